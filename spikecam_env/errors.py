@@ -1,0 +1,25 @@
+"""Which error to raise.
+
+- `InputError`: a value, file or option from the user is unusable.  The message names the value, what is
+  allowed, and what to do; the command line prints it in one line and exits with code 2.
+- `NotReadyError`: a call came before the one it needs (stepping before reset).
+
+Both are subclasses of the built-in a caller would expect, so `except ValueError` keeps working.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """An unusable value: says which, what is allowed, what to do."""
+
+
+class NotReadyError(RuntimeError):
+    """A call in the wrong order: says which call has to come first."""
+
+
+def unknown_name(kind: str, name: object, allowed: Iterable[str]) -> InputError:
+    """Error for a name that is not in a list: `unknown preset 'scs'; choose one of ideal, scsim`."""
+    return InputError(f"unknown {kind} {name!r}; choose one of {', '.join(sorted(allowed))}")
