@@ -97,7 +97,10 @@ class RotatingDisk:
         else:
             inner = np.arange(start // interval + 1, -(-stop // interval)) * interval
             times = np.concatenate([[start], inner, [stop]])
-        return Keyframes(times.astype(np.float64), np.stack([self._picture(t, gaze) for t in times]))
+        light = np.empty((len(times), *self.shape), np.float32)
+        for frame, picture in zip(times, light, strict=True):
+            self._paint(float(frame), gaze, picture)
+        return Keyframes(times.astype(np.float64), light)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame; see `scenes.protocol.Truth`."""
@@ -106,11 +109,13 @@ class RotatingDisk:
         dx, dy = np.arange(self.shape[1]) - x, (np.arange(self.shape[0]) - y)[:, None]
         inside = dx**2 + dy**2 <= self.radius**2
         drift = np.asarray(self.drift_px_s) / self.frame_rate_hz
+        radiance = np.empty(self.shape, np.float32)
+        self._paint(frame, gaze, radiance)
         flow = np.empty((*self.shape, 2), np.float32)
         flow[..., 0] = np.where(inside, self._turn * dy + drift[0], 0.0) - gaze.rate[0]
         flow[..., 1] = np.where(inside, -self._turn * dx + drift[1], 0.0) - gaze.rate[1]
         return Truth(
-            radiance=self._picture(frame, gaze),
+            radiance=radiance,
             flow=flow,
             object_id=inside.astype(np.int32),
             poses={"disk": (x, y, self.angle_at(frame)), "camera": gaze.at(frame)},
@@ -143,9 +148,11 @@ class RotatingDisk:
         speed += float(np.hypot(*gaze.rate)) if gaze else 0.0
         return int(np.clip(self.motion_per_key / max(speed, 1e-9), 1, LONGEST_INTERVAL))
 
-    def _picture(self, frame: float, gaze: Gaze | None) -> NDArray[np.float32]:
-        picture = self._background.copy()
-        if gaze is not None:
+    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+        """The radiance at a frame, into `picture` (H, W)."""
+        if gaze is None:
+            picture[:] = self._background
+        else:
             _paint_tile(self._tile, *gaze.at(frame), picture)
         x, y = self.centre_at(frame, gaze)
         rows, columns = _span(y, self.radius, self.shape[0]), _span(x, self.radius, self.shape[1])
@@ -153,7 +160,6 @@ class RotatingDisk:
         if view.size:
             x, y = x - columns.start, y - rows.start
             _paint_disk(self._turned(x, y, self.angle_at(frame), view.shape), x, y, self.radius, view)
-        return picture
 
     def _turned(self, x: float, y: float, angle: float, shape: tuple[int, ...]) -> NDArray[np.float32]:
         """The texture at an angle, its middle at (x, y) of a picture of this shape."""
@@ -167,13 +173,9 @@ class RotatingDisk:
                 [sine, cosine, middle - sine * x - cosine * y],
             ]
         )
-        return cv2.warpAffine(
-            self._disk,
-            matrix,
-            (shape[1], shape[0]),
-            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        turned = cv2.warpAffine(self._disk, matrix, (shape[1], shape[0]), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(turned, np.float32)
 
     def _check_numbers(self) -> None:
         ranges: dict[str, tuple[float, bool, str]] = {
@@ -198,10 +200,10 @@ def disk_texture(rng: np.random.Generator, size: int = 1024) -> Texture:
     axis = (np.arange(fine, dtype=np.float32) + 0.5) / size - 1
     x, y = axis[None, :], axis[:, None]
     radius = np.hypot(x, y)
-    turn = np.arctan2(y, x) / (2 * np.pi) + np.float32(0.5)
+    turn = (np.arctan2(y, x) / (2 * np.pi) + 0.5).astype(np.float32)
     image = np.full((fine, fine), 0.85, np.float32)
 
-    def fill(inner: float, outer: float, value: NDArray[np.float32] | float) -> None:
+    def fill(inner: float, outer: float, value: ArrayLike) -> None:
         np.copyto(image, value, where=(radius >= inner) & (radius < outer))
 
     fill(0.00, 0.05, 0.0)
@@ -211,7 +213,7 @@ def disk_texture(rng: np.random.Generator, size: int = 1024) -> Texture:
     fill(0.88, 0.93, np.floor(turn * 12) % 12 / np.float32(11))
     fill(0.93, 1.00, _sectors(turn, 144))
     fill(1.00, 2.00, 0.5)
-    return cv2.resize(image, (size, size), interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.resize(image, (size, size), interpolation=cv2.INTER_AREA), np.float32)
 
 
 _AT_REST = Gaze.fixed(0.0, 0.0)
@@ -245,9 +247,9 @@ def _prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.flo
     texels = max(2, round(2 * radius * TEXELS_PER_PIXEL))
     way = cv2.INTER_AREA if texels < len(texture) else cv2.INTER_LINEAR
     resampled = cv2.resize(texture.astype(np.float32), (texels, texels), interpolation=way)
-    wide = cv2.copyMakeBorder(resampled, *([_MARGIN] * 4), cv2.BORDER_REPLICATE)
+    wide = np.pad(resampled, _MARGIN, mode="edge")
     box = _turned_box(TEXELS_PER_PIXEL * np.sqrt(1 - 3 / TEXELS_PER_PIXEL**2))
-    return cv2.filter2D(wide, -1, box, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.filter2D(wide, -1, box, borderType=cv2.BORDER_REPLICATE), np.float32)
 
 
 def _turned_box(side: float) -> NDArray[np.float32]:
