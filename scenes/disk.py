@@ -14,6 +14,8 @@ bilinearly for each key; the rim is covered by area.  Keys are so close that the
 
 from __future__ import annotations
 
+import copy
+
 import cv2
 import numba
 import numpy as np
@@ -77,11 +79,18 @@ class RotatingDisk:
         self.motion_per_key = float(motion_per_key)
         self._check_numbers()
         textures, backgrounds = np.random.default_rng(seed).spawn(2)
-        values = disk_texture(textures) if texture is None else _checked_texture(texture)
+        size = int(np.clip(10 * self.radius, 128, 1024))
+        values = disk_texture(textures, size) if texture is None else _checked_texture(texture)
         self._disk = _prefiltered(light[0] + (light[1] - light[0]) * values, self.radius)
         self._tile = _background_tile(background, backgrounds, self.shape, light)
         self._background = np.empty(self.shape, np.float32)
         _paint_tile(self._tile, 0.0, 0.0, self._background)
+
+    def __repr__(self) -> str:
+        return (
+            f"RotatingDisk(shape={self.shape}, rpm={self.rpm:g}, radius={self.radius:g}, light={self.light}, "
+            f"centre={self.centre}, drift_px_s={self.drift_px_s}, angle={self.angle:g})"
+        )
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """Keys that cover frames [start, stop]: (K,) float64 whole frames, (K, H, W) float32.
@@ -120,6 +129,15 @@ class RotatingDisk:
             object_id=inside.astype(np.int32),
             poses={"disk": (x, y, self.angle_at(frame)), "camera": gaze.at(frame)},
         )
+
+    def placed(
+        self, centre: tuple[float, float], drift_px_s: tuple[float, float] = (0.0, 0.0), angle: float = 0.0
+    ) -> RotatingDisk:
+        """The same disk and background with the disk elsewhere at frame 0; shares the textures, costs nothing."""
+        other = copy.copy(self)
+        other.centre, other.drift_px_s, other.angle = centre, drift_px_s, float(angle)
+        other._check_numbers()
+        return other
 
     def angle_at(self, frame: float) -> float:
         """Of the disk, in [0, 2 pi) [radians]."""

@@ -2,6 +2,7 @@
 
 from spikecam_env.streams.hdf5 import SpikeWriter, read_truth
 from spikecam_env.streams.isi import isi_plane, isi_planes
+from spikecam_env.streams.npz import save_npz
 from spikecam_env.streams.packing import pack_frames, unpack_frames
 from spikecam_env.streams.pictures import middleTFI, middleTFP, tfp_film
 from spikecam_env.streams.recording import Recording, read_recording
@@ -18,6 +19,7 @@ __all__ = [
     "pack_frames",
     "read_recording",
     "read_truth",
+    "save_npz",
     "save_vidar_dat",
     "tfp_film",
     "unpack_frames",

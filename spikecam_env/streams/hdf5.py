@@ -42,7 +42,7 @@ class SpikeWriter:
         path: str | Path,
         shape: tuple[int, int],
         frame_rate_hz: float | None,
-        **attributes: str | int | float | bool,
+        **attributes: object,
     ) -> None:
         self.path = Path(path)
         self.shape = check_shape(shape)
@@ -130,14 +130,14 @@ def _opened(path: str | Path) -> h5py.File:
 
 
 def _file_attributes(
-    shape: tuple[int, int], frame_rate_hz: float | None, added: dict[str, str | int | float | bool]
-) -> dict[str, str | int | float | bool]:
+    shape: tuple[int, int], frame_rate_hz: float | None, added: dict[str, object]
+) -> dict[str, object]:
     for name, value in added.items():
         if name in RESERVED:
             raise InputError(f"attribute {name} is written by the recording itself; choose another name")
         if not isinstance(value, str | int | float | bool | np.number):
             raise InputError(f"attribute {name} is a {type(value).__name__}; give text, a number or a bool")
-    own: dict[str, str | int | float | bool] = {
+    own: dict[str, object] = {
         "format": FORMAT,
         "height": shape[0],
         "width": shape[1],

@@ -3,7 +3,9 @@
 One 3-D array of 0 and 1 (uint8, int8 or bool), time first or last; or packed along time, as in RSIR: `seq`
 holds eight frames a byte along its time axis and `length` the number of frames.
 
-Which axis is time, when the caller does not say, by the first rule that decides:
+Those that `save_npz` writes hold `spikes`, time first, and say so: `time_axis` = 0.
+
+Which axis is time, when neither the caller nor the file says, by the first rule that decides:
 
 1. Spikes.  A pixel that fires less than every second frame hardly ever fires in two frames running, while
    neighbours in space do so as often as chance has it.  Along an axis, over the lines with rate p <= 1/2,
@@ -23,12 +25,12 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.errors import InputError
-from spikecam_env.streams.packing import BitOrder, check_bit_order
+from spikecam_env.streams.packing import BitOrder, as_spikes, check_bit_order
 from spikecam_env.streams.vidar import KNOWN_SHAPES
-from spikecam_env.streams.whole import check_range, existing_file
+from spikecam_env.streams.whole import check_range, existing_file, whole_file
 
 
 def load_npz(
@@ -60,12 +62,19 @@ def load_npz(
     else:
         if stored.max(initial=0) > 1:
             raise InputError(f"{path}: {key} holds values to {stored.max()}; a spike stream holds 0 and 1 only")
-        time_axis, source = _time_axis(stored, time_axis, path)
+        stated = int(arrays["time_axis"]) if "time_axis" in arrays and key == "spikes" else None
+        time_axis, source = _time_axis(stored, time_axis, stated, path)
         spikes = np.moveaxis(stored, time_axis, 0)
     first, stop = check_range(first, count, len(spikes), str(path))
     spikes = spikes[first:stop, ::-1] if flip else spikes[first:stop]
     how = {"key": key, "time_axis": time_axis, "time_axis_from": source}
     return np.ascontiguousarray(spikes).view(np.uint8), how
+
+
+def save_npz(path: str | Path, spikes: ArrayLike) -> None:
+    """(T, H, W) spikes -> a compressed `.npz` that `load_npz` reads back.  The file appears whole."""
+    with whole_file(path) as beside, beside.open("wb") as file:
+        np.savez_compressed(file, spikes=as_spikes(spikes), time_axis=0)
 
 
 def coincidence(stored: NDArray[np.uint8], axis: int) -> float:
@@ -79,12 +88,13 @@ def coincidence(stored: NDArray[np.uint8], axis: int) -> float:
     return float(np.mean(lines[:-1] & lines[1:])) / chance
 
 
-def _time_axis(stored: NDArray[np.uint8], given: int | None, path: str | Path) -> tuple[int, str]:
+def _time_axis(stored: NDArray[np.uint8], given: int | None, stated: int | None, path: str | Path) -> tuple[int, str]:
     """(axis, where from): see the module's rules."""
-    if given is not None:
-        if given not in (0, 1, 2):
-            raise InputError(f"time_axis is {given}; it must be 0, 1 or 2")
-        return given, "given"
+    for axis, source in ((given, "given"), (stated, "file")):
+        if axis is not None:
+            if axis not in (0, 1, 2):
+                raise InputError(f"{path}: time_axis is {axis}; it must be 0, 1 or 2")
+            return axis, source
     middle = tuple(slice((n - min(n, 256)) // 2, (n + min(n, 256)) // 2) for n in stored.shape)
     silent = [axis for axis in (0, 2) if coincidence(stored[middle], axis) < 0.5]
     if len(silent) == 1:

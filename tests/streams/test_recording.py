@@ -8,7 +8,7 @@ import pytest
 
 from spikecam_env import __version__
 from spikecam_env.errors import InputError, NotReadyError
-from spikecam_env.streams import SpikeWriter, read_recording, read_truth, save_vidar_dat
+from spikecam_env.streams import SpikeWriter, read_recording, read_truth, save_npz, save_vidar_dat
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "data" / "real"
 needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="needs the shared data folder")
@@ -71,6 +71,15 @@ def test_packed_along_time_is_unpacked(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", seq=packed, length=80)
     with pytest.raises(InputError, match="80 frames"):
         read_recording(tmp_path / "a.npz")
+
+
+def test_npz_saved_here_says_its_time_axis(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 2, (20, 6, 11), dtype=np.uint8)
+    save_npz(tmp_path / "a.npz", noise)
+    recording = read_recording(tmp_path / "a.npz")
+    assert recording.attributes == {"key": "spikes", "time_axis": 0, "time_axis_from": "file"}
+    np.testing.assert_array_equal(recording.spikes, noise)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
 
 
 def test_npz_without_one_stream_is_refused(tmp_path: Path) -> None:
@@ -136,7 +145,7 @@ def test_truncated_and_foreign_files_are_refused(tmp_path: Path) -> None:
 
 def test_attributes_are_plain_and_not_reserved(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="seed is a dict"):
-        SpikeWriter(tmp_path / "a.h5", (5, 9), None, seed={})  # type: ignore[arg-type]
+        SpikeWriter(tmp_path / "a.h5", (5, 9), None, seed={})
     with pytest.raises(InputError, match="height"):
         SpikeWriter(tmp_path / "a.h5", (5, 9), None, height=4)
     with pytest.raises(InputError, match="frame_rate_hz is 0"):
