@@ -49,6 +49,8 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
     max_gaze_rate_px_s   default 4 of the shorter side a second
     engine               of the sensor: "auto", "fast" or "reference"
 
+    `sensor` and `scene` are open to look at: `env.unwrapped.sensor.clean_twin()`, `env.unwrapped.scene.truth(...)`.
+
     Errors: InputError for a value out of range or unknown, by name; NotReadyError before the first reset.
     """
 
@@ -80,7 +82,7 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         self.frames_per_step, self.packed, self.ground_truth = int(frames_per_step), packed, ground_truth
         self.render_mode = render_mode
         self._make_scene, self._judge = make_scene, judge
-        self._sensor = SpikeSensor(self.model, self.shape, seed=0, engine=engine)
+        self.sensor = SpikeSensor(self.model, self.shape, seed=0, engine=engine)
         self._scene: Scene | None = None
         self._position = (0.0, 0.0)
         self._recent: list[NDArray[np.uint8]] = []
@@ -93,7 +95,7 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         """A new episode; `options` go to `make_scene`."""
         super().reset(seed=seed)
         self._scene = self._checked(self._make_scene(self.np_random, dict(options or {})))
-        self._sensor.reset(seed=int(self.np_random.integers(2**31)))
+        self.sensor.reset(seed=int(self.np_random.integers(2**31)))
         self._position = (0.0, 0.0)
         self._recent = []
         observation, info, _ = self._expose((0.0, 0.0))
@@ -106,7 +108,7 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
             raise InputError(f"action is {action!r}; it must be two finite numbers in [-1, 1], (pan, tilt)")
         pan, tilt = np.clip(rate, -1.0, 1.0) * (self.max_gaze_rate_px_s / self.model.frame_rate_hz)
         observation, info, gaze = self._expose((float(pan), float(tilt)))
-        reward, terminated = self._judge(self._scene, self._sensor.frame, gaze)
+        reward, terminated = self._judge(self.scene, self.sensor.frame, gaze)
         return observation, float(reward), bool(terminated), False, info
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
@@ -120,20 +122,26 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         grey = (255 * rate ** (1 / 2.2) + 0.5).astype(np.uint8)
         return np.repeat(grey[:, :, None], 3, axis=2)
 
+    @property
+    def scene(self) -> Scene:
+        """Of this episode; NotReadyError before the first reset."""
+        if self._scene is None:
+            raise NotReadyError("the environment has no scene yet; call reset first")
+        return self._scene
+
     def _expose(self, rate: tuple[float, float]) -> tuple[NDArray[Any], dict[str, Any], Gaze]:
         """The next K frames while the gaze moves at `rate` [pixels/frame]: (observation, info, the gaze's path)."""
-        if self._scene is None:
-            raise NotReadyError("the environment has no scene yet; call reset before step")
-        first, stop = self._sensor.frame, self._sensor.frame + self.frames_per_step
+        scene = self.scene
+        first, stop = self.sensor.frame, self.sensor.frame + self.frames_per_step
         pan, tilt = self._position
         self._position = pan + rate[0] * self.frames_per_step, tilt + rate[1] * self.frames_per_step
         gaze = Gaze((pan, tilt), self._position, (first, stop))
-        spikes = self._sensor.step(self._scene.radiance(first, stop, gaze), frames=self.frames_per_step)
+        spikes = self.sensor.step(scene.radiance(first, stop, gaze), frames=self.frames_per_step)
         if self.render_mode is not None:
             blocks = -(-RENDER_FRAMES // self.frames_per_step)
             self._recent = [*self._recent, spikes.copy()][-blocks:]
         observation = pack_frames(spikes) if self.packed else spikes.view(np.int8)
-        return observation, self._info(self._scene, gaze), gaze
+        return observation, self._info(scene, gaze), gaze
 
     def _info(self, scene: Scene, gaze: Gaze) -> dict[str, Any]:
         first, stop = gaze.frames

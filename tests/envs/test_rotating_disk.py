@@ -200,3 +200,12 @@ def test_a_scene_of_another_size_is_refused() -> None:
 def test_importing_the_environments_registers_them() -> None:
     program = f"import gymnasium, spikecam_env.envs; gymnasium.make({ID!r}, shape=(8, 8)).reset(seed=0)"
     subprocess.run([sys.executable, "-W", "error", "-c", program], check=True, timeout=120)
+
+
+def test_clean_twin_sees_the_same_scene() -> None:
+    """Stepped through the same light, the noise-free twin's counts are those of the light."""
+    env = make(rpm=0.0, drift_px_s=0.0, frames_per_step=400, ground_truth=True)
+    _, info = env.reset(seed=2)
+    twin = env.sensor.clean_twin()
+    clean = twin.step(env.scene.radiance(0, 400, None), 400)
+    assert np.abs(clean.sum(axis=0) - 400 * info["radiance"]).max() <= 1.001
