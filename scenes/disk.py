@@ -168,10 +168,11 @@ class RotatingDisk:
 
     def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
         """The radiance at a frame, into `picture` (H, W)."""
-        if gaze is None:
+        pan, tilt = (gaze or _AT_REST).at(frame)
+        if (pan, tilt) == (0.0, 0.0):
             picture[:] = self._background
         else:
-            _paint_tile(self._tile, *gaze.at(frame), picture)
+            _paint_tile(self._tile, pan, tilt, picture)
         x, y = self.centre_at(frame, gaze)
         rows, columns = _span(y, self.radius, self.shape[0]), _span(x, self.radius, self.shape[1])
         view = picture[rows, columns]
@@ -302,27 +303,29 @@ def _background_tile(
 def _paint_tile(tile, pan, tilt, picture):  # pragma: no cover - compiled
     """The repeated tile seen from offset (pan, tilt), bilinear."""
     height, width = tile.shape
-    left, top = np.floor(pan), np.floor(tilt)
+    left, top = int(np.floor(pan)), int(np.floor(tilt))
     right_share, lower_share = np.float32(pan - left), np.float32(tilt - top)
-    columns = np.empty(picture.shape[1] + 1, np.int64)
-    for c in range(len(columns)):
-        columns[c] = (c + int(left)) % width
+    column = (left + np.arange(picture.shape[1] + 1)) % width
+    mixed = np.empty(picture.shape[1] + 1, np.float32)
     for r in range(picture.shape[0]):
-        upper, lower = tile[(r + int(top)) % height], tile[(r + int(top) + 1) % height]
+        upper, lower = (top + r) % height, (top + r + 1) % height
+        for c in range(len(mixed)):
+            above = tile[upper, column[c]]
+            mixed[c] = above + lower_share * (tile[lower, column[c]] - above)
         for c in range(picture.shape[1]):
-            a, b = columns[c], columns[c + 1]
-            above = upper[a] + right_share * (upper[b] - upper[a])
-            below = lower[a] + right_share * (lower[b] - lower[a])
-            picture[r, c] = above + lower_share * (below - above)
+            picture[r, c] = mixed[c] + right_share * (mixed[c + 1] - mixed[c])
 
 
 @numba.njit(cache=True)
 def _paint_disk(disk, x, y, radius, picture):  # pragma: no cover - compiled
     """The disk over the picture; a pixel on the rim is covered by the share (a half-plane's) inside."""
-    for r in range(picture.shape[0]):
+    reach = np.float32(radius + 0.5)
+    across = (np.arange(picture.shape[1]) - x).astype(np.float32)
+    for r in range(len(picture)):
+        down = np.float32(r - y)
         for c in range(picture.shape[1]):
-            distance = np.float32(np.sqrt((c - x) ** 2 + (r - y) ** 2))
-            cover = min(max(np.float32(radius + 0.5) - distance, np.float32(0.0)), np.float32(1.0))
+            distance = np.sqrt(across[c] * across[c] + down * down)
+            cover = min(max(reach - distance, np.float32(0.0)), np.float32(1.0))
             picture[r, c] += cover * (disk[r, c] - picture[r, c])
 
 

@@ -114,6 +114,24 @@ def test_gaze_moves_the_picture_the_other_way() -> None:
     assert after.poses["camera"] == (7.0, -4.0)
 
 
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (0.3, -0.6), (-7.0, 3.0), (123.7, -57.25)])
+@pytest.mark.parametrize("tile_shape", [(1, 1), (3, 5), (64, 40)])
+def test_background_repeats_and_is_linear_between_texels(
+    tile_shape: tuple[int, int], offset: tuple[float, float]
+) -> None:
+    tile = np.random.default_rng(0).random(tile_shape).astype(np.float32)
+    seen = RotatingDisk(shape=(20, 30), radius=1, centre=(-900.0, 0.0), background=tile).truth(0, Gaze.fixed(*offset))
+    rows, columns = np.arange(20) + offset[1], np.arange(30) + offset[0]
+    expected = np.zeros((20, 30))
+    for dr in (0, 1):
+        for dc in (0, 1):
+            r, c = np.floor(rows) + dr, np.floor(columns) + dc
+            weight = np.outer(1 - np.abs(rows - r), 1 - np.abs(columns - c))
+            picked = tile[np.ix_(r.astype(int) % tile_shape[0], c.astype(int) % tile_shape[1])]
+            expected += weight * picked
+    np.testing.assert_allclose(seen.radiance, expected, atol=2e-6)
+
+
 def test_gaze_keys_start_and_end_with_the_block() -> None:
     disk = RotatingDisk(shape=(60, 90))
     keys = disk.radiance(41, 83, Gaze((0.0, 0.0), (8.0, 3.0), (41, 83)))
