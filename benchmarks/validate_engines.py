@@ -1,6 +1,6 @@
 """Is the fast engine the reference in distribution?  The acceptance grid; prints every cell's smallest p-value.
 
-    python benchmarks/validate_engines.py --pixels 200000 --seed 1
+python benchmarks/validate_engines.py --pixels 200000 --seed 1
 """
 
 from __future__ import annotations
