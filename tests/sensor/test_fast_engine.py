@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
 from spikecam_env.sensor.kernels import fast
-from spikecam_env.sensor.light import GRAINS, Segment
+from spikecam_env.sensor.light import GRAINS, Segment, ramp
 from spikecam_env.sensor.model import generator
 
 KEYS = 4
@@ -164,3 +164,23 @@ def test_what_the_engine_does_not_carry_is_refused_by_name() -> None:
         SpikeSensor(few, (4, 4), engine="fast")
     assert SpikeSensor(few, (4, 4), engine="auto").engine == "reference"
     assert fast.missing(scsim.effects) == []
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 7, 33, 63, 64])
+def test_collected_light_never_falls_and_is_right_within_a_grain(length: int) -> None:
+    """Every pair of levels up to 150 grains, and steep ramps up to a threshold a frame: an engine that jumps needs F monotone, to the grain."""
+    rng = np.random.default_rng(length)
+    dim = np.array(np.meshgrid(np.arange(150), np.arange(150))).reshape(2, -1)
+    steep = rng.integers(0, GRAINS, (2, 20_000))
+    fading = np.array([rng.integers(0, GRAINS, 20_000), np.zeros(20_000, dtype=np.int64)])
+    start, stop = np.concatenate([dim, steep, fading, fading[::-1]], axis=1).astype(np.float32)
+    one, none = np.ones_like(start), np.zeros_like(start)
+    law = ramp(Segment(start, stop, length, 0, length), one, none)
+    collected = np.array([law.collected(k) for k in range(length + 1)])
+    k = np.arange(length + 1.0)[:, None]
+    exact = start * k + (stop.astype(np.float64) - start) * k**2 / (2 * length)
+    error = collected - exact
+    print(f"length {length}: {error.min():+.2f} .. {error.max():+.2f} grains")
+    assert np.diff(collected, axis=0).min() >= 0
+    assert error.min() > -1.0
+    assert error.max() < 1.0
