@@ -168,7 +168,10 @@ def test_what_the_engine_does_not_carry_is_refused_by_name() -> None:
 
 @pytest.mark.parametrize("length", [1, 2, 3, 7, 33, 63, 64])
 def test_collected_light_never_falls_and_is_right_within_a_grain(length: int) -> None:
-    """Every pair of levels up to 150 grains, and steep ramps up to a threshold a frame: an engine that jumps needs F monotone, to the grain."""
+    """Every pair of levels up to 150 grains, and ramps up to a threshold a frame.
+
+    An engine that jumps to the crossing sees what one that steps sees only if F is monotone, to the grain.
+    """
     rng = np.random.default_rng(length)
     dim = np.array(np.meshgrid(np.arange(150), np.arange(150))).reshape(2, -1)
     steep = rng.integers(0, GRAINS, (2, 20_000))

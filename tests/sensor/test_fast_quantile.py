@@ -64,11 +64,12 @@ def test_polynomial_rises_throughout_and_leaves_every_threshold_positive(electro
 
 
 def test_a_fit_takes_less_than_a_fifth_of_a_second() -> None:
-    fitted_polynomial(1234.0, 0.01)
-    begin = time.perf_counter()
-    fitted_polynomial(1235.0, 0.01)
-    took = time.perf_counter() - begin
-    print(f"{1e3 * took:.0f} ms")
+    took = np.inf
+    for electrons in (1234.0, 1235.0, 1236.0, 1237.0):
+        begin = time.perf_counter()
+        fitted_polynomial(electrons, 0.01)
+        took = min(took, time.perf_counter() - begin)
+    print(f"{1e3 * took:.0f} ms, best of four")
     assert took < 0.2
 
 

@@ -1,4 +1,4 @@
-"""The compiled loop of the fast engine: from spike to spike, sixteen pixels at a time.
+"""The compiled loop of the fast engine: from spike to spike, 32 pixels at a time.
 
     F(k) = i0 k + B k^2 + r k^2 / 2n                    grains collected before frame k (`light`, exact integers)
     next spike: smallest k with F(k) >= x               x: grains at which the pixel fires, counted from the key
@@ -27,8 +27,8 @@ TILE = 256
 BAND = 8
 """Tiles that one thread takes at a time: 256 bytes of a packed frame, so threads do not write one cache line."""
 
-_LANES = 16
-"""Pixels that go from spike to spike together: what LLVM turns into vector instructions."""
+_LANES = 32
+"""Pixels that go from spike to spike together: LLVM makes vector instructions of it (8 it would unroll to scalars)."""
 
 _U = np.uint32
 _I = np.int32
