@@ -31,6 +31,7 @@ class Bench:
             rows = bench_sensor()
         else:
             from denoiser.bench import bench_online
+
             from spikecam_env.sensor.bench import machine
 
             print(machine())

@@ -55,7 +55,9 @@ class Demo:
         }
         write_film(folder / "demo.mp4", frames, fps=15.0)
         write_picture(folder / "demo.png", frames[len(frames) // 2])
-        write_json(folder / "demo.json", {"options": {**vars(self), "out": str(self.out)}, "speed": speed, "table": rows})
+        write_json(
+            folder / "demo.json", {"options": {**vars(self), "out": str(self.out)}, "speed": speed, "table": rows}
+        )
         print(table(rows))
         print()
         print(table([speed]))

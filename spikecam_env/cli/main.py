@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated, Any
+from typing import Annotated, Any, Union
 
 import tyro
 
@@ -42,9 +42,9 @@ def main(args: list[str] | None = None) -> None:
 def run(args: list[str] | None = None) -> int:
     """Parse and run; returns the exit code."""
     union: Any = None
-    for name, cls in COMMANDS.items():
-        part = Annotated[cls, tyro.conf.subcommand(name, description=cls.__doc__)]
-        union = part if union is None else union | part
+    for name, options in COMMANDS.items():
+        command_type: Any = Annotated[options, tyro.conf.subcommand(name)]  # type: ignore[valid-type]
+        union = command_type if union is None else Union[union, command_type]  # noqa: UP007
     command = tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=args, config=(tyro.conf.OmitArgPrefixes,))
     try:
         command.run()

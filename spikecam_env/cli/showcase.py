@@ -1,4 +1,4 @@
-"""What `spikecam demo` shows: a disk through the environment and the online denoiser, beside its clean twin and its truth."""
+"""What `spikecam demo` shows: a disk through environment and online denoiser, beside its clean twin and its truth."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from denoiser.metrics import gap_closed, psnr_db
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from denoiser import OnlineDnSS
-from denoiser.metrics import gap_closed, psnr_db
 from scenes.protocol import Gaze
 from spikecam_env.cli.film import Panel, compose
 from spikecam_env.errors import InputError
@@ -33,7 +33,7 @@ Picture = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Streamed:
-    """One run.  noisy, clean, denoised: (T, H, W) uint8.  planes, truths: (H, W) float32 of each block's middle frame."""
+    """One run.  noisy, clean, denoised: (T, H, W) uint8.  planes, truths: (H, W) float32, of blocks' middle frames."""
 
     mode: str
     frame_rate_hz: float
@@ -57,9 +57,7 @@ class Streamed:
         return range(FIRST_SHOWN, len(self.truths) - LAST_SHOWN)
 
 
-def stream_disk(
-    *, rpm: float, frames: int, mode: str, model: str, shape: tuple[int, int], seed: int
-) -> Streamed:
+def stream_disk(*, rpm: float, frames: int, mode: str, model: str, shape: tuple[int, int], seed: int) -> Streamed:
     """Stream the disk through environment and denoiser; raises InputError for fewer than 500 frames."""
     if frames < 500:
         raise InputError(f"{frames} frames are too few to show; ask for 500 or more (1200 are a turn at 2000 rpm)")
@@ -75,7 +73,11 @@ def stream_disk(
     online = OnlineDnSS.pretrained(mode, output="both")
     _compile(env, online, shape)
     still = np.zeros(2, np.float32)
-    noisy, clean, denoised, planes, truths = [], [], [], [], []
+    noisy: list[Spikes] = []
+    clean: list[Spikes] = []
+    denoised: list[Spikes] = []
+    planes: list[Picture] = []
+    truths: list[Picture] = []
     camera_s = denoiser_s = 0.0
     blocks = -(-frames // BLOCK)
     for step in tqdm(range(blocks + 1), desc="stream", unit="block", leave=False):

@@ -1,4 +1,4 @@
-"""Gymnasium environments.  Importing this package registers their ids; Gymnasium 1.x finds none by itself."""
+"""Gymnasium environments.  Importing this package registers their ids."""
 
 from spikecam_env.envs.registration import register
 
