@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import numba
 import numpy as np
+from numba import config
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects import Effect
@@ -48,12 +48,8 @@ def missing(effects: Sequence[Effect]) -> list[str]:
     """Names of effects, or options of them, that this engine does not carry."""
     names = [e.name for e in effects if e.name not in CARRIES]
     names += ["shot_noise.dark_is_noisy=false" for e in effects if getattr(e, "dark_is_noisy", True) is False]
-    names += [
-        f"shot_noise.quanta={e.quanta:g} (below {MIN_ELECTRONS:g})"
-        for e in effects
-        if getattr(e, "quanta", MIN_ELECTRONS) < MIN_ELECTRONS
-    ]
-    return names
+    quanta = [getattr(e, "quanta", MIN_ELECTRONS) for e in effects]
+    return names + [f"shot_noise.quanta={n:g} (below {MIN_ELECTRONS:g})" for n in quanta if n < MIN_ELECTRONS]
 
 
 @dataclass(frozen=True)
@@ -82,8 +78,9 @@ class PixelLaw:
 
 @dataclass
 class FastState:
-    """Pixels mid-stream, padded to whole tiles: remaining (int32) grains to the next spike, fired (uint32) spikes so far.
+    """Pixels mid-stream, padded to whole tiles.
 
+    remaining: int32 grains to the next spike.  fired: uint32 spikes so far.
     seeds: the two words that, with a pixel's number and its spike's, fix every draw.
     """
 
@@ -139,7 +136,7 @@ def run_packed(state: FastState, segment: Segment, *, threads: int | None = None
         state.fired,
         packed,
     )
-    threads = numba.config.NUMBA_NUM_THREADS if threads is None else threads
+    threads = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
     bands = -(-state.remaining.size // (loop.TILE * loop.BAND))
     threads = max(1, min(threads, bands, pixels * segment.count // _WORTH_A_THREAD))
     others = [_pool(os.getpid(), threads - 1).submit(loop.advance, i, threads, *work) for i in range(1, threads)]
