@@ -1,0 +1,107 @@
+"""Inter-spike interval (ISI) planes.
+
+For a stream of T frames and a pixel with spikes at frames s (0 <= s < T):
+
+    last(t) = max{s : s <= t},            -1 if there is none
+    next(t) = min{s : s > t},             T if there is none
+    ISI(t)  = min(next(t), t + future + 1) - last(t)          [frames], an integer >= 1
+
+The interval at t is the one that runs at the end of frame t: a spike in frame t opens a new interval.
+Where a bounding spike is missing the interval counts to the edge of what was seen (one frame before the
+data, one frame after them, or one frame after the look-ahead): a lower bound on the true interval.
+
+`future` is the look-ahead in frames.  Plane t depends on frames 0 .. t + future only, so a causal
+filter that lags by `future` frames computes the same plane.  None looks to the end of the data.
+Normalised plane: 1 / ISI, in (0, 1], an estimate of the rate [spikes/frame].  Source: DESIGN section 5.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spikecam_env.errors import InputError
+from spikecam_env.streams.packing import as_spikes
+
+
+def isi_plane(
+    spikes: ArrayLike, t: int, *, future: int | None = None, normalised: bool = False
+) -> NDArray[np.float32]:
+    """(T, H, W) spikes -> (H, W) float32, the interval at frame t [frames], or its inverse if `normalised`.
+
+    Errors: InputError if t is outside the stream or `future` is negative.
+    """
+    return isi_planes(spikes, start=t, stop=t + 1, future=future, normalised=normalised)[0]
+
+
+def isi_planes(
+    spikes: ArrayLike,
+    *,
+    start: int = 0,
+    stop: int | None = None,
+    future: int | None = None,
+    normalised: bool = False,
+) -> NDArray[np.float32]:
+    """(T, H, W) spikes -> (stop - start, H, W) float32: plane i is `isi_plane(spikes, start + i)`.
+
+    The whole stream is seen whatever `start` and `stop` are; time is O(T) a pixel.
+    Errors: InputError unless 0 <= start < stop <= T and future >= 0.
+    """
+    frames = as_spikes(spikes)
+    count = len(frames)
+    stop = count if stop is None else stop
+    if not 0 <= start < stop <= count:
+        raise InputError(
+            f"planes {start} to {stop} asked of {count} frames; need 0 <= start < stop <= {count}"
+        )
+    if future is not None and future < 0:
+        raise InputError(f"future is {future}; it is a look-ahead in frames, 0 or more")
+    ahead = count if future is None else future
+    flat = np.ascontiguousarray(frames).reshape(count, -1)
+    planes = np.empty((stop - start, flat.shape[1]), np.float32)
+    _isi(flat, start, stop, min(ahead, count), normalised, planes)
+    return planes.reshape(stop - start, *frames.shape[1:])
+
+
+@numba.njit(cache=True, parallel=True)
+def _isi(spikes, start, stop, ahead, normalised, planes):  # pragma: no cover - compiled
+    count, pixels = spikes.shape
+    strip = 2048
+    for s in numba.prange((pixels + strip - 1) // strip):
+        a, b = s * strip, min((s + 1) * strip, pixels)
+        last = np.full(b - a, -1, np.int32)
+        for t in range(_first_that_matters(spikes, start, a, b), stop):
+            for i in range(b - a):
+                if spikes[t, a + i]:
+                    last[i] = t
+            if t >= start:
+                for i in range(b - a):
+                    planes[t - start, a + i] = last[i]
+        horizon = min(count, stop + ahead)
+        following = np.full(b - a, horizon, np.int32)
+        for t in range(horizon - 1, start - 1, -1):
+            if t < stop:
+                limit = min(t + ahead + 1, count)
+                for i in range(b - a):
+                    interval = np.float32(min(following[i], limit)) - planes[t - start, a + i]
+                    planes[t - start, a + i] = np.float32(1.0) / interval if normalised else interval
+            for i in range(b - a):
+                if spikes[t, a + i]:
+                    following[i] = t
+
+
+@numba.njit(cache=True)
+def _first_that_matters(spikes, start, a, b):  # pragma: no cover - compiled
+    """The latest t <= start such that every pixel in [a, b) has a spike in t .. start, or 0."""
+    missing = b - a
+    seen = np.zeros(b - a, np.uint8)
+    t = start
+    while missing > 0 and t > 0:
+        for i in range(b - a):
+            if spikes[t, a + i] and not seen[i]:
+                seen[i] = 1
+                missing -= 1
+        if missing > 0:
+            t -= 1
+    return t

@@ -1,0 +1,75 @@
+"""Spike frames as arrays and as bits.
+
+A stream is (T, H, W) uint8 of 0 and 1: time, rows from the top, columns.  Packed, a frame is
+ceil(H W / 8) bytes: pixels row by row, eight a byte, the first in the least significant bit; the unused
+bits of the last byte are 0.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spikecam_env.errors import InputError, unknown_name
+
+BitOrder = Literal["little", "big"]
+
+
+def pack_frames(spikes: ArrayLike, *, bit_order: BitOrder = "little") -> NDArray[np.uint8]:
+    """(T, H, W) spikes -> (T, ceil(H W / 8)) uint8."""
+    frames = as_spikes(spikes)
+    flat = frames.reshape(frames.shape[0], frames.shape[1] * frames.shape[2])
+    return np.packbits(flat, axis=1, bitorder=check_bit_order(bit_order))
+
+
+def unpack_frames(
+    packed: NDArray[np.uint8], shape: tuple[int, int], *, bit_order: BitOrder = "little"
+) -> NDArray[np.uint8]:
+    """(T, ceil(H W / 8)) uint8 -> (T, H, W) uint8 of 0 and 1.
+
+    Errors: InputError if the width is not that of `shape`.
+    """
+    height, width = check_shape(shape)
+    expected = packed_bytes((height, width))
+    if packed.ndim != 2 or packed.dtype != np.uint8 or packed.shape[1] != expected:
+        raise InputError(
+            f"packed frames are {packed.dtype} of shape {packed.shape}; "
+            f"{height} x {width} pixels need uint8 of shape (frames, {expected})"
+        )
+    bits = np.unpackbits(packed, axis=1, count=height * width, bitorder=check_bit_order(bit_order))
+    return bits.reshape(-1, height, width)
+
+
+def packed_bytes(shape: tuple[int, int]) -> int:
+    """Bytes a packed frame takes."""
+    return -(-shape[0] * shape[1] // 8)
+
+
+def as_spikes(spikes: ArrayLike) -> NDArray[np.uint8]:
+    """The stream as (T, H, W) uint8, without a copy where it is uint8, int8 or bool already.
+
+    Errors: InputError for another dtype or number of axes.
+    """
+    array = np.asarray(spikes)
+    if array.ndim != 3 or array.dtype not in (np.uint8, np.int8, np.bool_):
+        raise InputError(
+            f"spikes are {array.dtype} of shape {array.shape}; a stream is uint8, int8 or bool "
+            "of shape (frames, rows, columns)"
+        )
+    return array.view(np.uint8)
+
+
+def check_shape(shape: tuple[int, int]) -> tuple[int, int]:
+    """(rows, columns), both at least 1, or InputError."""
+    if len(shape) != 2 or min(shape) < 1:
+        raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
+    return int(shape[0]), int(shape[1])
+
+
+def check_bit_order(bit_order: str) -> BitOrder:
+    """`little` (first pixel in the least significant bit) or `big`, or InputError."""
+    if bit_order not in ("little", "big"):
+        raise unknown_name("bit_order", bit_order, ("little", "big"))
+    return "little" if bit_order == "little" else "big"
