@@ -1,0 +1,27 @@
+"""Capacitor spread: pixels differ in the capacitance that light discharges.
+
+    C(x, y) = C + C_S,  C_S ~ N(0, sigma^2)
+
+Stage: integration.  Seen in: flats (with dark current, separates from conversion gain).
+Source: paper (10); published 0.0128 fF.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.unit import PixelArray
+
+
+@dataclass(frozen=True)
+class CapacitorSpread(Effect):
+    sigma_fF: float = parameter(0.0128, unit="fF", bounds=(0.0, 1.0), doc="standard deviation over pixels")
+
+    stage = Stage.INTEGRATION
+
+    def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
+        capacitance = pixels.capacitance_fF + self.sigma_fF * rng.standard_normal(pixels.gain.shape)
+        return replace(pixels, capacitance_fF=np.maximum(capacitance, 0.01 * pixels.circuit.capacitance_fF))

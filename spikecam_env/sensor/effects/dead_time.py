@@ -1,0 +1,24 @@
+"""Dead time: after a spike the reset switch holds the node for tau, and that light is lost.
+
+    T = 1/x + tau        x: charge a frame over threshold, T: mean interval [frames]
+
+Stage: reset.  Seen in: flats at x > 0.3 (every interval longer by tau, whatever the level).
+Twins: comparator_delay (grows as 1/sqrt(x)), photo_response_nonlinearity.
+Source: SCSim's script (0.2 % of a 50 us frame).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from spikecam_env.sensor.effects.base import Array, Effect, Stage, parameter
+
+
+@dataclass(frozen=True)
+class DeadTime(Effect):
+    tau_us: float = parameter(0.1, unit="us", bounds=(0.0, 25.0), doc="time without integration after a spike")
+
+    stage = Stage.RESET
+
+    def after_reset(self, residual: Array, rate: Array, frame_rate_hz: float) -> Array:
+        return residual - rate * (self.tau_us * 1e-6 * frame_rate_hz)

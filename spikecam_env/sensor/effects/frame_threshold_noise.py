@@ -1,0 +1,26 @@
+"""Frame threshold noise: the comparator's reference is drawn anew in every frame, not at each reset.
+
+    fires when charge >= 1 + sigma n_t / V_d,  n_t ~ N(0, 1) a pixel and frame
+
+Stage: threshold.  Seen in: dim flats: many draws before a crossing make the lowest win, so intervals shorten with T.
+Source: SCSim's public script (6.36 mV), kept for comparison with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Stage, parameter
+from spikecam_env.sensor.unit import Unit
+
+
+@dataclass(frozen=True)
+class FrameThresholdNoise(Effect):
+    sigma_mV: float = parameter(6.36, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a frame's reference")
+
+    stage = Stage.THRESHOLD
+
+    def frame_threshold(self, threshold: Array, unit: Unit, rng: np.random.Generator) -> Array:
+        return threshold + 1e-3 * self.sigma_mV / unit.swing_V * rng.standard_normal(threshold.shape)

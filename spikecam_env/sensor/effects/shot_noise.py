@@ -1,0 +1,34 @@
+"""Shot noise: charge arrives as single electrons, a Poisson stream.
+
+    electrons of a frame ~ Poisson(mean);   spread of a spike's charge: 1 / sqrt(N)
+
+Stage: integration.  Seen in: the k-slope of A_k, T^2/N.  Source: paper (3)-(4), where the photon count is drawn; here it
+is the collected electrons, dark ones included.  SCSim's script counts 5e4 quanta a frame at full scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.unit import PixelArray
+
+
+@dataclass(frozen=True)
+class ShotNoise(Effect):
+    quanta: float = parameter(
+        29648.0,
+        unit="electrons",
+        bounds=(2.0, 1e9),
+        doc="electrons to a nominal threshold; C V / q by default",
+    )
+    dark_is_noisy: bool = parameter(
+        True, unit="", doc="dark charge is Poisson too (physics); False is the paper's literal (11)"
+    )
+
+    stage = Stage.INTEGRATION
+
+    def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
+        return replace(pixels, quanta=self.quanta, dark_is_noisy=self.dark_is_noisy)

@@ -1,0 +1,27 @@
+"""Synchronous reset: the node is held at reset from the crossing to the read-out, and that light is lost.
+
+    T = ceil(1/x) for steady light x;  averaged over x: mean interval + 1/2, successive intervals uncorrelated
+
+Stage: reset.  Seen in: flats (intervals locked to whole frames).
+Source: what simulators do that set the accumulator to zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Stage, parameter
+
+
+@dataclass(frozen=True)
+class SynchronousReset(Effect):
+    fraction: float = parameter(
+        1.0, unit="relative", bounds=(0.0, 1.0), doc="share of the charge after the crossing lost"
+    )
+
+    stage = Stage.RESET
+
+    def after_reset(self, residual: Array, rate: Array, frame_rate_hz: float) -> Array:
+        return residual * np.float64(1.0 - self.fraction)

@@ -1,0 +1,182 @@
+"""Light over time, and how a pixel integrates it: the exact law that every engine shares.
+
+Radiance is relative: 1.0 makes the nominal pixel fire once a frame.  It is given at key frames and linear
+between them; frame n integrates over [n, n+1).
+
+Collected light is counted in *grains*, GRAINS = 2^23 to a pixel's own threshold (0.004 electrons: finer than
+anything physical), in whole numbers.  Within a key interval of n frames whose light goes from i0 to i1 grains
+a frame, the grains collected before frame k are
+
+    F(k) = A k + B k(k-1)/2 + (r k(k-1)/2) / n        A = i0 + B/2,  i1 - i0 = B n + r
+
+in 32-bit integer arithmetic, so engines that compute it in closed form or frame by frame give the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spikecam_env.errors import InputError
+
+GRAINS = 1 << 23
+"""Grains of charge to one threshold."""
+
+MAX_GRAINS_PER_FRAME = 2 * GRAINS
+"""Light is capped at two thresholds a frame: from one on, a pixel fires in every frame anyway."""
+
+MAX_SEGMENT = 64
+"""Longest key interval [frames] integrated as one ramp; longer ones are divided."""
+
+
+@dataclass(frozen=True)
+class Keyframes:
+    """Radiance at key frames, linear between them, constant outside.
+
+    frame: (K,) float64, strictly increasing [frames].  radiance: (K, H, W) float32, >= 0.
+    Keys at whole frames not more than 64 apart are integrated in one go; other keys cost one pass a frame.
+    Raises InputError for other shapes, unordered frames, and radiance that is negative or not finite.
+    """
+
+    frame: NDArray[np.float64]
+    radiance: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        frame = np.asarray(self.frame, dtype=np.float64)
+        radiance = np.ascontiguousarray(self.radiance, dtype=np.float32)
+        if frame.ndim != 1 or frame.size == 0 or radiance.ndim != 3 or len(radiance) != len(frame):
+            raise InputError(
+                f"Keyframes need frame (K,) and radiance (K, H, W) with K >= 1; got {frame.shape} and {radiance.shape}"
+            )
+        if not np.all(np.isfinite(frame)) or np.any(np.diff(frame) <= 0):
+            raise InputError("Keyframes.frame must be finite and strictly increasing; sort it and drop repeats")
+        check_radiance(radiance)
+        object.__setattr__(self, "frame", frame)
+        object.__setattr__(self, "radiance", radiance)
+
+    def at(self, frame: float) -> NDArray[np.float32]:
+        """Radiance (H, W) at a time [frames]."""
+        if frame <= self.frame[0]:
+            return self.radiance[0]
+        if frame >= self.frame[-1]:
+            return self.radiance[-1]
+        i = int(np.searchsorted(self.frame, frame, side="right")) - 1
+        w = np.float32((frame - self.frame[i]) / (self.frame[i + 1] - self.frame[i]))
+        if w == 0.0:
+            return self.radiance[i]
+        return self.radiance[i] * (np.float32(1.0) - w) + self.radiance[i + 1] * w
+
+
+def check_radiance(radiance: NDArray[np.float32]) -> None:
+    """Raise InputError unless every value is finite and not negative."""
+    low, high = radiance.min(), radiance.max()
+    if not (low >= 0.0 and high < np.inf):
+        what = "NaN" if np.isnan(low) else ("infinity" if high == np.inf else f"negative values (lowest {low:g})")
+        raise InputError(f"radiance holds {what}; it must be finite and >= 0 (1.0 = one spike a frame)")
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Frames first .. first + count of a key interval of `length` frames, light linear over the interval.
+
+    radiance0, radiance1: (H*W,) float32, light at the start and at the end of the whole interval.
+    """
+
+    radiance0: NDArray[np.float32]
+    radiance1: NDArray[np.float32]
+    length: int
+    first: int
+    count: int
+
+
+def segments(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> Iterator[Segment]:
+    """Cut frames start .. start + frames into segments.
+
+    light: keyframes, or one (H, W) picture held throughout.  How the stream is cut into calls changes no bit:
+    the ramps depend on the keys alone.
+    """
+    stop = start + frames
+    if not isinstance(light, Keyframes):
+        yield from _held(light, start, stop)
+        return
+    first, last = light.frame[0], light.frame[-1]
+    whole = bool(np.all(light.frame == np.floor(light.frame)))
+    at = start
+    while at < stop:
+        if whole and at >= last:
+            yield from _held(light.radiance[-1], at, stop)
+            at = stop
+        elif whole and at < first:
+            until = min(stop, int(first))
+            yield from _held(light.radiance[0], at, until)
+            at = until
+        elif whole:
+            i = int(np.searchsorted(light.frame, at, side="right")) - 1
+            begin, end = int(light.frame[i]), int(light.frame[i + 1])
+            begin += (at - begin) // MAX_SEGMENT * MAX_SEGMENT
+            end = min(end, begin + MAX_SEGMENT)
+            until = min(stop, end)
+            r0, r1 = light.at(begin).reshape(-1), light.at(end).reshape(-1)
+            yield Segment(r0, r1, end - begin, at - begin, until - at)
+            at = until
+        else:
+            centre = light.at(at + 0.5).reshape(-1)
+            yield Segment(centre, centre, 1, 0, 1)
+            at += 1
+
+
+def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]:
+    flat = picture.reshape(-1)
+    while at < stop:
+        count = min(MAX_SEGMENT, stop - at)
+        yield Segment(flat, flat, MAX_SEGMENT, 0, count)
+        at += count
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """The integers of F(k) for every pixel of a segment (see the module's equation)."""
+
+    a: NDArray[np.int32]
+    b: NDArray[np.int32]
+    r: NDArray[np.int32]
+    length: int
+
+    def collected(self, k: int) -> NDArray[np.int32]:
+        """Grains (P,) collected from the start of the key interval to the start of its frame k."""
+        t = np.int32(k * (k - 1) // 2)
+        per = np.int32((1 << 20) // self.length)
+        return self.a * np.int32(k) + self.b * t + ((self.r * t * per) >> np.int32(20))
+
+
+def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32]) -> Ramp:
+    """Integrate one segment: gain [grains/frame at radiance 1] and dark [grains/frame] are (P,) float32."""
+    i0 = _grains_per_frame(segment.radiance0, gain, dark)
+    d = _grains_per_frame(segment.radiance1, gain, dark) - i0
+    b = np.floor(d.astype(np.float32) * np.float32(1.0 / segment.length)).astype(np.int32)
+    return Ramp(i0 + (b >> np.int32(1)), b, d - b * np.int32(segment.length), segment.length)
+
+
+def _grains_per_frame(
+    radiance: NDArray[np.float32], gain: NDArray[np.float32], dark: NDArray[np.float32]
+) -> NDArray[np.int32]:
+    capped = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
+    return (capped + np.float32(0.5)).astype(np.int32)
+
+
+def as_light(radiance: Keyframes | ArrayLike, shape: tuple[int, int]) -> Keyframes | NDArray[np.float32]:
+    """Check what a user gave as light against the sensor's shape; raises InputError."""
+    if isinstance(radiance, Keyframes):
+        if radiance.radiance.shape[1:] != shape:
+            raise InputError(f"radiance is {radiance.radiance.shape[1:]} pixels, the sensor is {shape}")
+        return radiance
+    picture = np.ascontiguousarray(radiance, dtype=np.float32)
+    if picture.shape != shape:
+        raise InputError(
+            f"radiance has shape {picture.shape}, the sensor is {shape}; give one (H, W) picture to hold, or Keyframes"
+        )
+    check_radiance(picture)
+    return picture

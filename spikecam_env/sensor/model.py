@@ -1,0 +1,151 @@
+"""A sensor model: a nominal circuit and an ordered list of named effects.  It reads and writes as TOML."""
+
+from __future__ import annotations
+
+import os
+import sys
+import zlib
+from dataclasses import asdict, dataclass, fields, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.sensor.effects import CATALOGUE, Effect
+from spikecam_env.sensor.effects.base import build
+from spikecam_env.sensor.unit import Circuit, PixelArray, Unit, firing_law
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+FORMAT = "spikecam-model/1"
+PRESETS = ("ideal", "physical", "scsim")
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """What kind of camera: circuit, frame rate and effects, in physical order whatever order they are given in.
+
+    >>> SensorModel.preset("scsim").without("shot_noise").effects[0].name
+    'conversion_gain_spread'
+    """
+
+    name: str
+    circuit: Circuit
+    frame_rate_hz: float
+    effects: tuple[Effect, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 0 < self.frame_rate_hz < np.inf:
+            raise InputError(
+                f"frame_rate_hz = {self.frame_rate_hz!r}; it must be positive and finite (40000 for a Vidar)"
+            )
+        names = [e.name for e in self.effects]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"effect {name!r} is listed {names.count(name)} times; list it once")
+        order = list(CATALOGUE)
+        object.__setattr__(self, "effects", tuple(sorted(self.effects, key=lambda e: order.index(e.name))))
+
+    @classmethod
+    def preset(cls, name: str = "scsim", *, script: bool = False) -> SensorModel:
+        """A shipped model: `ideal`, `scsim`, `physical`; `script=True` gives SCSim's public script to the letter."""
+        if name not in PRESETS:
+            raise unknown_name("preset", name, PRESETS)
+        if script and name != "scsim":
+            raise InputError(f"script=True belongs to the preset 'scsim', not to {name!r}")
+        file = "scsim-script" if script else name
+        text = (resources.files("spikecam_env.sensor") / "presets" / f"{file}.toml").read_text(encoding="utf-8")
+        return cls._from_dict(tomllib.loads(text), where=f"preset {file}")
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> SensorModel:
+        """Read a model file; raises InputError for a missing file, broken TOML, unknown effect or parameter."""
+        try:
+            data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InputError(f"cannot read model file {path}: {error.strerror}") from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"{path} is not a TOML file: {error}") from error
+        return cls._from_dict(data, where=str(path))
+
+    @classmethod
+    def load(cls, name_or_path: str | os.PathLike[str]) -> SensorModel:
+        """A preset by its name, or a model file by its path (anything that ends in .toml)."""
+        if str(name_or_path).endswith(".toml"):
+            return cls.from_toml(name_or_path)
+        return cls.preset(str(name_or_path))
+
+    @classmethod
+    def _from_dict(cls, data: dict[str, Any], where: str) -> SensorModel:
+        if data.get("format") != FORMAT:
+            raise InputError(f"{where}: format is {data.get('format')!r}, expected {FORMAT!r}")
+        allowed = {"format", "name", "frame_rate_hz", "circuit", "effect"}
+        for key in data:
+            if key not in allowed:
+                raise unknown_name(f"entry of {where}", key, allowed)
+        circuit_keys = {f.name for f in fields(Circuit)}
+        circuit = data.get("circuit", {})
+        for key, value in circuit.items():
+            if key not in circuit_keys:
+                raise unknown_name(f"circuit entry of {where}", key, circuit_keys)
+            if not isinstance(value, (int, float)) or not np.isfinite(value):
+                raise InputError(f"{where}: circuit.{key} = {value!r} must be a finite number")
+        effects = []
+        for entry in data.get("effect", []):
+            if "name" not in entry:
+                raise InputError(f"{where}: an [[effect]] has no name; it needs one of {', '.join(CATALOGUE)}")
+            effects.append(build(CATALOGUE, entry["name"], {k: v for k, v in entry.items() if k != "name"}))
+        try:
+            frame_rate_hz = float(data["frame_rate_hz"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"{where}: frame_rate_hz must be a number (40000.0 for a Vidar)") from error
+        return cls(str(data.get("name", "unnamed")), Circuit(**circuit), frame_rate_hz, tuple(effects))
+
+    def to_toml(self, path: str | os.PathLike[str]) -> None:
+        """Write the model; the file appears whole and loads back equal."""
+        effects = [{"name": e.name, **e.parameters()} for e in self.effects]
+        data = {
+            "format": FORMAT,
+            "name": self.name,
+            "frame_rate_hz": self.frame_rate_hz,
+            "circuit": asdict(self.circuit),
+            "effect": effects,
+        }
+        beside = Path(f"{path}.part")
+        beside.write_text(tomli_w.dumps(data), encoding="utf-8")
+        os.replace(beside, path)
+
+    def with_effect(self, effect: Effect) -> SensorModel:
+        """This model with an effect added, or replaced where it has one of that name."""
+        return replace(self, effects=(*(e for e in self.effects if e.name != effect.name), effect))
+
+    def without(self, name: str) -> SensorModel:
+        """This model without one of its effects; raises InputError when it has none of that name."""
+        if name not in {e.name for e in self.effects}:
+            raise unknown_name(f"effect of {self.name}", name, [e.name for e in self.effects])
+        return replace(self, effects=tuple(e for e in self.effects if e.name != name))
+
+    def noise_free(self) -> SensorModel:
+        """The ideal pixel with this circuit and frame rate."""
+        return replace(self, name="ideal", effects=())
+
+    def draw_unit(self, shape: tuple[int, int], seed: int) -> Unit:
+        """One camera of this model: every effect leaves its fixed pattern, each from a stream of its own.
+
+        Adding or removing one effect leaves the draws of the others as they were.
+        """
+        pixels = PixelArray.nominal(self.circuit, self.frame_rate_hz, shape)
+        for effect in self.effects:
+            pixels = effect.imprint(pixels, generator(seed, effect.name))
+        return firing_law(pixels)
+
+
+def generator(seed: int, purpose: str) -> np.random.Generator:
+    """A random generator for one purpose of one seed, independent of all others."""
+    return np.random.default_rng([seed, zlib.crc32(purpose.encode())])

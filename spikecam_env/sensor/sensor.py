@@ -1,0 +1,162 @@
+"""The camera you can step: a model, one unit of it, and the state of every pixel."""
+
+from __future__ import annotations
+
+import copy
+import operator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.sensor import reference
+from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.light import Keyframes, as_light, segments
+from spikecam_env.sensor.model import SensorModel, generator
+
+ENGINES = ("auto", "fast", "reference")
+
+
+@dataclass(frozen=True)
+class SensorState:
+    """A sensor mid-stream: which unit it is, the next frame, and its pixels.  Picklable; tied to its engine."""
+
+    engine: str
+    shape: tuple[int, int]
+    seed: int
+    frame: int
+    phase: NDArray[np.float64]
+    pixels: Any
+
+
+class SpikeSensor:
+    """A spike camera of `shape` (rows, columns) pixels.
+
+    model: what kind of camera; a SensorModel, a preset's name or a TOML path.
+    seed: which unit of it (fixed pattern), its starting phase and its temporal noise; same seed, same bits,
+        for any cutting of the stream into steps and any number of threads.
+    engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification, every effect), or
+        "auto" (fast where it carries every effect of the model, else reference).
+    Raises InputError for an unknown engine, a shape that is not two positive whole numbers, a negative seed, and for
+    engine="fast" with an effect that it does not carry.
+
+    >>> sensor = SpikeSensor(SensorModel.preset("ideal"), shape=(2, 2), seed=0)
+    >>> sensor.step(np.full((2, 2), 0.25, np.float32), frames=8).sum(axis=0).tolist()
+    [[2, 2], [2, 2]]
+    """
+
+    def __init__(
+        self,
+        model: SensorModel | str = "scsim",
+        shape: tuple[int, int] = (250, 400),
+        seed: int = 0,
+        engine: str = "fast",
+    ) -> None:
+        self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
+        self.shape = _checked_shape(shape)
+        self.engine = _chosen_engine(engine, self.model)
+        self._extras = tuple(e for e in self.model.effects if e.name not in fast.CARRIES)
+        self._start(_checked_seed(seed), phase=None)
+
+    def reset(self, seed: int | None = None) -> None:
+        """Back to frame 0; with a seed, as another unit."""
+        self._start(self.seed if seed is None else _checked_seed(seed), phase=None)
+
+    def step(self, radiance: Keyframes | ArrayLike, frames: int = 1) -> NDArray[np.uint8]:
+        """Expose the next frames; returns spikes (frames, H, W) uint8, 0 or 1.
+
+        radiance: (H, W) held throughout, or Keyframes on the stream's absolute frame numbers; 1.0 makes the nominal
+        pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light or frames < 1.
+        """
+        frames = _checked_frames(frames)
+        light = as_light(radiance, self.shape)
+        spikes = np.empty((frames, self.shape[0] * self.shape[1]), dtype=np.uint8)
+        done = 0
+        for segment in segments(light, self.frame, frames):
+            spikes[done : done + segment.count] = self._run(segment)
+            done += segment.count
+        self.frame += frames
+        return spikes.reshape(frames, *self.shape)
+
+    def state(self) -> SensorState:
+        """A copy of everything that the next step depends on, besides the model."""
+        return SensorState(self.engine, self.shape, self.seed, self.frame, self.phase, copy.deepcopy(self._pixels))
+
+    def restore(self, state: SensorState) -> None:
+        """Go on from a saved state; raises InputError for the state of another engine or shape."""
+        if (state.engine, state.shape) != (self.engine, self.shape):
+            raise InputError(
+                f"this state is of a {state.engine} sensor of {state.shape}; this one is {self.engine}, {self.shape}"
+            )
+        if state.seed != self.seed:
+            self._start(state.seed, phase=state.phase)
+        self.phase = state.phase
+        self.frame = state.frame
+        self._pixels = copy.deepcopy(state.pixels)
+
+    def clean_twin(self) -> SpikeSensor:
+        """A noise-free camera at frame 0 with this one's initial phase: on the same scene it gives the clean stream."""
+        twin = SpikeSensor(self.model.noise_free(), self.shape, self.seed, engine=self.engine)
+        twin._start(self.seed, phase=self.phase)
+        return twin
+
+    _pixels: Any
+
+    def _start(self, seed: int, phase: NDArray[np.float64] | None) -> None:
+        self.seed = seed
+        self.frame = 0
+        self.unit = self.model.draw_unit(self.shape, seed)
+        self.phase = generator(seed, "phase").random(self.shape) if phase is None else phase
+        flat = self.phase.reshape(-1)
+        if self.engine == "fast":
+            self._pixels = fast.start(self.unit, flat, seed)
+        else:
+            self._pixels = reference.start(self.unit, flat, generator(seed, "temporal"))
+
+    def _run(self, segment: Any) -> NDArray[np.uint8]:
+        if self.engine == "fast":
+            return fast.run(self.unit, self._pixels, segment)
+        return reference.run(self.unit, self._extras, self.model.frame_rate_hz, self._pixels, segment)
+
+
+def _checked_shape(shape: Any) -> tuple[int, int]:
+    try:
+        rows, columns = (operator.index(n) for n in shape)
+    except (TypeError, ValueError):
+        rows = columns = 0
+    if rows < 1 or columns < 1:
+        raise InputError(f"shape = {shape!r}; it must be two positive whole numbers, (rows, columns)")
+    return rows, columns
+
+
+def _checked_frames(frames: Any) -> int:
+    try:
+        number = operator.index(frames)
+    except TypeError:
+        number = 0
+    if number < 1:
+        raise InputError(f"frames = {frames!r}; it must be a whole number, 1 or more")
+    return number
+
+
+def _checked_seed(seed: Any) -> int:
+    try:
+        number = operator.index(seed)
+    except TypeError:
+        number = -1
+    if number < 0:
+        raise InputError(f"seed = {seed!r}; it must be a whole number, 0 or more")
+    return number
+
+
+def _chosen_engine(engine: str, model: SensorModel) -> str:
+    if engine not in ENGINES:
+        raise unknown_name("engine", engine, ENGINES)
+    missing = fast.missing(model.effects)
+    if engine == "auto":
+        return "reference" if missing else "fast"
+    if engine == "fast" and missing:
+        raise InputError(f"the fast engine does not carry {', '.join(missing)}; use engine='reference' or 'auto'")
+    return engine
