@@ -1,0 +1,101 @@
+"""What a scene is: light over time on the sensor's grid, and the truth about it.
+
+Coordinates: x to the right, y down, in pixels; pixel (row r, column c) has its centre at (x, y) = (c, r).
+Time is in frames: frame n is exposed over [n, n + 1).  Radiance is linear; 1.0 makes the nominal pixel
+fire once a frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.errors import InputError
+
+if TYPE_CHECKING:
+    from spikecam_env.sensor import Keyframes
+
+
+@dataclass(frozen=True)
+class Gaze:
+    """Where the camera looks: a straight path of (pan, tilt) offsets over a block of frames.
+
+    `start` and `stop` are offsets in pixels at frames `frames[0]` and `frames[1]`.  With offset (p, q), the
+    point of the scene that an unmoved camera sees at (x, y) is seen at (x - p, y - q): pan to the right
+    and the scene slides left, tilt down (positive) and it slides up.
+    """
+
+    start: tuple[float, float]
+    stop: tuple[float, float]
+    frames: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        if not self.frames[0] < self.frames[1]:
+            raise InputError(f"gaze frames are {self.frames}; the first must be before the second")
+
+    @classmethod
+    def fixed(cls, pan: float, tilt: float) -> Gaze:
+        """A camera at rest at this offset [pixels]."""
+        return cls((pan, tilt), (pan, tilt), (0.0, 1.0))
+
+    @property
+    def rate(self) -> tuple[float, float]:
+        """(pan, tilt) velocity [pixels/frame]."""
+        duration = self.frames[1] - self.frames[0]
+        return (self.stop[0] - self.start[0]) / duration, (self.stop[1] - self.start[1]) / duration
+
+    def at(self, frame: float) -> tuple[float, float]:
+        """(pan, tilt) at a frame [pixels], on the straight line through start and stop."""
+        share = (frame - self.frames[0]) / (self.frames[1] - self.frames[0])
+        return (
+            self.start[0] + share * (self.stop[0] - self.start[0]),
+            self.start[1] + share * (self.stop[1] - self.start[1]),
+        )
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Ground truth at one instant.
+
+    radiance   (H, W) float32, linear
+    flow       (H, W, 2) float32, velocity of the surface seen in the pixel [pixels/frame], x then y
+    object_id  (H, W) int32, 0 is the background
+    depth      (H, W) float32 or None where the scene is flat
+    poses      object name -> its pose, as the scene documents it; "camera" is the gaze (pan, tilt) [pixels]
+    """
+
+    radiance: NDArray[np.float32]
+    flow: NDArray[np.float32]
+    object_id: NDArray[np.int32]
+    depth: NDArray[np.float32] | None = None
+    poses: dict[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+@runtime_checkable
+class Scene(Protocol):
+    """Light over time.  A scene holds no state: the same call gives the same light, in any order."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        ...
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames a second."""
+        ...
+
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
+        """Linear float32 keys that cover frames [start, stop].
+
+        Without gaze the keys lie on an absolute grid of integer frames: a key's time and light do not
+        depend on how the stream is cut into calls.
+        """
+        ...
+
+    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
+        """Ground truth at an instant; frame n is sampled at n + 0.5."""
+        ...

@@ -1,0 +1,172 @@
+"""Procedural textures: (size, size) float32 in [0, 1], linear, from an explicit generator.
+
+`TEXTURES` maps a name to a function (rng, size) -> texture; `random_texture` draws one.  Those that say
+"tiles" repeat without a seam.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from spikecam_env.errors import InputError, unknown_name
+
+Texture = NDArray[np.float32]
+
+
+def random_texture(rng: np.random.Generator, size: int, kinds: Sequence[str] | None = None) -> Texture:
+    """One texture of a kind drawn evenly from `kinds` (default: all of `TEXTURES`).
+
+    Errors: InputError for size < 8 or an unknown kind.
+    """
+    if size < 8:
+        raise InputError(f"texture size is {size}; it must be at least 8 pixels")
+    names = tuple(TEXTURES) if kinds is None else tuple(kinds)
+    for name in names:
+        if name not in TEXTURES:
+            raise unknown_name("texture", name, TEXTURES)
+    return TEXTURES[names[rng.integers(len(names))]](rng, size)
+
+
+def fractal_noise(rng: np.random.Generator, size: int) -> Texture:
+    """Noise of amplitude 1 / f^p, p in [0.8, 2], as in natural images (p about 1).  Tiles."""
+    frequency = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None, :])
+    frequency[0, 0] = np.inf
+    spectrum = np.fft.rfft2(rng.standard_normal((size, size))) * frequency ** -rng.uniform(0.8, 2.0)
+    return _stretch(np.fft.irfft2(spectrum, s=(size, size)))
+
+
+def dead_leaves(rng: np.random.Generator, size: int) -> Texture:
+    """Shaded discs that cover each other, radii drawn from r^-3: edges at every scale.
+
+    Source: Lee, Mumford and Huang, "Occlusion models for natural images", IJCV 2001.  Tiles.
+    """
+    image = np.full((size, size), rng.random(), np.float32)
+    smallest, largest = max(2.0, size / 100), size / 4
+    radii = (smallest**-2 - rng.random(1200) * (smallest**-2 - largest**-2)) ** -0.5
+    for radius in radii:
+        _paint_disc(image, rng.uniform(0, size, 2), radius, rng.random(), rng.normal(0, 0.15, 2))
+    return _soften(image)
+
+
+def stripes(rng: np.random.Generator, size: int) -> Texture:
+    """Waves in one direction, from a sine to hard stripes.  Tiles."""
+    along, across = _wave_numbers(rng, size / 10)
+    y, x = _grid(size)
+    wave = np.sin(2 * np.pi * (along * x + across * y) + rng.uniform(0, 2 * np.pi))
+    turned = wave.T if rng.random() < 0.5 else wave
+    return _stretch(np.tanh(rng.uniform(0.5, 6.0) * turned))
+
+
+def checker(rng: np.random.Generator, size: int) -> Texture:
+    """Two crossed waves: a checkerboard at any angle, soft to hard.  Tiles."""
+    along, across = _wave_numbers(rng, size / 14)
+    y, x = _grid(size)
+    phase = rng.uniform(0, 2 * np.pi, 2)
+    first = np.sin(2 * np.pi * (along * x + across * y) + phase[0])
+    second = np.sin(2 * np.pi * (along * y - across * x) + phase[1])
+    return _stretch(np.tanh(rng.uniform(1.0, 8.0) * first * second))
+
+
+def blobs(rng: np.random.Generator, size: int) -> Texture:
+    """Smoothed noise pushed to two levels: islands of one scale.  Tiles."""
+    noise = gaussian_filter(rng.standard_normal((size, size)), rng.uniform(0.004, 0.03) * size, mode="wrap")
+    return _stretch(np.tanh(rng.uniform(0.5, 5.0) * noise / noise.std()))
+
+
+def rectangles(rng: np.random.Generator, size: int) -> Texture:
+    """Upright rectangles of random grey that cover each other.  Tiles."""
+    image = np.full((size, size), rng.random(), np.float32)
+    for height, width in rng.integers(max(2, size // 120), max(4, size // 5), (150, 2)):
+        rows = (rng.integers(size) + np.arange(height)) % size
+        columns = (rng.integers(size) + np.arange(width)) % size
+        image[np.ix_(rows, columns)] = rng.random()
+    return _soften(image)
+
+
+def gradient(rng: np.random.Generator, size: int) -> Texture:
+    """Very smooth shading.  Tiles."""
+    noise = gaussian_filter(rng.standard_normal((size, size)), rng.uniform(0.08, 0.2) * size, mode="wrap")
+    return _stretch(noise)
+
+
+def glyphs(rng: np.random.Generator, size: int) -> Texture:
+    """Lines of letters and digits, dark on light or light on dark."""
+    page = np.full((size, size), 255, np.uint8)
+    scale = rng.uniform(0.0012, 0.004) * size
+    pitch = max(6, int(26 * scale))
+    for baseline in range(pitch, size + pitch, pitch):
+        line = "".join(rng.choice(_ALPHABET, 2 + size // max(3, int(9 * scale))))
+        cv2.putText(
+            page,
+            line,
+            (-int(rng.integers(pitch)), baseline),
+            int(rng.choice(_FONTS)),
+            0.7 * scale,
+            0,
+            max(1, round(1.4 * scale)),
+            cv2.LINE_AA,
+        )
+    image = page / np.float32(255)
+    return 1 - image if rng.random() < 0.5 else image
+
+
+TEXTURES: dict[str, Callable[[np.random.Generator, int], Texture]] = {
+    "fractal_noise": fractal_noise,
+    "dead_leaves": dead_leaves,
+    "stripes": stripes,
+    "checker": checker,
+    "blobs": blobs,
+    "rectangles": rectangles,
+    "gradient": gradient,
+    "glyphs": glyphs,
+}
+
+_ALPHABET = tuple("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789&%?!  ")
+_FONTS = (
+    cv2.FONT_HERSHEY_SIMPLEX,
+    cv2.FONT_HERSHEY_DUPLEX,
+    cv2.FONT_HERSHEY_COMPLEX,
+    cv2.FONT_HERSHEY_TRIPLEX,
+)
+
+
+def _wave_numbers(rng: np.random.Generator, highest: float) -> tuple[int, int]:
+    """Whole waves along two axes: log-uniform from 2 to `highest`, tilted up to 45 degrees."""
+    along = max(1, round(2.0 * (max(highest, 2.0) / 2.0) ** rng.random()))
+    return along, int(rng.integers(-along, along + 1))
+
+
+def _grid(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(y, x) as (size, 1) and (1, size) in [0, 1)."""
+    axis = np.arange(size) / size
+    return axis[:, None], axis[None, :]
+
+
+def _soften(image: Texture) -> Texture:
+    """A blur of 0.6 texels across hard edges."""
+    return gaussian_filter(image, 0.6, mode="wrap").clip(0, 1).astype(np.float32, copy=False)
+
+
+def _stretch(image: NDArray[np.float64]) -> Texture:
+    """To the full range [0, 1]."""
+    low, high = image.min(), image.max()
+    return ((image - low) / max(high - low, 1e-12)).astype(np.float32)
+
+
+def _paint_disc(
+    image: Texture, centre: NDArray[np.float64], radius: float, grey: float, slope: NDArray[np.float64]
+) -> None:
+    """A shaded disc over the image, wrapped at the borders."""
+    size = len(image)
+    reach = int(np.ceil(radius))
+    offset = np.arange(-reach, reach + 1)
+    dy, dx = offset[:, None], offset[None, :]
+    rows, columns = np.broadcast_arrays(int(centre[0]) + dy, int(centre[1]) + dx)
+    inside = dy**2 + dx**2 <= radius**2
+    shade = np.clip(grey + (slope[0] * dy + slope[1] * dx) / radius, 0, 1)
+    image[rows[inside] % size, columns[inside] % size] = shade[inside]
