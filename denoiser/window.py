@@ -5,7 +5,8 @@ A pass of the network covers `planes` frames b .. b + planes (b a multiple of `p
     spikes   frames b - past .. b + planes + future, (span, H, W) uint8
     planes   estimates of the rate per pixel [spikes/frame], (layers, H, W) float32, in this order:
              1/ISI at each covered frame (`spikes/streams/isi.py`'s law, looking ahead to the window's end);
-             interval rates n / (t_n - t_0) over whole intervals about the middle, one for each half-width;
+             interval rates n / (t_n - t_0) over whole intervals about the middle, one for each half-width (a count
+             until the first spike has come);
              running means e <- e + (s - e) / m over all frames up to the window's end, one for each memory m,
              corrected for the short past at the start (divided by 1 - (1 - 1/m)^frames).
 
@@ -19,7 +20,7 @@ real frames only.  The state is the frames of one window, the last spike before 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,20 +78,20 @@ class RollingWindow:
         self._means = np.zeros((len(layout.memories), *shape), np.float32)
         self._averaged = 0  # frames in the running means
 
-    def push(self, chunk: NDArray[np.uint8], wanted: range | None = None) -> Iterator[Window]:
-        """(K, H, W) more frames -> the passes they complete.  Passes that start outside `wanted` are skipped."""
+    def push(self, chunk: NDArray[np.uint8], wanted: Container[int] | None = None) -> Iterator[Window]:
+        """(K, H, W) more frames -> the passes they complete; with `wanted`, only those that start in it."""
         self._frames = np.concatenate([self._frames, chunk])
         self.seen += len(chunk)
         while self.start + self.layout.planes + self.layout.future <= self.seen:
-            window = self._window() if wanted is None or self.start in wanted else None
+            if wanted is None or self.start in wanted:
+                yield self._window()
             self._advance()
-            if window is not None:
-                yield window
 
-    def end(self) -> Iterator[Window]:
+    def end(self, wanted: Container[int] | None = None) -> Iterator[Window]:
         """The stream is over: the passes that are left, over mirrored frames."""
         while self.start < self.seen:
-            yield self._window()
+            if wanted is None or self.start in wanted:
+                yield self._window()
             self._advance()
 
     def state(self) -> dict[str, Any]:
@@ -204,7 +205,9 @@ def _interval_planes(frames, last_before, first, start, count, half_widths, plan
         for i in range(widths):
             for x in range(width):
                 n = counted[x] - counted_begin[i, x]
-                if n > 0:
+                if begins[i, x] < 0:  # the stream is young: count
+                    planes[count + i, y, x] = counted[x] / np.float32(stop)
+                elif n > 0:
                     planes[count + i, y, x] = n / np.float32(last[x] - begins[i, x])
                 else:
                     planes[count + i, y, x] = np.float32(1.0) / np.float32(stop - begins[i, x])
@@ -222,7 +225,7 @@ def _interval_planes(frames, last_before, first, start, count, half_widths, plan
             for i in range(widths):
                 if t == middle + half_widths[i] and t < stop:
                     for x in range(width):
-                        if following[x] < stop:
+                        if following[x] < stop and begins[i, x] >= 0:
                             n = counted_end[i, x] + 1 - counted_begin[i, x]
                             planes[count + i, y, x] = n / np.float32(following[x] - begins[i, x])
 
