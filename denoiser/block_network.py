@@ -32,9 +32,7 @@ class Residual(nn.Module):
 class BlockDnSS(nn.Module):
     """(N, span, H, W) spikes and (N, layers, H, W) rate planes -> (N, planes, H, W) rates [spikes/frame]."""
 
-    def __init__(
-        self, span: int = 48, layers: int = 13, planes: int = 8, widths: tuple[int, int] = (48, 80)
-    ) -> None:
+    def __init__(self, span: int = 48, layers: int = 14, planes: int = 8, widths: tuple[int, int] = (48, 80)) -> None:
         super().__init__()
         fine, coarse = widths
         self.fold = nn.PixelUnshuffle(2)

@@ -17,9 +17,7 @@ def psnr_db(picture: Picture, truth: Picture, peak: float) -> float:
 
 def ssim(picture: Picture, truth: Picture, peak: float) -> float:
     """Structural similarity over 7 x 7 windows (Wang et al., TIP 2004), by scikit-image."""
-    return float(
-        structural_similarity(np.asarray(picture, np.float64), np.asarray(truth, np.float64), data_range=peak)
-    )
+    return float(structural_similarity(np.asarray(picture, np.float64), np.asarray(truth, np.float64), data_range=peak))
 
 
 def gap_closed(noisy_db: float, denoised_db: float, clean_db: float) -> float:

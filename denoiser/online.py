@@ -20,7 +20,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
-from denoiser import accumulate, mus
+from denoiser import accumulate, infer, mus
 from denoiser.recipe import Recipe
 from denoiser.weights import load_weights, pretrained_path
 from denoiser.window import RollingWindow, Window
@@ -62,7 +62,7 @@ class OnlineDnSS:
         self.output = output
         self._recipe, self._stride = recipe, stride
         self._network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-        self._type = _number_type(precision)
+        self._type = infer.number_type(precision)
         self._decoder = _DECODERS[recipe.decoder]
         self.reset()
 
@@ -143,6 +143,7 @@ class OnlineDnSS:
         rates, spikes = [], []
         for window in windows:
             rate = self._rate(window)
+            self._window.learn(window, rate)
             fired, self._decoding = self._decoder.step(rate, self._decoding)
             rates.append(rate)
             spikes.append(fired)
@@ -154,14 +155,8 @@ class OnlineDnSS:
     def _rate(self, window: Window) -> NDArray[np.float32]:
         """(count, H, W) rates of one pass."""
         if window.start % self._stride == 0 or self._held is None:
-            with torch.inference_mode(), torch.autocast("cpu", self._type, enabled=self._type != torch.float32):
-                spikes, planes = (torch.from_numpy(np.ascontiguousarray(a))[None] for a in (window.spikes, window.planes))
-                layout = torch.channels_last
-                rate = self._network(
-                    spikes.to(self._type).contiguous(memory_format=layout), planes.contiguous(memory_format=layout)
-                )
-            self._held = np.ascontiguousarray(rate[0].float().clamp(0.0, 1.0).numpy())
-        return self._held[: window.count]
+            self._held = infer.rates(self._network, window, self._type)
+        return self._held
 
     def _checked(self, spikes: ArrayLike) -> NDArray[np.uint8]:
         chunk = as_spikes(spikes)
@@ -190,10 +185,3 @@ def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **option
         spikes_out, rates_out = zip(*pieces, strict=True)
         return np.concatenate(spikes_out), np.concatenate(rates_out)
     return np.concatenate(pieces)
-
-
-def _number_type(precision: str) -> torch.dtype:
-    if precision == "auto":
-        fast = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)()
-        return torch.bfloat16 if fast else torch.float32
-    return torch.bfloat16 if precision == "bfloat16" else torch.float32

@@ -13,14 +13,20 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from multiprocessing import get_context
+from pathlib import Path
 
 import cv2
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import nn
 
+from denoiser import infer
 from denoiser.recipe import Recipe
-from denoiser.window import RollingWindow
+from denoiser.weights import load_weights
+from denoiser.window import RollingWindow, Window, WindowLayout
 from scenes.collage import Collage
 from scenes.textures import random_texture
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
@@ -31,6 +37,7 @@ ENGINE = "reference"  # the specification: the pairs stay the same, bit for bit,
 WARM_UP = 64  # frames until noisy and clean twins have lost their common phase (DESIGN section 7: 60)
 CLIP_SHAPE = (96, 96)
 WINDOWS_PER_CLIP = 8
+CLIPS_AHEAD = 6
 VARIED = (  # effect, least and greatest factor on its strength
     ("conversion_gain_spread", 0.25, 1.3),
     ("bias_voltage_spread", 0.25, 1.3),
@@ -49,8 +56,13 @@ class Sample:
     target: NDArray[np.float16]
 
 
-def draw_clip(recipe: Recipe, seed: int, number: int, shape: tuple[int, int] = CLIP_SHAPE) -> list[Sample]:
-    """Simulate clip `number` of the training set `seed` and keep WINDOWS_PER_CLIP windows of it."""
+def draw_clip(
+    recipe: Recipe, seed: int, number: int, network: nn.Module | None = None, shape: tuple[int, int] = CLIP_SHAPE
+) -> list[Sample]:
+    """Simulate clip `number` of the training set `seed` and keep WINDOWS_PER_CLIP windows of it.
+
+    network: runs over the clip so that the windows carry the gain it would have found; None: gain 1.
+    """
     rng = np.random.default_rng([seed, number])
     scene = draw_scene(rng, shape, _texture_bank(seed))
     frames = int(rng.choice((192, 256, 384, 640), p=(0.35, 0.3, 0.2, 0.15)))
@@ -62,15 +74,27 @@ def draw_clip(recipe: Recipe, seed: int, number: int, shape: tuple[int, int] = C
     starts = np.arange(WARM_UP if learns_clean else 0, frames - (WARM_UP if learns_clean else 0), layout.planes)
     kept = set(rng.choice(starts, WINDOWS_PER_CLIP, replace=False).tolist())
     clean = sensor.clean_twin().step(light, frames=frames) if learns_clean else None
-    roller = RollingWindow(layout, shape)
     samples = []
-    for window in (*roller.push(noisy, kept), *roller.end(kept)):
+    for window in _windows(layout, noisy, kept, network):
         covered = range(window.start, window.start + layout.planes)
         truth = np.stack([light_in_frame(light, t) for t in covered])
         target = truth if clean is None else isi_planes(clean, start=covered[0], stop=covered[-1] + 1, normalised=True)
         half = np.float16
         samples.append(Sample(window.spikes, window.planes.astype(half), truth.astype(half), target.astype(half)))
     return samples
+
+
+def _windows(
+    layout: WindowLayout, spikes: NDArray[np.uint8], kept: set[int], network: nn.Module | None
+) -> Iterator[Window]:
+    """The windows that start in `kept`, as an online denoiser with this network would see them."""
+    roller = RollingWindow(layout, (spikes.shape[1], spikes.shape[2]))
+    wanted = kept if network is None else None
+    for window in chain(roller.push(spikes, wanted), roller.end(wanted)):
+        if window.start in kept:
+            yield window
+        if network is not None:
+            roller.learn(window, infer.rates(network, window, torch.bfloat16))
 
 
 def draw_scene(rng: np.random.Generator, shape: tuple[int, int], textures: list[NDArray[np.float32]]) -> Collage:
@@ -116,20 +140,24 @@ def _texture_bank(seed: int, count: int = 96, size: int = 256) -> list[NDArray[n
 
 
 class ClipFeed:
-    """Clips first, first + 1, ... in order, simulated ahead of use in a process of its own."""
+    """Clips first, first + 1, ... in order, simulated ahead of use in a process of its own.
 
-    def __init__(self, recipe: Recipe, seed: int, first: int = 0, ahead: int = 6) -> None:
+    `weights` may be set to a checkpoint: the clips that are begun from then on carry the gain its network finds.
+    """
+
+    def __init__(self, recipe: Recipe, seed: int, first: int = 0, weights: Path | None = None) -> None:
+        self.weights = weights
         self._recipe, self._seed, self._next = recipe, seed, first
         self._workers = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_one_thread)
         self._waiting: deque[Future[list[Sample]]] = deque()
-        self._ahead = ahead
 
     def __iter__(self) -> Iterator[list[Sample]]:
         return self
 
     def __next__(self) -> list[Sample]:
-        while len(self._waiting) < self._ahead:
-            self._waiting.append(self._workers.submit(draw_clip, self._recipe, self._seed, self._next))
+        while len(self._waiting) < CLIPS_AHEAD:
+            job = self._workers.submit(_draw_with, self._recipe, self._seed, self._next, self.weights)
+            self._waiting.append(job)
             self._next += 1
         return self._waiting.popleft().result()
 
@@ -138,11 +166,21 @@ class ClipFeed:
         self._workers.shutdown(wait=True, cancel_futures=True)
 
 
+def _draw_with(recipe: Recipe, seed: int, number: int, weights: Path | None) -> list[Sample]:
+    return draw_clip(recipe, seed, number, None if weights is None else _network_of(weights))
+
+
+@lru_cache(maxsize=1)
+def _network_of(weights: Path) -> nn.Module:
+    return load_weights(weights)[1].to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+
+
 def _one_thread() -> None:
     import numba
 
     cv2.setNumThreads(1)
     numba.set_num_threads(1)
+    torch.set_num_threads(1)
 
 
 class SamplePool:

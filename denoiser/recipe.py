@@ -53,7 +53,7 @@ class Recipe:
 RECIPES = {
     "paper": Recipe(WindowLayout(past=20, planes=1, future=20), "clean_inverse_interval", "mus"),
     "best": Recipe(
-        WindowLayout(past=20, planes=8, future=20, half_widths=(4, 12, 24), memories=(64.0, 512.0)),
+        WindowLayout(past=20, planes=8, future=20, half_widths=(4, 12, 24), memories=(64.0, 512.0), gain_memory=1024.0),
         "light",
         "accumulate",
     ),

@@ -4,8 +4,15 @@
     best    L = mean (rate - light)^2 / (light + 0.05)      light weighs as its count noise does, so dim scenes count
 
 Adam; the rate of learning warms up over 100 steps and falls as a cosine to nothing at the end.  Everything follows from
-the seed and the number of steps; a run limited by `minutes` ends where the clock says.  In `out` the run keeps
-`<mode>.pt` (weights), `last.pt` (to resume), `curve.json` and `curve.png` (validation).
+the seed and the number of steps; a run limited by `minutes` ends where the clock says.
+
+`best` sees the pixel's gain as it found it itself earlier in the stream (`denoiser.window`).  So every `refresh_every`
+steps the network of the moment is written down, and the clips simulated from then on are denoised by it from their first
+frame to give that gain; until the first refresh the gain is 1.  (A resumed run draws its clips again, with the last
+network written down.)
+
+In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `rollout-<step>.pt` (the network that found the
+gain), `curve.json` and `curve.png` (validation).
 """
 
 from __future__ import annotations
@@ -24,14 +31,16 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from denoiser.pairs import ClipFeed, Sample, SamplePool, stack
+from denoiser import infer
+from denoiser.pairs import ClipFeed, Sample, SamplePool, draw_clip
 from denoiser.recipe import Recipe, recipe_of
 from denoiser.weights import read_plain, save_weights, write_whole
+from denoiser.window import Window
 from spikecam_env.errors import InputError
 
 POOL_CLIPS = 160
 FIRST_CLIPS = 24
-VALIDATION_CLIPS = 24
+VALIDATION_CLIPS = 10
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 WARM_UP_STEPS = 100
 
@@ -40,8 +49,9 @@ WARM_UP_STEPS = 100
 class TrainConfig:
     """mode: "best" | "paper".  out: folder.  The run ends after `steps`, or `minutes` where that is given.
 
-    batch: patches a step.  patch: their side [pixels].  lr: highest rate of learning.  steps_per_clip: steps between new
-    clips.  threads: for the network; the simulation has one process of its own.  resume: go on from out/last.pt.
+    batch: patches a step.  patch: their side [pixels].  lr: highest rate of learning.  steps_per_clip: steps between
+    new clips.  refresh_every: steps between validations, and between new networks for the gain.  threads: for the
+    network; the simulation has one process of its own.  resume: go on from out/last.pt.
     """
 
     mode: str = "best"
@@ -56,7 +66,7 @@ class TrainConfig:
     threads: int = 1
     resume: bool = True
     save_every_s: float = 60.0
-    validate_every: int = 1000
+    refresh_every: int = 1500
 
     def __post_init__(self) -> None:
         if self.steps < 1 or self.batch < 1 or not 4 <= self.patch <= 96 or self.lr <= 0 or self.steps_per_clip < 1:
@@ -77,17 +87,13 @@ def train(config: TrainConfig, *, progress: bool = True) -> Path:
         run.load(config.out / "last.pt")
     newest = FIRST_CLIPS + run.step // config.steps_per_clip
     pool = SamplePool(POOL_CLIPS)
-    feed = ClipFeed(recipe, config.seed, first=max(0, newest - POOL_CLIPS))
-    validation_feed = ClipFeed(recipe, config.seed + VALIDATION_SEED)
+    feed = ClipFeed(recipe, config.seed, max(0, newest - POOL_CLIPS), _rollout(config, recipe, run.step))
     try:
-        validation = _halves([next(validation_feed) for _ in range(VALIDATION_CLIPS)])
-        validation_feed.close()
         for _ in range(min(newest, POOL_CLIPS)):
             pool.add(next(feed))
-        return _loop(config, recipe, run, pool, feed, validation, progress)
+        return _loop(config, recipe, run, pool, feed, progress)
     finally:
         feed.close()
-        validation_feed.close()
 
 
 @dataclass
@@ -137,7 +143,6 @@ def _loop(
     run: _Run,
     pool: SamplePool,
     feed: ClipFeed,
-    validation: list[Sample],
     progress: bool,
 ) -> Path:
     loss_of = _clean_interval_loss if recipe.target == "clean_inverse_interval" else _light_loss
@@ -152,11 +157,12 @@ def _loop(
         run.step += 1
         run.seconds = before + time.monotonic() - began
         bar.update()
-        if run.step % config.validate_every == 0:
-            scores = validate(run.network, validation)
+        if run.step % config.refresh_every == 0:
+            scores = validate(recipe, run.network, config.seed + VALIDATION_SEED)
             run.curve.append({"step": run.step, "seconds": run.seconds, "loss": float(np.mean(losses)), **scores})
             losses.clear()
             bar.set_postfix(loss=run.curve[-1]["loss"], light_db=scores["network_vs_light_db"])
+            feed.weights = _refresh(config, recipe, run)
             _save(config, recipe, run)
             saved = time.monotonic()
         elif time.monotonic() - saved > config.save_every_s:
@@ -205,28 +211,45 @@ def network_inputs(spikes: NDArray[np.uint8], planes: NDArray) -> tuple[Tensor, 
     )
 
 
-@torch.no_grad()
-def validate(network: nn.Module, samples: list[Sample]) -> dict[str, float]:
+def validate(recipe: Recipe, network: nn.Module, seed: int) -> dict[str, float]:
     """Error over held-out windows, as PSNR [dB] against light 1.0: network, noisy 1/ISI and the window's mean rate.
 
-    Against the true light in each covered frame, and against what the network is taught.
+    Against the true light in each covered frame, and against what the network is taught.  The network runs over each clip
+    from its start, as online.
     """
+    network.eval()
     sums: dict[str, float] = {}
-    for batch in samples:
-        count = batch.light.shape[1]
-        with torch.autocast("cpu", torch.bfloat16):
-            rate = network(*network_inputs(batch.spikes, batch.planes)).float().numpy()
-        mean = batch.spikes.mean(axis=1, keepdims=True, dtype=np.float32)
-        for name, guess in {"network": rate, "interval": batch.planes[:, :count], "mean": mean}.items():
-            for reference in ("light", "target"):
-                error = np.square(guess.astype(np.float32) - getattr(batch, reference).astype(np.float32)).mean()
-                sums[f"{name}_vs_{reference}_db"] = sums.get(f"{name}_vs_{reference}_db", 0.0) + float(error)
-    return {name: round(-10 * float(np.log10(total / len(samples))), 3) for name, total in sums.items()}
+    for number in range(VALIDATION_CLIPS):
+        for sample in draw_clip(recipe, seed, number, network if recipe.layout.gain_memory else None)[:3]:
+            window = Window(0, len(sample.light), sample.spikes, sample.planes.astype(np.float32))
+            guesses = {
+                "network": infer.rates(network, window, torch.bfloat16),
+                "interval": window.planes[: window.count],
+                "mean": window.spikes.mean(axis=0, keepdims=True, dtype=np.float32),
+            }
+            for name, guess in guesses.items():
+                for reference in ("light", "target"):
+                    error = np.square(guess - getattr(sample, reference).astype(np.float32)).mean()
+                    sums[f"{name}_vs_{reference}_db"] = sums.get(f"{name}_vs_{reference}_db", 0.0) + float(error)
+    network.train()
+    return {name: round(-10 * float(np.log10(total / (3 * VALIDATION_CLIPS))), 3) for name, total in sums.items()}
 
 
-def _halves(clips: list[list[Sample]]) -> list[Sample]:
-    """Two windows of each clip, as batches of one clip."""
-    return [stack(clip[:2]) for clip in clips]
+def _rollout(config: TrainConfig, recipe: Recipe, step: int) -> Path | None:
+    """The network written down last, if there is one."""
+    path = config.out / f"rollout-{step // config.refresh_every * config.refresh_every}.pt"
+    return path if recipe.layout.gain_memory and path.exists() else None
+
+
+def _refresh(config: TrainConfig, recipe: Recipe, run: _Run) -> Path | None:
+    """Write the network down for the clips to come; older ones go."""
+    if not recipe.layout.gain_memory:
+        return None
+    path = config.out / f"rollout-{run.step}.pt"
+    save_weights(path, config.mode, recipe, run.network, {"steps": run.step})
+    for old in sorted(config.out.glob("rollout-*.pt"), key=os.path.getmtime)[:-2]:
+        old.unlink()
+    return path
 
 
 def _save(config: TrainConfig, recipe: Recipe, run: _Run) -> Path:

@@ -27,7 +27,9 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         if output not in ("spikes", "rate"):
             raise unknown_name("output", output, ("spikes", "rate"))
         if space.shape is None or len(space.shape) != 3:
-            raise InputError(f"observations are {space}; the denoiser needs unpacked spike blocks (frames, rows, columns)")
+            raise InputError(
+                f"observations are {space}; the denoiser needs unpacked spike blocks (frames, rows, columns)"
+            )
         self._denoiser = OnlineDnSS.pretrained(mode, output=output) if isinstance(mode, str) else mode
         self._denoiser.output = output
         self._type = space.dtype if output == "spikes" else np.dtype(np.float32)

@@ -117,9 +117,7 @@ class _Layer:
         """Fastest point [pixels/frame]."""
         return float(np.hypot(*self.velocity)) + abs(self.spin) * self.radius
 
-    def pose(
-        self, frame: float, offset: tuple[float, float], shape: tuple[int, int]
-    ) -> tuple[float, float, float]:
+    def pose(self, frame: float, offset: tuple[float, float], shape: tuple[int, int]) -> tuple[float, float, float]:
         """(x, y) of the middle in the picture [pixels] and the angle [radians]."""
         place = [
             (c + v * frame - o + self.radius) % (size + 2 * self.radius) - self.radius
@@ -127,18 +125,14 @@ class _Layer:
         ]
         return place[0], place[1], self.angle + self.spin * frame
 
-    def velocity_at(
-        self, frame: float, offset: tuple[float, float], shape: tuple[int, int]
-    ) -> NDArray[np.float32]:
+    def velocity_at(self, frame: float, offset: tuple[float, float], shape: tuple[int, int]) -> NDArray[np.float32]:
         """(H, W, 2): velocity of this layer's surface in every pixel [pixels/frame], x then y."""
         x, y, _ = self.pose(frame, offset, shape)
         rows, columns = np.indices(shape)
         vx, vy = self.velocity[0] - self.spin * (rows - y), self.velocity[1] + self.spin * (columns - x)
         return np.stack([vx, vy], axis=-1).astype(np.float32)
 
-    def tiled(
-        self, frame: float, offset: tuple[float, float], shape: tuple[int, int]
-    ) -> NDArray[np.float32]:
+    def tiled(self, frame: float, offset: tuple[float, float], shape: tuple[int, int]) -> NDArray[np.float32]:
         """The sprite's light repeated over the whole picture."""
         x = self.centre[0] + self.velocity[0] * frame - offset[0]
         y = self.centre[1] + self.velocity[1] * frame - offset[1]
