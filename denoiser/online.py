@@ -12,7 +12,6 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Iterator
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from spikecam_env.streams.packing import as_spikes
 
 OUTPUTS = ("spikes", "rate", "both")
 PRECISIONS = ("auto", "bfloat16", "float32")
-_DECODERS: dict[str, ModuleType] = {"mus": mus, "accumulate": accumulate}
+_DECODERS: dict[str, Any] = {"mus": mus, "accumulate": accumulate}
 
 Denoised = NDArray[Any] | tuple[NDArray[np.uint8], NDArray[np.float32]]
 """(F, H, W) spikes uint8, or rates float32 [spikes/frame], or both as a pair; F may be 0."""
@@ -63,7 +62,6 @@ class OnlineDnSS:
         self._recipe, self._stride = recipe, stride
         self._network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._type = infer.number_type(precision)
-        self._decoder = _DECODERS[recipe.decoder]
         self.reset()
 
     @classmethod
@@ -102,7 +100,7 @@ class OnlineDnSS:
         if self._window is None:
             size = (chunk.shape[1], chunk.shape[2])
             self._window = RollingWindow(self._recipe.layout, size)
-            self._decoding = self._decoder.start(size)
+            self._decoding = _DECODERS[self._recipe.decoder].start(size)
         return self._denoise(self._window.push(chunk))
 
     def flush(self) -> Denoised:
@@ -144,7 +142,7 @@ class OnlineDnSS:
         for window in windows:
             rate = self._rate(window)
             self._window.learn(window, rate)
-            fired, self._decoding = self._decoder.step(rate, self._decoding)
+            fired, self._decoding = _DECODERS[self._recipe.decoder].step(rate, self._decoding)
             rates.append(rate)
             spikes.append(fired)
         empty = (0, *self._window.shape)

@@ -26,7 +26,7 @@ from torch import nn
 from denoiser import infer
 from denoiser.recipe import Recipe
 from denoiser.weights import load_weights
-from denoiser.window import RollingWindow, Window, WindowLayout
+from denoiser.window import RollingWindow, Window, WindowLayout, without_gain
 from scenes.collage import Collage
 from scenes.textures import random_texture
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
@@ -57,11 +57,18 @@ class Sample:
 
 
 def draw_clip(
-    recipe: Recipe, seed: int, number: int, network: nn.Module | None = None, shape: tuple[int, int] = CLIP_SHAPE
+    recipe: Recipe,
+    seed: int,
+    number: int,
+    network: nn.Module | None = None,
+    *,
+    knows_gain: bool = True,
+    shape: tuple[int, int] = CLIP_SHAPE,
 ) -> list[Sample]:
     """Simulate clip `number` of the training set `seed` and keep WINDOWS_PER_CLIP windows of it.
 
-    network: runs over the clip so that the windows carry the gain it would have found; None: gain 1.
+    network: runs over the clip so that the windows carry the gain it finds; None: gain 1.  A network that was trained at
+    gain 1 does not know what to do with another: with `knows_gain` False it is not shown the gain.
     """
     rng = np.random.default_rng([seed, number])
     scene = draw_scene(rng, shape, _texture_bank(seed))
@@ -75,7 +82,7 @@ def draw_clip(
     kept = set(rng.choice(starts, WINDOWS_PER_CLIP, replace=False).tolist())
     clean = sensor.clean_twin().step(light, frames=frames) if learns_clean else None
     samples = []
-    for window in _windows(layout, noisy, kept, network):
+    for window in _windows(layout, noisy, kept, network, knows_gain):
         covered = range(window.start, window.start + layout.planes)
         truth = np.stack([light_in_frame(light, t) for t in covered])
         target = truth if clean is None else isi_planes(clean, start=covered[0], stop=covered[-1] + 1, normalised=True)
@@ -85,7 +92,7 @@ def draw_clip(
 
 
 def _windows(
-    layout: WindowLayout, spikes: NDArray[np.uint8], kept: set[int], network: nn.Module | None
+    layout: WindowLayout, spikes: NDArray[np.uint8], kept: set[int], network: nn.Module | None, knows_gain: bool
 ) -> Iterator[Window]:
     """The windows that start in `kept`, as an online denoiser with this network would see them."""
     roller = RollingWindow(layout, (spikes.shape[1], spikes.shape[2]))
@@ -94,7 +101,8 @@ def _windows(
         if window.start in kept:
             yield window
         if network is not None:
-            roller.learn(window, infer.rates(network, window, torch.bfloat16))
+            shown = window if knows_gain else without_gain(window)
+            roller.learn(window, infer.rates(network, shown, torch.bfloat16))
 
 
 def draw_scene(rng: np.random.Generator, shape: tuple[int, int], textures: list[NDArray[np.float32]]) -> Collage:
@@ -167,12 +175,16 @@ class ClipFeed:
 
 
 def _draw_with(recipe: Recipe, seed: int, number: int, weights: Path | None) -> list[Sample]:
-    return draw_clip(recipe, seed, number, None if weights is None else _network_of(weights))
+    if weights is None:
+        return draw_clip(recipe, seed, number)
+    network, knows_gain = _network_of(weights)
+    return draw_clip(recipe, seed, number, network, knows_gain=knows_gain)
 
 
 @lru_cache(maxsize=1)
-def _network_of(weights: Path) -> nn.Module:
-    return load_weights(weights)[1].to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+def _network_of(weights: Path) -> tuple[nn.Module, bool]:
+    _, network, training = load_weights(weights)
+    return network.to(memory_format=torch.channels_last), bool(training["knows_gain"])  # type: ignore[call-overload]
 
 
 def _one_thread() -> None:

@@ -8,7 +8,8 @@ the seed and the number of steps; a run limited by `minutes` ends where the cloc
 
 `best` sees the pixel's gain as it found it itself earlier in the stream (`denoiser.window`).  So every `refresh_every`
 steps the network of the moment is written down, and the clips simulated from then on are denoised by it from their first
-frame to give that gain; until the first refresh the gain is 1.  (A resumed run draws its clips again, with the last
+frame to give that gain; until the first refresh the gain is 1, and the first network, which learned without, is not shown
+the gain it finds.  (A resumed run draws its clips again, with the last
 network written down.)
 
 In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `rollout-<step>.pt` (the network that found the
@@ -18,6 +19,7 @@ gain), `curve.json` and `curve.png` (validation).
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
 from collections.abc import Callable
@@ -66,7 +68,7 @@ class TrainConfig:
     threads: int = 1
     resume: bool = True
     save_every_s: float = 60.0
-    refresh_every: int = 1500
+    refresh_every: int = 1000
 
     def __post_init__(self) -> None:
         if self.steps < 1 or self.batch < 1 or not 4 <= self.patch <= 96 or self.lr <= 0 or self.steps_per_clip < 1:
@@ -158,7 +160,8 @@ def _loop(
         run.seconds = before + time.monotonic() - began
         bar.update()
         if run.step % config.refresh_every == 0:
-            scores = validate(recipe, run.network, config.seed + VALIDATION_SEED)
+            knows_gain = run.step > config.refresh_every
+            scores = validate(recipe, run.network, config.seed + VALIDATION_SEED, knows_gain)
             run.curve.append({"step": run.step, "seconds": run.seconds, "loss": float(np.mean(losses)), **scores})
             losses.clear()
             bar.set_postfix(loss=run.curve[-1]["loss"], light_db=scores["network_vs_light_db"])
@@ -178,7 +181,7 @@ def _done(config: TrainConfig, run: _Run) -> float:
 
 
 def _set_rate(optimiser: torch.optim.Optimizer, lr: float, step: int, done: float) -> None:
-    rate = lr * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + np.cos(np.pi * done))
+    rate = lr * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
     for group in optimiser.param_groups:
         group["lr"] = rate
 
@@ -211,16 +214,17 @@ def network_inputs(spikes: NDArray[np.uint8], planes: NDArray) -> tuple[Tensor, 
     )
 
 
-def validate(recipe: Recipe, network: nn.Module, seed: int) -> dict[str, float]:
+def validate(recipe: Recipe, network: nn.Module, seed: int, knows_gain: bool = True) -> dict[str, float]:
     """Error over held-out windows, as PSNR [dB] against light 1.0: network, noisy 1/ISI and the window's mean rate.
 
     Against the true light in each covered frame, and against what the network is taught.  The network runs over each clip
     from its start, as online.
     """
     network.eval()
+    guide = network if knows_gain and recipe.layout.gain_memory else None
     sums: dict[str, float] = {}
     for number in range(VALIDATION_CLIPS):
-        for sample in draw_clip(recipe, seed, number, network if recipe.layout.gain_memory else None)[:3]:
+        for sample in draw_clip(recipe, seed, number, guide)[:3]:
             window = Window(0, len(sample.light), sample.spikes, sample.planes.astype(np.float32))
             guesses = {
                 "network": infer.rates(network, window, torch.bfloat16),
@@ -246,7 +250,7 @@ def _refresh(config: TrainConfig, recipe: Recipe, run: _Run) -> Path | None:
     if not recipe.layout.gain_memory:
         return None
     path = config.out / f"rollout-{run.step}.pt"
-    save_weights(path, config.mode, recipe, run.network, {"steps": run.step})
+    save_weights(path, config.mode, recipe, run.network, {"knows_gain": run.step > config.refresh_every})
     for old in sorted(config.out.glob("rollout-*.pt"), key=os.path.getmtime)[:-2]:
         old.unlink()
     return path

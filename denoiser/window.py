@@ -30,7 +30,7 @@ real frames only.  The state is the frames of one window, the last spike before 
 from __future__ import annotations
 
 from collections.abc import Container, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numba
@@ -178,6 +178,14 @@ class RollingWindow:
             new = self._frames[self._averaged - held : stop - held]
             _running_means(new, np.float32(1.0) / np.asarray(self.layout.memories, np.float32), self._means)
         self._averaged = max(stop, self._averaged)
+
+
+def without_gain(window: Window) -> Window:
+    """The window as it would be at gain 1."""
+    planes = window.planes.copy()
+    planes[:-1] *= 1 + planes[-1] / 4
+    planes[-1] = 0.0
+    return replace(window, planes=planes)
 
 
 def _mirror(frames: NDArray[np.int64], count: int) -> NDArray[np.int64]:

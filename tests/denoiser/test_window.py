@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from denoiser.recipe import RECIPES
-from denoiser.window import RollingWindow, WindowLayout
+from denoiser.window import RollingWindow, WindowLayout, without_gain
 from spikecam_env.streams import isi_planes
 
 SHAPE = (5, 7)
@@ -103,6 +103,9 @@ def test_gain_is_the_ratio_of_spikes_to_learned_rates():
     worst = abs(found - gains).max()
     print(f"worst gain error {worst:.4f}")
     assert worst < (1 + 2 * 0.1) / (0.4 * window.start)  # one spike more or less, and the prior's pull
+    blind = RollingWindow(WindowLayout(planes=8), SHAPE)
+    plain = [w for w in blind.push(spikes) if w.start == window.start][0]
+    assert np.allclose(without_gain(window).planes[:-1], plain.planes, rtol=1e-6)
 
 
 def test_mirrored_spikes_fill_both_edges():
