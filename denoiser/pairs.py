@@ -67,8 +67,8 @@ def draw_clip(
 ) -> list[Sample]:
     """Simulate clip `number` of the training set `seed` and keep WINDOWS_PER_CLIP windows of it.
 
-    network: runs over the clip so that the windows carry the gain it finds; None: gain 1.  A network that was trained at
-    gain 1 does not know what to do with another: with `knows_gain` False it is not shown the gain.
+    network: runs over the clip so that the windows carry the gain it finds; None: gain 1.  A network that was trained
+    at gain 1 does not know what to do with another: with `knows_gain` False it is not shown the gain.
     """
     rng = np.random.default_rng([seed, number])
     scene = draw_scene(rng, shape, _texture_bank(seed))
@@ -122,7 +122,7 @@ def draw_scene(rng: np.random.Generator, shape: tuple[int, int], textures: list[
 def draw_model(rng: np.random.Generator) -> SensorModel:
     """A sensor: half SCSim's preset, else a preset with the strength of its fixed pattern drawn anew; 40 or 20 kHz.
 
-    Real units differ: the flat-field maps show 2.7 % from pixel to pixel where SCSim has 7.3 %, and a wider dark current.
+    Real units differ: flat-field maps show 2.7 % from pixel to pixel where SCSim has 7.3 %, and a wider dark current.
     """
     preset = ("scsim", "physical", "ideal")[rng.choice(3, p=(0.75, 0.17, 0.08))]
     model = replace(SensorModel.preset(preset), frame_rate_hz=40_000.0 if rng.random() < 0.7 else 20_000.0)

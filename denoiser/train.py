@@ -7,10 +7,9 @@ Adam; the rate of learning warms up over 100 steps and falls as a cosine to noth
 the seed and the number of steps; a run limited by `minutes` ends where the clock says.
 
 `best` sees the pixel's gain as it found it itself earlier in the stream (`denoiser.window`).  So every `refresh_every`
-steps the network of the moment is written down, and the clips simulated from then on are denoised by it from their first
-frame to give that gain; until the first refresh the gain is 1, and the first network, which learned without, is not shown
-the gain it finds.  (A resumed run draws its clips again, with the last
-network written down.)
+steps the network of the moment is written down, and the clips simulated from then on are denoised by it from their
+first frame to give that gain; until the first refresh the gain is 1, and the first network, which learned without, is
+not shown the gain it finds.  (A resumed run draws its clips again, with the last network written down.)
 
 In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `rollout-<step>.pt` (the network that found the
 gain), `curve.json` and `curve.png` (validation).
@@ -217,8 +216,8 @@ def network_inputs(spikes: NDArray[np.uint8], planes: NDArray) -> tuple[Tensor, 
 def validate(recipe: Recipe, network: nn.Module, seed: int, knows_gain: bool = True) -> dict[str, float]:
     """Error over held-out windows, as PSNR [dB] against light 1.0: network, noisy 1/ISI and the window's mean rate.
 
-    Against the true light in each covered frame, and against what the network is taught.  The network runs over each clip
-    from its start, as online.
+    Against the true light in each covered frame, and against what the network is taught.  The network runs over each
+    clip from its start, as online.
     """
     network.eval()
     guide = network if knows_gain and recipe.layout.gain_memory else None

@@ -74,7 +74,7 @@ class Collage:
         frame = np.arange(first, last + 1) * float(self.key_every)
         if gaze is not None:
             frame = np.union1d(frame[(frame > start) & (frame < stop)], [start, stop])
-        return Keyframes(frame, np.stack([self._picture(t, gaze)[0] for t in frame]))
+        return Keyframes(frame.astype(np.float64), np.stack([self._picture(t, gaze)[0] for t in frame]))
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Radiance, flow [pixels/frame] and object number (0: background, then the shapes from the back)."""
@@ -137,7 +137,7 @@ class _Layer:
         x = self.centre[0] + self.velocity[0] * frame - offset[0]
         y = self.centre[1] + self.velocity[1] * frame - offset[1]
         matrix = self._to_sprite(x, y, self.angle)
-        return cv2.warpAffine(self.sprite[..., 0], matrix, shape[::-1], flags=_WARP, borderMode=cv2.BORDER_WRAP)
+        return _warp(self.sprite[..., 0], matrix, shape, cv2.BORDER_WRAP)
 
     def paint(
         self,
@@ -155,7 +155,7 @@ class _Layer:
         if left >= right or top >= bottom:
             return
         matrix = self._to_sprite(x - left, y - top, angle)
-        warped = cv2.warpAffine(self.sprite, matrix, (right - left, bottom - top), flags=_WARP)
+        warped = _warp(self.sprite, matrix, (bottom - top, right - left), cv2.BORDER_CONSTANT)
         patch = picture[top:bottom, left:right]
         patch *= 1 - warped[..., 1]
         patch += warped[..., 0]
@@ -168,7 +168,12 @@ class _Layer:
         return np.array([[cos, sin, middle - cos * x - sin * y], [-sin, cos, middle + sin * x - cos * y]])
 
 
-_WARP = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+def _warp(
+    image: NDArray[np.float32], matrix: NDArray[np.float64], shape: tuple[int, int], border: int
+) -> NDArray[np.float32]:
+    """The image at matrix (x, y, 1) for every pixel (x, y) of a picture of `shape`, bilinear."""
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return np.asarray(cv2.warpAffine(image, matrix, shape[::-1], flags=flags, borderMode=border), np.float32)
 
 
 def _draw_layer(
@@ -180,10 +185,7 @@ def _draw_layer(
     textures: Sequence[NDArray[np.float32]] | None,
     background: bool,
 ) -> _Layer:
-    if textures is None:
-        texture = random_texture(rng, 256, kinds)
-    else:
-        texture = textures[rng.integers(len(textures))]
+    texture = random_texture(rng, 256, kinds) if textures is None else textures[int(rng.integers(len(textures)))]
     low, high = np.sort(np.exp(rng.uniform(-np.log(contrast), 0, 2)))
     if rng.random() < 0.5:
         low, high = high, low
@@ -209,7 +211,7 @@ def _fill(grey: NDArray[np.float32], size: int, rng: np.random.Generator, zoom: 
     """A (size, size) piece of the texture, magnified by 1 / zoom, repeated where it ends."""
     x, y = rng.uniform(0, len(grey), 2)
     matrix = np.array([[zoom, 0, x], [0, zoom, y]])
-    return cv2.warpAffine(grey, matrix, (size, size), flags=_WARP, borderMode=cv2.BORDER_WRAP)
+    return _warp(grey, matrix, (size, size), cv2.BORDER_WRAP)
 
 
 def _mask(kind: str, half_width: float, half_height: float, blades: int) -> NDArray[np.float32]:

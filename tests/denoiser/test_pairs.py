@@ -35,7 +35,7 @@ def test_samples_have_the_recipe_s_channels(recipe, clip):
         assert sample.spikes.shape == (recipe.layout.span, *SHAPE) and sample.spikes.max() <= 1
         assert sample.planes.shape == (recipe.layout.layers, *SHAPE)
         assert sample.light.shape == sample.target.shape == (recipe.layout.planes, *SHAPE)
-        assert 0 <= sample.light.min() and sample.light.max() <= 1
+        assert sample.light.min() >= 0 and sample.light.max() <= 1
 
 
 def test_mean_target_is_the_mean_light():

@@ -43,7 +43,7 @@ def test_shipped_weights_are_small_and_say_how_they_were_made(mode):
 
 def test_a_truncated_file_is_refused(checkpoint):
     checkpoint.write_bytes(checkpoint.read_bytes()[:5000])
-    with pytest.raises(InputError, match="best.pt"):
+    with pytest.raises(InputError, match=r"best\.pt"):
         load_weights(checkpoint)
 
 

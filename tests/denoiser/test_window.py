@@ -104,7 +104,7 @@ def test_gain_is_the_ratio_of_spikes_to_learned_rates():
     print(f"worst gain error {worst:.4f}")
     assert worst < (1 + 2 * 0.1) / (0.4 * window.start)  # one spike more or less, and the prior's pull
     blind = RollingWindow(WindowLayout(planes=8), SHAPE)
-    plain = [w for w in blind.push(spikes) if w.start == window.start][0]
+    plain = next(w for w in blind.push(spikes) if w.start == window.start)
     assert np.allclose(without_gain(window).planes[:-1], plain.planes, rtol=1e-6)
 
 
