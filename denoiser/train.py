@@ -107,12 +107,13 @@ class _Run:
     step: int
     seconds: float
     curve: list[dict[str, float]]
+    resumed_at: list[int]
 
     @classmethod
     def begin(cls, config: TrainConfig, recipe: Recipe) -> _Run:
         network = recipe.network().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         optimiser = torch.optim.Adam(network.parameters(), config.lr)
-        return cls(network, optimiser, np.random.default_rng([config.seed, 1]), 0, 0.0, [])
+        return cls(network, optimiser, np.random.default_rng([config.seed, 1]), 0, 0.0, [], [])
 
     def save(self, path: Path) -> None:
         write_whole(
@@ -124,6 +125,7 @@ class _Run:
                 "step": self.step,
                 "seconds": self.seconds,
                 "curve": self.curve,
+                "resumed_at": self.resumed_at,
             },
         )
 
@@ -134,6 +136,7 @@ class _Run:
             self.optimiser.load_state_dict(data["optimiser"])
             self.rng.bit_generator.state = json.loads(data["rng"])
             self.step, self.seconds, self.curve = data["step"], data["seconds"], data["curve"]
+            self.resumed_at = [*data["resumed_at"], self.step]
         except (KeyError, TypeError, RuntimeError, ValueError) as error:
             raise InputError(f"{path} is not a run of this mode; give another --out, or resume=False") from error
 
@@ -275,7 +278,14 @@ def _training_record(config: TrainConfig, run: _Run) -> dict[str, Any]:
     except PackageNotFoundError:
         package = "not installed"
     options = {k: v for k, v in asdict(config).items() if k not in ("out", "resume", "save_every_s")}
-    return {"options": options, "steps": run.step, "minutes": round(run.seconds / 60, 1), "package": package}
+    return {
+        "command": f"spikecam train {config.mode}",
+        "options": options,
+        "steps": run.step,
+        "minutes": round(run.seconds / 60, 1),
+        "resumed_at": run.resumed_at,
+        "package": package,
+    }
 
 
 def _plot(curve: list[dict[str, float]], path: Path) -> None:
