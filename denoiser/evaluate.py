@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,7 +67,7 @@ class HeldOut:
 def evaluate_quick(
     modes: Sequence[str] = ("paper", "best"),
     *,
-    weights: dict[str, str | os.PathLike[str]] | None = None,
+    weights: Mapping[str, str | os.PathLike[str]] | None = None,
     scenes_a_class: int = 2,
     shape: tuple[int, int] = (128, 128),
     frames: int = 280,

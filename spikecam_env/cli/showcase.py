@@ -73,6 +73,7 @@ def stream_disk(*, rpm: float, frames: int, mode: str, model: str, shape: tuple[
     online = OnlineDnSS.pretrained(mode, output="both")
     _compile(env, online, shape)
     still = np.zeros(2, np.float32)
+    centred = {"centre": ((shape[1] - 1) / 2, (shape[0] - 1) / 2), "drift_px_s": (0.0, 0.0)}
     noisy: list[Spikes] = []
     clean: list[Spikes] = []
     denoised: list[Spikes] = []
@@ -83,7 +84,7 @@ def stream_disk(*, rpm: float, frames: int, mode: str, model: str, shape: tuple[
     for step in tqdm(range(blocks + 1), desc="stream", unit="block", leave=False):
         began = time.perf_counter()
         if step == 0:
-            block, _ = env.reset(seed=seed, options=_CENTRED)
+            block, _ = env.reset(seed=seed, options=centred)
             twin = camera.sensor.clean_twin()
         elif step < blocks:
             block, *_ = env.step(still)
@@ -114,8 +115,6 @@ def stream_disk(*, rpm: float, frames: int, mode: str, model: str, shape: tuple[
     )
 
 
-_CENTRED = {"drift_px_s": (0.0, 0.0)}
-"""The demo's disk stays where it starts."""
 
 
 def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:
@@ -184,7 +183,7 @@ def _denoised(mode: str, spikes: Spikes) -> Spikes:
 
 def _compile(env: gymnasium.Env, online: OnlineDnSS, shape: tuple[int, int]) -> None:
     """Run everything once, so that just-in-time compilation does not count as the camera's speed."""
-    env.reset(seed=0, options=_CENTRED)
+    env.reset(seed=0)
     env.step(np.zeros(2, np.float32))
     online.push(np.zeros((64, *shape), np.uint8))
     online.reset()
