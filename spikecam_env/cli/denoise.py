@@ -26,14 +26,16 @@ class Denoise:
     """Frames averaged in the pictures (TFP window); odd."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised."""
-    height: int = 250
-    """Rows of a .dat file."""
-    width: int = 400
-    """Columns of a .dat file."""
+    height: int | None = None
+    """Rows of a .dat file (250 if not given)."""
+    width: int | None = None
+    """Columns of a .dat file (400 if not given)."""
+    crop_width: int | None = None
+    """Columns of a .dat file to keep, where it holds wider rows (416 for 400)."""
     flip: bool = False
-    """A .dat file stored bottom row first (public Vidar files are)."""
-    bit_order: Literal["little", "big"] = "little"
-    """Which bit of a .dat byte comes first."""
+    """The file is stored bottom row first (public Vidar files are)."""
+    bit_order: Literal["little", "big"] | None = None
+    """Which bit of a .dat byte comes first (little if not given)."""
     key: str | None = None
     """Array of an .npz file to read; found by itself where there is only one candidate."""
     time_axis: Literal[0, 1, 2] | None = None
@@ -53,15 +55,9 @@ class Denoise:
 
         if self.window < 1 or self.window % 2 == 0:
             raise InputError(f"--window {self.window}; it must be odd and at least 1 (41 is usual)")
-        recording = read_recording(
-            self.file,
-            height=self.height,
-            width=self.width,
-            flip=self.flip,
-            bit_order=self.bit_order,
-            key=self.key,
-            time_axis=self.time_axis,
-        )
+        names = ("height", "width", "crop_width", "bit_order", "key", "time_axis")
+        options = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        recording = read_recording(self.file, **options, **({"flip": True} if self.flip else {}))
         noisy = recording.spikes
         online = OnlineDnSS.pretrained(self.mode)
         folder = out_folder(self.out)
@@ -74,7 +70,8 @@ class Denoise:
         parts.append(online.flush())
         clean = np.concatenate(parts)
 
-        attributes = {**recording.attributes, "denoiser": self.mode, "source": self.file.name}
+        kept = {k: recording.attributes[k] for k in ("model", "seed", "scene") if k in recording.attributes}
+        attributes = {**kept, "denoiser": self.mode, "source": self.file.name}
         with SpikeWriter(folder / "denoised.h5", clean.shape[1:], recording.frame_rate_hz, **attributes) as writer:
             writer.append(clean)
 
