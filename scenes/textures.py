@@ -111,7 +111,7 @@ def glyphs(rng: np.random.Generator, size: int) -> Texture:
             max(1, round(1.4 * scale)),
             cv2.LINE_AA,
         )
-    image = page / np.float32(255)
+    image = (page / 255).astype(np.float32)
     return 1 - image if rng.random() < 0.5 else image
 
 

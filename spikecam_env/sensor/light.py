@@ -7,9 +7,10 @@ Collected light is counted in *grains*, GRAINS = 2^23 to a pixel's own threshold
 anything physical), in whole numbers.  Within a key interval of n frames whose light goes from i0 to i1 grains
 a frame, the grains collected before frame k are
 
-    F(k) = A k + B k(k-1)/2 + (r k(k-1)/2) / n        A = i0 + B/2,  i1 - i0 = B n + r
+    F(k) = i0 k + (i1 - i0) k^2 / 2n = i0 k + B k^2 + r k^2 / 2n        i1 - i0 = 2 n B + r
 
-in 32-bit integer arithmetic, so engines that compute it in closed form or frame by frame give the same bits.
+in 32-bit integer arithmetic, rounded down, so engines that compute it in closed form or frame by frame give the same
+bits.  F never falls, down to single grains: 1/2n is taken in 2^-18, rounded up.
 """
 
 from __future__ import annotations
@@ -138,26 +139,26 @@ def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]
 
 @dataclass(frozen=True)
 class Ramp:
-    """The integers of F(k) for every pixel of a segment (see the module's equation)."""
+    """The integers of F(k) for every pixel of a segment: i0, B, and r / 2n in 2^-18 (see the module's equation)."""
 
-    a: NDArray[np.int32]
-    b: NDArray[np.int32]
-    r: NDArray[np.int32]
-    length: int
+    level: NDArray[np.int32]
+    curve: NDArray[np.int32]
+    rest: NDArray[np.int32]
 
-    def collected(self, k: int) -> NDArray[np.int32]:
-        """Grains (P,) collected from the start of the key interval to the start of its frame k."""
-        t = np.int32(k * (k - 1) // 2)
-        per = np.int32((1 << 20) // self.length)
-        return self.a * np.int32(k) + self.b * t + ((self.r * t * per) >> np.int32(20))
+    def collected(self, frame: int) -> NDArray[np.int32]:
+        """Grains (P,) collected from the start of the key interval to the start of its frame."""
+        k = np.int32(frame)
+        return self.level * k + self.curve * (k * k) + ((self.rest * (k * k)) >> np.int32(18))
 
 
 def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32]) -> Ramp:
     """Integrate one segment: gain [grains/frame at radiance 1] and dark [grains/frame] are (P,) float32."""
     i0 = _grains_per_frame(segment.radiance0, gain, dark)
     d = _grains_per_frame(segment.radiance1, gain, dark) - i0
-    b = np.floor(d.astype(np.float32) * np.float32(1.0 / segment.length)).astype(np.int32)
-    return Ramp(i0 + (b >> np.int32(1)), b, d - b * np.int32(segment.length), segment.length)
+    twice = 2 * segment.length
+    curve = np.floor(d.astype(np.float32) * np.float32(1.0 / twice)).astype(np.int32)
+    per = -(-(1 << 18) // twice)
+    return Ramp(i0, curve, (d - curve * np.int32(twice)) * np.int32(per))
 
 
 def _grains_per_frame(

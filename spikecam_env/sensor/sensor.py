@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.kernels import fast
-from spikecam_env.sensor.light import Keyframes, as_light, segments
+from spikecam_env.sensor.light import Keyframes, Segment, as_light, segments
 from spikecam_env.sensor.model import SensorModel, generator
 
 ENGINES = ("auto", "fast", "reference")
@@ -75,7 +75,7 @@ class SpikeSensor:
         spikes = np.empty((frames, self.shape[0] * self.shape[1]), dtype=np.uint8)
         done = 0
         for segment in segments(light, self.frame, frames):
-            spikes[done : done + segment.count] = self._run(segment)
+            self._run(segment, spikes[done : done + segment.count])
             done += segment.count
         self.frame += frames
         return spikes.reshape(frames, *self.shape)
@@ -115,10 +115,11 @@ class SpikeSensor:
         else:
             self._pixels = reference.start(self.unit, flat, generator(seed, "temporal"))
 
-    def _run(self, segment: Any) -> NDArray[np.uint8]:
+    def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
         if self.engine == "fast":
-            return fast.run(self.unit, self._pixels, segment)
-        return reference.run(self.unit, self._extras, self.model.frame_rate_hz, self._pixels, segment)
+            fast.run(self._pixels, segment, out)
+        else:
+            out[:] = reference.run(self.unit, self._extras, self.model.frame_rate_hz, self._pixels, segment)
 
 
 def _checked_shape(shape: Any) -> tuple[int, int]:

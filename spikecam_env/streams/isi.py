@@ -25,9 +25,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import as_spikes
 
 
-def isi_plane(
-    spikes: ArrayLike, t: int, *, future: int | None = None, normalised: bool = False
-) -> NDArray[np.float32]:
+def isi_plane(spikes: ArrayLike, t: int, *, future: int | None = None, normalised: bool = False) -> NDArray[np.float32]:
     """(T, H, W) spikes -> (H, W) float32, the interval at frame t [frames], or its inverse if `normalised`.
 
     Errors: InputError if t is outside the stream or `future` is negative.
@@ -52,9 +50,7 @@ def isi_planes(
     count = len(frames)
     stop = count if stop is None else stop
     if not 0 <= start < stop <= count:
-        raise InputError(
-            f"planes {start} to {stop} asked of {count} frames; need 0 <= start < stop <= {count}"
-        )
+        raise InputError(f"planes {start} to {stop} asked of {count} frames; need 0 <= start < stop <= {count}")
     if future is not None and future < 0:
         raise InputError(f"future is {future}; it is a look-ahead in frames, 0 or more")
     ahead = count if future is None else future

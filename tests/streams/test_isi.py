@@ -39,9 +39,7 @@ def test_more_pixels_than_a_strip_changes_nothing() -> None:
 def test_plane_depends_on_frames_up_to_t_plus_future_only() -> None:
     spikes = (np.random.default_rng(5).random((60, 8, 8)) < 0.1).astype(np.uint8)
     for t in (0, 20, 40):
-        np.testing.assert_array_equal(
-            isi_plane(spikes, t, future=15), isi_plane(spikes[: t + 16], t, future=15)
-        )
+        np.testing.assert_array_equal(isi_plane(spikes, t, future=15), isi_plane(spikes[: t + 16], t, future=15))
 
 
 def test_normalised_is_the_inverse_and_at_most_one() -> None:

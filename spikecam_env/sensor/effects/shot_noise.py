@@ -2,8 +2,8 @@
 
     electrons of a frame ~ Poisson(mean);   spread of a spike's charge: 1 / sqrt(N)
 
-Stage: integration.  Seen in: the k-slope of A_k, T^2/N.  Source: paper (3)-(4), where the photon count is drawn; here it
-is the collected electrons, dark ones included.  SCSim's script counts 5e4 quanta a frame at full scale.
+Stage: integration.  Seen in: the k-slope of A_k, T^2/N.  Source: paper (3)-(4), where the photon count is
+drawn; here it is the collected electrons, dark ones included.  SCSim's script counts 5e4 quanta a frame at full scale.
 """
 
 from __future__ import annotations

@@ -1,11 +1,32 @@
-"""The fast engine (stand-in until the numba kernels land): carries nothing."""
+"""The fast engine: random numbers only per spike.
+
+Poisson arrivals of rate lambda(t) are a unit-rate process in Lambda(t) = integral of lambda, so a pixel that needs N
+electrons fires when Lambda has advanced by Gamma(N, 1), with the reset's draw mixed in (`quantile`).  Between spikes
+nothing is drawn: the crossing time follows from the light ramp (`loop`).  Without noise the bits are the reference's.
+
+Threads are the engine's own, not numba's: numba's OpenMP layer aborts in a process forked after its first use, which is
+how vector environments start.  Their number is NUMBA_NUM_THREADS, by default the processors, and changes no bit.
+"""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
+from numba import config
+from numpy.typing import NDArray
+
 from spikecam_env.sensor.effects import Effect
+from spikecam_env.sensor.kernels import loop
+from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS, fitted_polynomial
+from spikecam_env.sensor.light import GRAINS, Segment
+from spikecam_env.sensor.model import generator
+from spikecam_env.sensor.unit import Unit
 
 CARRIES: frozenset[str] = frozenset(
     {
@@ -19,17 +40,146 @@ CARRIES: frozenset[str] = frozenset(
     }
 )
 
+_WORTH_A_THREAD = 400_000
+"""Pixel-steps below which handing work to another thread costs more than it saves (0.1 ms)."""
+
 
 def missing(effects: Sequence[Effect]) -> list[str]:
     """Names of effects, or options of them, that this engine does not carry."""
     names = [e.name for e in effects if e.name not in CARRIES]
     names += ["shot_noise.dark_is_noisy=false" for e in effects if getattr(e, "dark_is_noisy", True) is False]
-    return names
+    quanta = [getattr(e, "quanta", MIN_ELECTRONS) for e in effects]
+    return names + [f"shot_noise.quanta={n:g} (below {MIN_ELECTRONS:g})" for n in quanta if n < MIN_ELECTRONS]
 
 
-def start(*args: Any) -> Any:
-    raise NotImplementedError
+@dataclass(frozen=True)
+class PixelLaw:
+    """A unit in the loop's numbers: float32, padded to whole tiles.
+
+    gain, dark [grains/frame]; spread [grains], standard deviation of a spike's charge; polynomial: its law's shape.
+    """
+
+    gain: NDArray[np.float32]
+    dark: NDArray[np.float32]
+    spread: NDArray[np.float32]
+    polynomial: tuple[np.float32, ...]
+
+    @classmethod
+    def of(cls, unit: Unit) -> PixelLaw:
+        """The shape is fitted at the median pixel; the spread is each pixel's own."""
+        gain, dark = unit.grains_per_frame
+        inverse = 1.0 / unit.electrons if unit.shot else np.zeros_like(unit.electrons)
+        spread = GRAINS * np.sqrt(inverse + unit.kappa**2)
+        return cls(_padded(gain), _padded(dark), _padded(spread.astype(np.float32)), _shape_of_law(unit))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> PixelLaw:
+        return self  # never written to
 
 
-def run(*args: Any) -> Any:
-    raise NotImplementedError
+@dataclass
+class FastState:
+    """Pixels mid-stream, padded to whole tiles.
+
+    remaining: int32 grains to the next spike.  fired: uint32 spikes so far.
+    seeds: the two words that, with a pixel's number and its spike's, fix every draw.
+    """
+
+    law: PixelLaw
+    remaining: NDArray[np.int32]
+    fired: NDArray[np.uint32]
+    seeds: tuple[np.uint32, np.uint32]
+
+
+def start(unit: Unit, phase: NDArray[np.float64], seed: int) -> FastState:
+    """Pixels part-way through a cycle: phase (P,) in [0, 1) is the share of the nominal threshold collected.
+
+    The first spike's charge is drawn literally: threshold, whole electrons still missing, their Gamma waiting charge.
+    """
+    rng = generator(seed, "fast engine: first spike")
+    missing_grains = GRAINS * (1.0 + unit.kappa * rng.standard_normal(phase.size)) - np.floor(phase * GRAINS)
+    if unit.shot:
+        grains_per_electron = GRAINS / unit.electrons
+        electrons = np.maximum(np.ceil(missing_grains / grains_per_electron), 0.0)
+        missing_grains = rng.standard_gamma(electrons) * grains_per_electron
+    remaining = np.maximum(np.ceil(missing_grains), 1.0).astype(np.int32)
+    words = generator(seed, "fast engine: spikes").integers(0, 1 << 32, 2, dtype=np.uint32)
+    fired = np.zeros(phase.size, dtype=np.uint32)
+    return FastState(PixelLaw.of(unit), _padded(remaining, GRAINS), _padded(fired), (words[0], words[1]))
+
+
+def run(
+    state: FastState, segment: Segment, out: NDArray[np.uint8] | None = None, *, threads: int | None = None
+) -> NDArray[np.uint8]:
+    """Advance `state` over a segment; returns spikes (count, P) uint8, 0 or 1, in `out` where that is given.
+
+    out: (count, P) uint8, C-contiguous.  threads: default NUMBA_NUM_THREADS.
+    """
+    return unpack(run_packed(state, segment, threads=threads), segment.radiance0.size, out)
+
+
+def run_packed(state: FastState, segment: Segment, *, threads: int | None = None) -> NDArray[np.uint8]:
+    """Advance `state` over a segment; returns spikes (count, ceil(P/8)) uint8: pixel p is bit p % 8 of byte p // 8."""
+    pixels = segment.radiance0.size
+    packed = np.empty((segment.count, (pixels + 7) // 8), dtype=np.uint8)
+    work = (
+        _compilable(segment.radiance0),
+        _compilable(segment.radiance1),
+        np.int32(segment.length),
+        np.int32(segment.first),
+        np.int32(segment.count),
+        state.law.gain,
+        state.law.dark,
+        state.law.spread,
+        state.law.polynomial,
+        *state.seeds,
+        state.remaining,
+        state.fired,
+        packed,
+    )
+    threads = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
+    bands = -(-state.remaining.size // (loop.TILE * loop.BAND))
+    threads = max(1, min(threads, bands, pixels * segment.count // _WORTH_A_THREAD))
+    others = [_pool(os.getpid(), threads - 1).submit(loop.advance, i, threads, *work) for i in range(1, threads)]
+    loop.advance(0, threads, *work)
+    for other in others:
+        other.result()
+    return packed
+
+
+def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+    """Bits (count, ceil(pixels/8)) to spikes (count, pixels) uint8, in `out` where that is given."""
+    whole = packed.shape[1] * 8
+    if out is None:
+        out = np.empty((len(packed), pixels), dtype=np.uint8)
+    spikes = out if pixels == whole else np.empty((len(packed), whole), dtype=np.uint8)
+    loop.unpack(packed.reshape(-1), spikes.reshape(-1).view(np.uint64))
+    if spikes is not out:
+        out[:] = spikes[:, :pixels]
+    return out
+
+
+def _shape_of_law(unit: Unit) -> tuple[np.float32, ...]:
+    kappa = _rounded(float(np.median(unit.kappa)))
+    electrons = _rounded(float(np.median(unit.electrons))) if unit.shot else np.inf
+    return fitted_polynomial(electrons, kappa)
+
+
+def _rounded(value: float) -> float:
+    """To three digits, so that cameras of one model share a fit."""
+    return float(f"{value:.3g}")
+
+
+def _padded(values: NDArray[Any], fill: int = 0) -> NDArray[Any]:
+    return np.pad(values, (0, -values.size % loop.TILE), constant_values=fill)
+
+
+def _compilable(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A read-only or strided array would be compiled for anew: seconds, against microseconds for a copy."""
+    plain = radiance.flags.c_contiguous and radiance.flags.writeable
+    return radiance if plain else radiance.copy()
+
+
+@lru_cache(maxsize=1)
+def _pool(process: int, threads: int) -> ThreadPoolExecutor:
+    """Threads do not survive a fork, hence one pool a process."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="spikecam-fast")

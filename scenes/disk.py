@@ -1,0 +1,350 @@
+"""A rotating textured disk: the fast scene with a closed-form truth.
+
+    angle(t) = angle(0) + w t,  w = 2 pi rpm / (60 frame_rate_hz)      [radians, radians/frame]
+    flow inside the disk  = w (dy, -dx) + drift - gaze rate             [pixels/frame]
+    flow outside the disk = - gaze rate
+
+(dx, dy) is the offset from the disk's centre, y down; w > 0 turns counter-clockwise in the picture.  At
+2000 rpm and 40 kHz the rim of a disk of radius 110 moves 0.58 pixels a frame.
+
+The texture is resampled once to `TEXELS_PER_PIXEL` and filtered by the area of a pixel, then warped
+bilinearly for each key; the rim is covered by area.  Keys are so close that the rim moves at most
+`motion_per_key` pixels between two.
+"""
+
+from __future__ import annotations
+
+import copy
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter
+
+from scenes.protocol import Gaze, Truth
+from scenes.textures import Texture, dead_leaves, fractal_noise
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import Keyframes
+
+TEXELS_PER_PIXEL = 3
+"""Of the prefiltered texture.  The default disk is 0.9 % rms of full scale off 16 x 16 supersampling at 3,
+1.5 % at 2, 0.8 % at 4 (tests/scenes/test_disk.py measures it)."""
+
+LONGEST_INTERVAL = 64
+"""Frames between two keys, at most."""
+
+
+class RotatingDisk:
+    """A disk that spins and drifts over a background.
+
+    shape           (rows, columns) of the sensor
+    rpm             turns a minute; positive is counter-clockwise, 0 stands still
+    radius          [pixels]; default 0.44 of the shorter side (110 at 250 x 400)
+    light           radiance of texture value 0 and 1, linear: (dark, bright)
+    texture         (n, n) in [0, 1], the square around the disk; default `disk_texture` from the seed
+    background      a radiance, or a tile of radiance (one texel a pixel, repeated); default soft noise
+    seed            of the default texture and background
+    frame_rate_hz   frames a second
+    centre          (x, y) of the disk at frame 0 [pixels]; default the middle of the picture
+    drift_px_s      (x, y) velocity of the disk's centre [pixels/s]
+    angle           at frame 0 [radians]
+    motion_per_key  most the rim may move between two keys [pixels]; the light half-way between two keys is a
+                    blend of both: on the default disk 4.7 % rms off at 1.15 pixels, 1.6 % at 0.58
+
+    Truth: object 1 is the disk; poses["disk"] is (x, y, angle) with the angle in [0, 2 pi).
+    Errors: InputError for a value out of range, by name.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int] = (250, 400),
+        rpm: float = 2000.0,
+        radius: float | None = None,
+        light: tuple[float, float] = (0.05, 0.6),
+        texture: ArrayLike | None = None,
+        background: float | ArrayLike | None = None,
+        seed: int = 0,
+        frame_rate_hz: float = 40_000.0,
+        centre: tuple[float, float] | None = None,
+        drift_px_s: tuple[float, float] = (0.0, 0.0),
+        angle: float = 0.0,
+        motion_per_key: float = 1.2,
+    ) -> None:
+        self.shape = _checked_shape(shape)
+        self.radius = 0.44 * min(self.shape) if radius is None else float(radius)
+        self.rpm, self.frame_rate_hz, self.light = float(rpm), float(frame_rate_hz), light
+        self.centre = ((self.shape[1] - 1) / 2, (self.shape[0] - 1) / 2) if centre is None else centre
+        self.drift_px_s, self.angle = drift_px_s, float(angle)
+        self.motion_per_key = float(motion_per_key)
+        self._check_numbers()
+        textures, backgrounds = np.random.default_rng(seed).spawn(2)
+        size = int(np.clip(10 * self.radius, 128, 1024))
+        values = disk_texture(textures, size) if texture is None else _checked_texture(texture)
+        self._disk = _prefiltered(light[0] + (light[1] - light[0]) * values, self.radius)
+        self._tile = _background_tile(background, backgrounds, self.shape, light)
+        self._background = np.empty(self.shape, np.float32)
+        _paint_tile(self._tile, 0.0, 0.0, self._background)
+
+    def __repr__(self) -> str:
+        return (
+            f"RotatingDisk(shape={self.shape}, rpm={self.rpm:g}, radius={self.radius:g}, light={self.light}, "
+            f"centre={self.centre}, drift_px_s={self.drift_px_s}, angle={self.angle:g})"
+        )
+
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
+        """Keys that cover frames [start, stop]: (K,) float64 whole frames, (K, H, W) float32.
+
+        Without gaze keys are multiples of a fixed interval.  With gaze there are keys at `start` and `stop`
+        too, where the camera's path may bend.  Errors: InputError unless start < stop.
+        """
+        if not start < stop:
+            raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+        interval = self._key_interval(gaze)
+        if gaze is None:
+            times = np.arange(start // interval, -(-stop // interval) + 1) * interval
+        else:
+            inner = np.arange(start // interval + 1, -(-stop // interval)) * interval
+            times = np.concatenate([[start], inner, [stop]])
+        light = np.empty((len(times), *self.shape), np.float32)
+        for frame, picture in zip(times, light, strict=True):
+            self._paint(float(frame), gaze, picture)
+        return Keyframes(times.astype(np.float64), light)
+
+    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
+        """Ground truth at a frame; see `scenes.protocol.Truth`."""
+        gaze = gaze or _AT_REST
+        x, y = self.centre_at(frame, gaze)
+        dx, dy = np.arange(self.shape[1]) - x, (np.arange(self.shape[0]) - y)[:, None]
+        inside = dx**2 + dy**2 <= self.radius**2
+        drift = np.asarray(self.drift_px_s) / self.frame_rate_hz
+        radiance = np.empty(self.shape, np.float32)
+        self._paint(frame, gaze, radiance)
+        flow = np.empty((*self.shape, 2), np.float32)
+        flow[..., 0] = np.where(inside, self._turn * dy + drift[0], 0.0) - gaze.rate[0]
+        flow[..., 1] = np.where(inside, -self._turn * dx + drift[1], 0.0) - gaze.rate[1]
+        return Truth(
+            radiance=radiance,
+            flow=flow,
+            object_id=inside.astype(np.int32),
+            poses={"disk": (x, y, self.angle_at(frame)), "camera": gaze.at(frame)},
+        )
+
+    def placed(
+        self, centre: tuple[float, float], drift_px_s: tuple[float, float] = (0.0, 0.0), angle: float = 0.0
+    ) -> RotatingDisk:
+        """The same disk and background with the disk elsewhere at frame 0; shares the textures, costs nothing."""
+        other = copy.copy(self)
+        other.centre, other.drift_px_s, other.angle = centre, drift_px_s, float(angle)
+        other._check_numbers()
+        return other
+
+    def angle_at(self, frame: float) -> float:
+        """Of the disk, in [0, 2 pi) [radians]."""
+        return (self.angle + self._turn * frame) % (2 * np.pi)
+
+    def centre_at(self, frame: float, gaze: Gaze | None = None) -> tuple[float, float]:
+        """(x, y) of the disk's centre in the picture [pixels]."""
+        seconds = frame / self.frame_rate_hz
+        pan, tilt = (gaze or _AT_REST).at(frame)
+        return (
+            self.centre[0] + self.drift_px_s[0] * seconds - pan,
+            self.centre[1] + self.drift_px_s[1] * seconds - tilt,
+        )
+
+    @property
+    def rim_speed(self) -> float:
+        """Of the texture at the rim [pixels/frame], without drift."""
+        return abs(self._turn) * self.radius
+
+    @property
+    def _turn(self) -> float:
+        return 2 * np.pi * self.rpm / (60 * self.frame_rate_hz)
+
+    def _key_interval(self, gaze: Gaze | None) -> int:
+        speed = self.rim_speed + float(np.hypot(*self.drift_px_s)) / self.frame_rate_hz
+        speed += float(np.hypot(*gaze.rate)) if gaze else 0.0
+        return int(np.clip(self.motion_per_key / max(speed, 1e-9), 1, LONGEST_INTERVAL))
+
+    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+        """The radiance at a frame, into `picture` (H, W)."""
+        pan, tilt = (gaze or _AT_REST).at(frame)
+        if (pan, tilt) == (0.0, 0.0):
+            picture[:] = self._background
+        else:
+            _paint_tile(self._tile, pan, tilt, picture)
+        x, y = self.centre_at(frame, gaze)
+        rows, columns = _span(y, self.radius, self.shape[0]), _span(x, self.radius, self.shape[1])
+        view = picture[rows, columns]
+        if view.size:
+            x, y = x - columns.start, y - rows.start
+            _paint_disk(self._turned(x, y, self.angle_at(frame), view.shape), x, y, self.radius, view)
+
+    def _turned(self, x: float, y: float, angle: float, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """The texture at an angle, its middle at (x, y) of a picture of this shape."""
+        texels = len(self._disk)
+        scale = (texels - 2 * _MARGIN) / (2 * self.radius)
+        cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
+        middle = (texels - 1) / 2
+        matrix = np.array(
+            [
+                [cosine, -sine, middle - cosine * x + sine * y],
+                [sine, cosine, middle - sine * x - cosine * y],
+            ]
+        )
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        turned = cv2.warpAffine(self._disk, matrix, (shape[1], shape[0]), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(turned, np.float32)
+
+    def _check_numbers(self) -> None:
+        ranges: dict[str, tuple[float, bool, str]] = {
+            "rpm": (self.rpm, True, "finite"),
+            "radius": (self.radius, self.radius >= 1, "at least 1 pixel"),
+            "frame_rate_hz": (self.frame_rate_hz, self.frame_rate_hz > 0, "positive"),
+            "light[0]": (self.light[0], self.light[0] >= 0, "0 or more"),
+            "light[1]": (self.light[1], self.light[1] > self.light[0], "above light[0]"),
+            "centre": (sum(self.centre), True, "finite"),
+            "drift_px_s": (sum(self.drift_px_s), True, "finite"),
+            "angle": (self.angle, True, "finite"),
+            "motion_per_key": (self.motion_per_key, self.motion_per_key > 0, "positive"),
+        }
+        for name, (value, allowed, rule) in ranges.items():
+            if not (np.isfinite(value) and allowed):
+                raise InputError(f"{name} is {value}; it must be {rule}")
+
+
+def disk_texture(rng: np.random.Generator, size: int = 1024) -> Texture:
+    """The default disk: hub, sectors, fallen leaves, a line of text, and a scale of ticks; (size, size) in [0, 1]."""
+    fine = 2 * size
+    axis = (np.arange(fine, dtype=np.float32) + 0.5) / size - 1
+    x, y = axis[None, :], axis[:, None]
+    radius = np.hypot(x, y)
+    turn = (np.arctan2(y, x) / (2 * np.pi) + 0.5).astype(np.float32)
+    image = np.full((fine, fine), 0.85, np.float32)
+
+    def fill(inner: float, outer: float, value: ArrayLike) -> None:
+        np.copyto(image, value, where=(radius >= inner) & (radius < outer))
+
+    fill(0.00, 0.05, 0.0)
+    fill(0.10, 0.36, _sectors(turn, 24))
+    fill(0.38, 0.66, cv2.resize(dead_leaves(rng, size), (fine, fine), interpolation=cv2.INTER_LINEAR))
+    fill(0.68, 0.86, _round_text("SPIKE CAMERA * 40000 FRAMES A SECOND * ", turn, radius, 0.68, 0.86))
+    fill(0.88, 0.93, np.floor(turn * 12) % 12 / np.float32(11))
+    fill(0.93, 1.00, _sectors(turn, 144))
+    fill(1.00, 2.00, 0.5)
+    return np.asarray(cv2.resize(image, (size, size), interpolation=cv2.INTER_AREA), np.float32)
+
+
+_AT_REST = Gaze.fixed(0.0, 0.0)
+_MARGIN = 6
+"""Texels around the prefiltered texture, so that the rim is interpolated from texture on both sides."""
+
+
+def _sectors(turn: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+    """Alternating 0 and 1, `count` of them in a turn."""
+    return np.floor(turn * count) % 2
+
+
+def _round_text(
+    text: str, turn: NDArray[np.float32], radius: NDArray[np.float32], inner: float, outer: float
+) -> NDArray[np.float32]:
+    """Text around a ring, tops outward, clockwise, as wide as the ring; white on black."""
+    (width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_DUPLEX, 4.0, 12)
+    height = 140
+    strip = np.zeros((height, width), np.uint8)
+    cv2.putText(strip, text, (0, 114), cv2.FONT_HERSHEY_DUPLEX, 4.0, 255, 12, cv2.LINE_AA)
+    across = (outer - radius) / np.float32(outer - inner) * height
+    return cv2.remap(strip, turn * width, across, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) / np.float32(255)
+
+
+def _prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.float32]:
+    """Resampled to `TEXELS_PER_PIXEL` over the disk's square and averaged over a pixel's area, whatever the angle.
+
+    Resampling by area (m texels a pixel) and bilinear interpolation blur too, by 1 / 12 m^2 and 1 / 6 m^2
+    pixels^2; a box of side sqrt(1 - 3 / m^2) makes up the pixel's 1 / 12.  The border is repeated outward.
+    """
+    texels = max(2, round(2 * radius * TEXELS_PER_PIXEL))
+    way = cv2.INTER_AREA if texels < len(texture) else cv2.INTER_LINEAR
+    resampled = cv2.resize(texture.astype(np.float32), (texels, texels), interpolation=way)
+    wide = np.pad(resampled, _MARGIN, mode="edge")
+    box = _turned_box(TEXELS_PER_PIXEL * np.sqrt(1 - 3 / TEXELS_PER_PIXEL**2))
+    return np.asarray(cv2.filter2D(wide, -1, box, borderType=cv2.BORDER_REPLICATE), np.float32)
+
+
+def _turned_box(side: float) -> NDArray[np.float32]:
+    """Kernel (n, n): a square of this side [texels] about the middle, averaged over all angles; sum 1."""
+    fine, reach = 16, int(np.ceil(side / np.sqrt(2) + 0.5))
+    size = 2 * reach + 1
+    axis = (np.arange(size * fine) + 0.5) / fine - size / 2
+    distance = np.hypot(axis[:, None], axis[None, :])
+    towards_side = np.arccos(np.clip(side / 2 / np.maximum(distance, side / 2), 0, 1))
+    share = np.clip(1 - towards_side / (np.pi / 4), 0, 1)
+    kernel = share.reshape(size, fine, size, fine).mean(axis=(1, 3))
+    return (kernel / kernel.sum()).astype(np.float32)
+
+
+def _background_tile(
+    background: float | ArrayLike | None,
+    rng: np.random.Generator,
+    shape: tuple[int, int],
+    light: tuple[float, float],
+) -> NDArray[np.float32]:
+    """(h, w) float32 radiance, to be repeated."""
+    if background is None:
+        noise = gaussian_filter(fractal_noise(rng, 2 * (max(shape) // 2) + 64), 1.0, mode="wrap")
+        return np.float32(light[0]) + np.float32(0.4 * (light[1] - light[0])) * noise
+    tile = np.atleast_2d(np.asarray(background, np.float32))
+    if tile.ndim != 2 or not tile.size or not np.isfinite(tile).all() or tile.min() < 0:
+        raise InputError("background must be a radiance or a (rows, columns) tile of it, finite and 0 or more")
+    return np.ascontiguousarray(tile)
+
+
+@numba.njit(cache=True)
+def _paint_tile(tile, pan, tilt, picture):  # pragma: no cover - compiled
+    """The repeated tile seen from offset (pan, tilt), bilinear."""
+    height, width = tile.shape
+    left, top = int(np.floor(pan)), int(np.floor(tilt))
+    right_share, lower_share = np.float32(pan - left), np.float32(tilt - top)
+    column = (left + np.arange(picture.shape[1] + 1)) % width
+    mixed = np.empty(picture.shape[1] + 1, np.float32)
+    for r in range(picture.shape[0]):
+        upper, lower = (top + r) % height, (top + r + 1) % height
+        for c in range(len(mixed)):
+            above = tile[upper, column[c]]
+            mixed[c] = above + lower_share * (tile[lower, column[c]] - above)
+        for c in range(picture.shape[1]):
+            picture[r, c] = mixed[c] + right_share * (mixed[c + 1] - mixed[c])
+
+
+@numba.njit(cache=True)
+def _paint_disk(disk, x, y, radius, picture):  # pragma: no cover - compiled
+    """The disk over the picture; a pixel on the rim is covered by the share (a half-plane's) inside."""
+    reach = np.float32(radius + 0.5)
+    across = (np.arange(picture.shape[1]) - x).astype(np.float32)
+    for r in range(len(picture)):
+        down = np.float32(r - y)
+        for c in range(picture.shape[1]):
+            distance = np.sqrt(across[c] * across[c] + down * down)
+            cover = min(max(reach - distance, np.float32(0.0)), np.float32(1.0))
+            picture[r, c] += cover * (disk[r, c] - picture[r, c])
+
+
+def _span(centre: float, radius: float, size: int) -> slice:
+    """Pixels along one axis that the disk can touch."""
+    first = min(max(int(np.floor(centre - radius - 1)), 0), size)
+    return slice(first, max(first, min(int(np.ceil(centre + radius + 2)), size)))
+
+
+def _checked_shape(shape: tuple[int, int]) -> tuple[int, int]:
+    if len(shape) != 2 or min(shape) < 1:
+        raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
+    return int(shape[0]), int(shape[1])
+
+
+def _checked_texture(texture: ArrayLike) -> NDArray[np.float32]:
+    values = np.asarray(texture, np.float32)
+    if values.ndim != 2 or values.shape[0] != values.shape[1] or len(values) < 2:
+        raise InputError(f"texture has shape {values.shape}; it must be square, (n, n) with n at least 2")
+    if not (values.min() >= 0 and values.max() <= 1):
+        raise InputError(f"texture runs from {values.min()} to {values.max()}; it must lie in [0, 1]")
+    return values

@@ -1,0 +1,44 @@
+"""`spikecam bench`: speed, as ratios to a baseline measured in the same run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+
+@dataclass
+class Bench:
+    """Measure speed on this machine: the sensor's engines, or the online denoiser.
+
+    example:  spikecam bench sensor
+    """
+
+    what: tyro.conf.Positional[Literal["sensor", "online"]]
+    """sensor: pixel-steps a second of numpy, reference and fast.  online: denoised frames a second."""
+    out: Path | None = None
+    """Where to write the figures as JSON."""
+
+    def run(self) -> None:
+        from spikecam_env.cli.table import table
+
+        if self.what == "sensor":
+            from spikecam_env.sensor.bench import bench_sensor, machine
+
+            print(machine())
+            rows = bench_sensor()
+        else:
+            from denoiser.bench import bench_online
+
+            from spikecam_env.sensor.bench import machine
+
+            print(machine())
+            rows = bench_online()
+        print(table(rows))
+        if self.out is not None:
+            from spikecam_env.cli.files import write_json
+
+            write_json(self.out, {"machine": machine(), "rows": rows})
+            print(f"wrote {self.out}")

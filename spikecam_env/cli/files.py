@@ -1,0 +1,29 @@
+"""Result files appear whole: written beside, then renamed."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from spikecam_env.errors import InputError
+
+
+def out_folder(path: Path) -> Path:
+    """Make (if needed) and return a folder for results; raises InputError where a file is in the way."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot use {path} as a folder for results: {error.strerror}") from error
+    return path
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write data as indented JSON."""
+    beside = path.with_name(path.name + ".part")
+    try:
+        beside.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from error
+    os.replace(beside, path)

@@ -1,0 +1,76 @@
+"""Films and pictures of streams side by side: grey panels with captions, written whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import imageio.v2 as imageio
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+BACKGROUND, INK, FAINT = (16, 18, 22), (235, 238, 242), (150, 158, 170)
+MARGIN, CAPTION = 10, 50
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A picture (H, W) in linear radiance with a title and a line below it."""
+
+    picture: NDArray[np.floating]
+    title: str
+    line: str = ""
+
+
+def display(radiance: NDArray[np.floating], white: float) -> NDArray[np.uint8]:
+    """Linear radiance to 8-bit grey for a screen: clipped to 0 .. white, gamma 2.2."""
+    return (255.0 * np.clip(np.asarray(radiance, np.float64) / white, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
+
+
+def compose(panels: Sequence[Panel], white: float, corner: str = "") -> NDArray[np.uint8]:
+    """Panels in a row with captions, and a line in the lower right corner; (rows, columns, 3) uint8, even sizes."""
+    height, width = panels[0].picture.shape
+    scale = max(1, round(300 / width))
+    h, w = height * scale, width * scale
+    canvas = Image.new("RGB", (len(panels) * (w + MARGIN) + MARGIN, h + 2 * MARGIN + CAPTION + 26), BACKGROUND)
+    draw = ImageDraw.Draw(canvas)
+    for i, panel in enumerate(panels):
+        x = MARGIN + i * (w + MARGIN)
+        picture = Image.fromarray(display(panel.picture, white)).resize((w, h), Image.Resampling.NEAREST)
+        canvas.paste(picture.convert("RGB"), (x, MARGIN))
+        draw.text((x, MARGIN + h + 6), panel.title, INK, _font(16))
+        draw.text((x, MARGIN + h + 28), panel.line, FAINT, _font(14))
+    if corner:
+        right, low = canvas.size[0] - MARGIN, canvas.size[1] - 8
+        draw.text((right, low), corner, INK, _font(14), anchor="rd")
+    even = canvas.crop((0, 0, canvas.size[0] // 2 * 2, canvas.size[1] // 2 * 2))
+    return np.asarray(even)
+
+
+def write_film(path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], fps: float = 30.0) -> None:
+    """Write (rows, columns, 3) uint8 frames as an H.264 MP4; the file appears when it is complete."""
+    beside = Path(path).with_suffix(".part.mp4")
+    try:
+        with imageio.get_writer(beside, fps=fps, codec="libx264", quality=8, macro_block_size=2) as writer:
+            for frame in frames:
+                writer.append_data(frame)  # type: ignore[attr-defined]
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def write_picture(path: str | os.PathLike[str], picture: NDArray[np.uint8]) -> None:
+    """Write a grey or RGB uint8 picture as PNG; the file appears whole."""
+    beside = Path(path).with_suffix(".part.png")
+    Image.fromarray(picture).save(beside)
+    os.replace(beside, path)
+
+
+@lru_cache(maxsize=8)
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), size)

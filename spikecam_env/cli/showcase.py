@@ -1,0 +1,190 @@
+"""What `spikecam demo` shows: a disk through environment and online denoiser, beside its clean twin and its truth."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+from denoiser.metrics import gap_closed, psnr_db
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from denoiser import OnlineDnSS
+from scenes.protocol import Gaze
+from spikecam_env.cli.film import Panel, compose
+from spikecam_env.errors import InputError
+from spikecam_env.streams import middleTFP
+
+BLOCK = 25
+"""Frames a step; odd, since the truth of a block is that of its middle frame."""
+FIRST_SHOWN = 4
+"""Blocks left out at the start: noisy and clean twins need 60 frames to forget their common phase."""
+LAST_SHOWN = 2
+"""Blocks left out at the end, where TFP windows are cut."""
+TABLE_FRAMES = 250
+"""Stretch that the table is of: the paper's network takes 20 times as long as `best`, so it sees no more."""
+
+Spikes = NDArray[np.uint8]
+Picture = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Streamed:
+    """One run.  noisy, clean, denoised: (T, H, W) uint8.  planes, truths: (H, W) float32, of blocks' middle frames."""
+
+    mode: str
+    frame_rate_hz: float
+    noisy: Spikes
+    clean: Spikes
+    denoised: Spikes
+    planes: list[Picture]
+    truths: list[Picture]
+    camera_s: float
+    denoiser_s: float
+    latency: int
+
+    @property
+    def times_real(self) -> float:
+        """The camera's time over the time it took, scene, camera and denoiser together."""
+        return len(self.noisy) / self.frame_rate_hz / (self.camera_s + self.denoiser_s)
+
+    @property
+    def shown(self) -> range:
+        """Blocks to show."""
+        return range(FIRST_SHOWN, len(self.truths) - LAST_SHOWN)
+
+
+def stream_disk(*, rpm: float, frames: int, mode: str, model: str, shape: tuple[int, int], seed: int) -> Streamed:
+    """Stream the disk through environment and denoiser; raises InputError for fewer than 500 frames."""
+    if frames < 500:
+        raise InputError(f"{frames} frames are too few to show; ask for 500 or more (1200 are a turn at 2000 rpm)")
+    env = gymnasium.make(
+        "spikecam_env/RotatingDisk-v0",
+        shape=shape,
+        rpm=rpm,
+        model=model,
+        frames_per_step=BLOCK,
+        max_episode_steps=frames,
+    )
+    camera: Any = env.unwrapped
+    online = OnlineDnSS.pretrained(mode, output="both")
+    _compile(env, online, shape)
+    still = np.zeros(2, np.float32)
+    noisy: list[Spikes] = []
+    clean: list[Spikes] = []
+    denoised: list[Spikes] = []
+    planes: list[Picture] = []
+    truths: list[Picture] = []
+    camera_s = denoiser_s = 0.0
+    blocks = -(-frames // BLOCK)
+    for step in tqdm(range(blocks + 1), desc="stream", unit="block", leave=False):
+        began = time.perf_counter()
+        if step == 0:
+            block, _ = env.reset(seed=seed, options=_CENTRED)
+            twin = camera.sensor.clean_twin()
+        elif step < blocks:
+            block, *_ = env.step(still)
+        shot = time.perf_counter()
+        fired, rates = online.push(block) if step < blocks else online.flush()
+        camera_s, denoiser_s = camera_s + shot - began, denoiser_s + time.perf_counter() - shot
+        ready = sum(len(part) for part in denoised)
+        planes += [rate for frame, rate in enumerate(rates, ready) if frame % BLOCK == BLOCK // 2]
+        denoised.append(fired)
+        if step < blocks:
+            gaze = Gaze((0.0, 0.0), (0.0, 0.0), (twin.frame, twin.frame + BLOCK))
+            truths.append(camera.scene.truth(twin.frame + BLOCK / 2, gaze).radiance)
+            clean.append(twin.step(camera.scene.radiance(*gaze.frames, gaze), BLOCK))
+            noisy.append(block.view(np.uint8))
+    frame_rate_hz = camera.model.frame_rate_hz
+    env.close()
+    return Streamed(
+        mode=mode,
+        frame_rate_hz=frame_rate_hz,
+        noisy=np.concatenate(noisy),
+        clean=np.concatenate(clean),
+        denoised=np.concatenate(denoised),
+        planes=planes,
+        truths=truths,
+        camera_s=camera_s,
+        denoiser_s=denoiser_s,
+        latency=online.latency,
+    )
+
+
+_CENTRED = {"drift_px_s": (0.0, 0.0)}
+"""The demo's disk stays where it starts."""
+
+
+def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:
+    """One picture a shown block: noisy, denoised, true light, with PSNR against the true light."""
+    white = float(np.percentile(run.truths[0], 99.8))
+    corner = f"denoised online at {run.times_real:.3f} x real time"
+    return [compose(_panels(run, b), white, corner) for b in run.shown]
+
+
+def _panels(run: Streamed, block: int) -> list[Panel]:
+    frame = block * BLOCK + BLOCK // 2
+    truth = run.truths[block]
+    peak = float(truth.max())
+    noisy, plane = middleTFP(run.noisy, frame, 41), run.planes[block]
+    return [
+        Panel(noisy, "noisy spikes (TFP 41)", f"PSNR {psnr_db(noisy, truth, peak):.2f} dB"),
+        Panel(plane, f"DnSS online ({run.mode}, rate plane)", f"PSNR {psnr_db(plane, truth, peak):.2f} dB"),
+        Panel(truth, "true light", f"{1e3 * frame / run.frame_rate_hz:.2f} ms"),
+    ]
+
+
+def comparison(run: Streamed) -> list[dict[str, Any]]:
+    """Noisy, denoised in both modes, and clean twin, over TABLE_FRAMES from the middle of the run.
+
+    Mean PSNR [dB] of TFP 21 and TFP 41 pictures against the true light and against the clean twin's picture, and the
+    share of the noisy-to-clean gap (against the light) that is closed.
+    """
+    first = max(FIRST_SHOWN, len(run.truths) // 2 - TABLE_FRAMES // BLOCK // 2)
+    start, stop = first * BLOCK, min((first * BLOCK) + TABLE_FRAMES, len(run.noisy))
+    streams = {"noisy": run.noisy[start:stop]}
+    for mode in ("paper", "best"):
+        if mode == run.mode:
+            streams[mode] = run.denoised[start:stop]
+        else:
+            streams[mode] = _denoised(mode, run.noisy[start:stop])
+    streams["clean twin"] = run.clean[start:stop]
+    blocks = [b for b in run.shown if start + 2 * BLOCK <= b * BLOCK < stop - 2 * BLOCK]
+    rows = []
+    for name, spikes in streams.items():
+        row: dict[str, Any] = {"stream": name}
+        for window in (21, 41):
+            against_light, against_clean = [], []
+            for b in blocks:
+                at = b * BLOCK + BLOCK // 2 - start
+                picture, twin = middleTFP(spikes, at, window), middleTFP(streams["clean twin"], at, window)
+                peak = float(run.truths[b].max())
+                against_light.append(psnr_db(picture, run.truths[b], peak))
+                against_clean.append(psnr_db(picture, twin, peak))
+            row[f"TFP {window}, light dB"] = float(np.mean(against_light))
+            row[f"TFP {window}, twin dB"] = float(np.mean(against_clean))
+        rows.append(row)
+    for row in rows:
+        for window in (21, 41):
+            noisy, mine, clean = (r[f"TFP {window}, light dB"] for r in (rows[0], row, rows[-1]))
+            row[f"TFP {window}, gap closed"] = gap_closed(noisy, mine, clean)
+    return rows
+
+
+def _denoised(mode: str, spikes: Spikes) -> Spikes:
+    online = OnlineDnSS.pretrained(mode)
+    parts = []
+    for start in tqdm(range(0, len(spikes), BLOCK), desc=f"compare ({mode})", unit="block", leave=False):
+        parts.append(online.push(spikes[start : start + BLOCK]))
+    return np.concatenate([*parts, online.flush()])
+
+
+def _compile(env: gymnasium.Env, online: OnlineDnSS, shape: tuple[int, int]) -> None:
+    """Run everything once, so that just-in-time compilation does not count as the camera's speed."""
+    env.reset(seed=0, options=_CENTRED)
+    env.step(np.zeros(2, np.float32))
+    online.push(np.zeros((64, *shape), np.uint8))
+    online.reset()

@@ -1,0 +1,88 @@
+"""Task: keep a spinning disk in the middle of the view."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from scenes.disk import RotatingDisk
+from scenes.protocol import Gaze
+from spikecam_env.envs.spike_camera import SpikeCameraEnv
+from spikecam_env.errors import InputError, unknown_name
+
+
+class RotatingDiskEnv(SpikeCameraEnv):
+    """The disk starts off the middle and drifts slowly; the camera turns after it.
+
+        reward = 1 - distance of the disk's centre from the picture's middle / half the picture's diagonal
+
+    at the end of the step: 1 in the middle, 0 in a corner.  The episode terminates when the disk's centre
+    leaves the picture, and is truncated after 500 steps (0.5 s at 40 frames a step).
+
+    start_offset_px   most the disk starts off the middle; default a quarter of the shorter side
+    drift_px_s        most it drifts; default 0.8 of the shorter side a second
+    shape, rpm, radius, light, texture, background, texture_seed: as `scenes.RotatingDisk` has them
+    camera            keywords of `SpikeCameraEnv`: model, frames_per_step, packed, ground_truth, ...
+
+    Options of reset: centre (x, y) [pixels], drift_px_s (x, y), angle [radians] fix what is drawn otherwise.
+    """
+
+    def __init__(
+        self,
+        *,
+        shape: tuple[int, int] = (250, 400),
+        rpm: float = 2000.0,
+        radius: float | None = None,
+        light: tuple[float, float] = (0.05, 0.6),
+        texture: ArrayLike | None = None,
+        background: float | ArrayLike | None = None,
+        texture_seed: int = 0,
+        start_offset_px: float | None = None,
+        drift_px_s: float | None = None,
+        **camera: Any,
+    ) -> None:
+        super().__init__(self._draw, judge, shape=shape, **camera)
+        self.start_offset_px = _limit("start_offset_px", start_offset_px, 0.25 * min(self.shape))
+        self.drift_px_s = _limit("drift_px_s", drift_px_s, 0.8 * min(self.shape))
+        self._disk = RotatingDisk(
+            self.shape, rpm, radius, light, texture, background, texture_seed, self.model.frame_rate_hz
+        )
+
+    def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> RotatingDisk:
+        """The disk of one episode: always the same number of draws, so that an option changes nothing else."""
+        middle_x, middle_y = self._disk.centre
+        x, y = _within(rng, self.start_offset_px)
+        drawn = {
+            "centre": (middle_x + x, middle_y + y),
+            "drift_px_s": _within(rng, self.drift_px_s),
+            "angle": float(rng.uniform(0, 2 * np.pi)),
+        }
+        for name in options:
+            if name not in drawn:
+                raise unknown_name("option of reset", name, drawn)
+        return self._disk.placed(**{**drawn, **options})
+
+
+def judge(disk: RotatingDisk, frame: float, gaze: Gaze) -> tuple[float, bool]:
+    """(reward, terminated) at a frame; see `RotatingDiskEnv`."""
+    rows, columns = disk.shape
+    x, y = disk.centre_at(frame, gaze)
+    distance = np.hypot(x - (columns - 1) / 2, y - (rows - 1) / 2)
+    inside = -0.5 <= x <= columns - 0.5 and -0.5 <= y <= rows - 0.5
+    return 1.0 - float(distance) / float(np.hypot(rows, columns) / 2), not inside
+
+
+def _within(rng: np.random.Generator, most: float) -> tuple[float, float]:
+    """A point drawn evenly from the disc of this radius."""
+    distance, direction = most * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi)
+    return float(distance * np.cos(direction)), float(distance * np.sin(direction))
+
+
+def _limit(name: str, value: float | None, default: float) -> float:
+    if value is None:
+        return default
+    if not 0 <= value < np.inf:
+        raise InputError(f"{name} is {value}; it must be 0 or more, and finite")
+    return float(value)

@@ -1,0 +1,171 @@
+"""A spike camera in front of a scene, as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from scenes.protocol import Gaze, Scene
+from spikecam_env.errors import InputError, NotReadyError, unknown_name
+from spikecam_env.sensor import SensorModel, SpikeSensor
+from spikecam_env.streams.packing import check_shape, pack_frames, packed_bytes
+
+MakeScene = Callable[[np.random.Generator, dict[str, Any]], Scene]
+"""(generator, options of reset) -> the scene of one episode."""
+
+Judge = Callable[[Any, float, Gaze], tuple[float, bool]]
+"""(scene, frame, gaze) at the end of a step -> (reward, terminated)."""
+
+RENDER_FRAMES = 40
+"""Frames a rendered picture counts spikes over, at least."""
+
+
+class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
+    """Each step exposes `frames_per_step` spike frames while the camera turns at the rate the action gives.
+
+    Observation   the step's frames: (K, H, W) int8 of 0 and 1 (`MultiBinary`), or with `packed` the bits as
+                  (K, ceil(H W / 8)) uint8, as `streams.unpack_frames` reads them.  A fresh array each step.
+    Action        (2,) float32, gaze rate (pan, tilt) in [-1, 1] of `max_gaze_rate_px_s`; pan is to the right,
+                  tilt is down.  Values beyond are cut, as a motor saturates.
+    Reward, end   from `judge`.
+    Reset         draws the scene and the camera's unit (fixed pattern, phases, noise) from `np_random`, then
+                  exposes the first K frames with the camera at rest.  Same seed, same actions: same bits.
+    Info          time_s, frame (end of the block), gaze (2,) float64 [pixels] there; with `ground_truth` also
+                  radiance, flow, object_id at the centre of the block and poses, see `scenes.protocol.Truth`.
+    Render        `rgb_array`: the share of frames with a spike, over the last blocks of RENDER_FRAMES or more;
+                  white is a spike every frame, gamma 2.2.
+
+    make_scene           see `MakeScene`; its scenes have this `shape` and the model's frame rate
+    judge                see `Judge`
+    shape                (rows, columns)
+    model                a preset's name, a TOML path or a SensorModel
+    frames_per_step      K: the control rate is frame rate / K
+    max_gaze_rate_px_s   default 4 of the shorter side a second
+    engine               of the sensor: "auto", "fast" or "reference"
+
+    `sensor` and `scene` are open to look at: `env.unwrapped.sensor.clean_twin()`, `env.unwrapped.scene.truth(...)`.
+
+    Errors: InputError for a value out of range or unknown, by name; NotReadyError before the first reset.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012
+
+    def __init__(
+        self,
+        make_scene: MakeScene,
+        judge: Judge,
+        *,
+        shape: tuple[int, int] = (250, 400),
+        model: SensorModel | str | PathLike[str] = "scsim",
+        frames_per_step: int = 40,
+        packed: bool = False,
+        ground_truth: bool = False,
+        max_gaze_rate_px_s: float | None = None,
+        engine: str = "auto",
+        render_mode: str | None = None,
+    ) -> None:
+        self.shape = check_shape(shape)
+        if frames_per_step < 1 or frames_per_step != int(frames_per_step):
+            raise InputError(f"frames_per_step is {frames_per_step}; it must be a whole number, 1 or more")
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise unknown_name("render_mode", render_mode, self.metadata["render_modes"])
+        self.max_gaze_rate_px_s = 4.0 * min(self.shape) if max_gaze_rate_px_s is None else max_gaze_rate_px_s
+        if not 0 < self.max_gaze_rate_px_s < np.inf:
+            raise InputError(f"max_gaze_rate_px_s is {max_gaze_rate_px_s}; it must be positive and finite")
+        self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
+        self.frames_per_step, self.packed, self.ground_truth = int(frames_per_step), packed, ground_truth
+        self.render_mode = render_mode
+        self._make_scene, self._judge = make_scene, judge
+        self.sensor = SpikeSensor(self.model, self.shape, seed=0, engine=engine)
+        self._scene: Scene | None = None
+        self._position = (0.0, 0.0)
+        self._recent: list[NDArray[np.uint8]] = []
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.observation_space = _observation_space(self.shape, self.frames_per_step, packed)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
+        """A new episode; `options` go to `make_scene`."""
+        super().reset(seed=seed)
+        self._scene = self._checked(self._make_scene(self.np_random, dict(options or {})))
+        self.sensor.reset(seed=int(self.np_random.integers(2**31)))
+        self._position = (0.0, 0.0)
+        self._recent = []
+        observation, info, _ = self._expose((0.0, 0.0))
+        return observation, info
+
+    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """Turn the camera at the action's rate for K frames.  Never truncates: that is `TimeLimit`'s."""
+        rate = np.asarray(action, np.float64)
+        if rate.shape != (2,) or not np.isfinite(rate).all():
+            raise InputError(f"action is {action!r}; it must be two finite numbers in [-1, 1], (pan, tilt)")
+        pan, tilt = np.clip(rate, -1.0, 1.0) * (self.max_gaze_rate_px_s / self.model.frame_rate_hz)
+        observation, info, gaze = self._expose((float(pan), float(tilt)))
+        reward, terminated = self._judge(self.scene, self.sensor.frame, gaze)
+        return observation, float(reward), bool(terminated), False, info
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """(H, W, 3) uint8, or None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if not self._recent:
+            raise NotReadyError("nothing to render yet; call reset first")
+        frames = sum(len(block) for block in self._recent)
+        rate = sum(block.sum(axis=0, dtype=np.float32) for block in self._recent) / frames
+        grey = (255 * rate ** (1 / 2.2) + 0.5).astype(np.uint8)
+        return np.repeat(grey[:, :, None], 3, axis=2)
+
+    @property
+    def scene(self) -> Scene:
+        """Of this episode; NotReadyError before the first reset."""
+        if self._scene is None:
+            raise NotReadyError("the environment has no scene yet; call reset first")
+        return self._scene
+
+    def _expose(self, rate: tuple[float, float]) -> tuple[NDArray[Any], dict[str, Any], Gaze]:
+        """The next K frames while the gaze moves at `rate` [pixels/frame]: (observation, info, the gaze's path)."""
+        scene = self.scene
+        first, stop = self.sensor.frame, self.sensor.frame + self.frames_per_step
+        pan, tilt = self._position
+        self._position = pan + rate[0] * self.frames_per_step, tilt + rate[1] * self.frames_per_step
+        gaze = Gaze((pan, tilt), self._position, (first, stop))
+        spikes = self.sensor.step(scene.radiance(first, stop, gaze), frames=self.frames_per_step)
+        if self.render_mode is not None:
+            blocks = -(-RENDER_FRAMES // self.frames_per_step)
+            self._recent = [*self._recent, spikes.copy()][-blocks:]
+        observation = pack_frames(spikes) if self.packed else spikes.view(np.int8)
+        return observation, self._info(scene, gaze), gaze
+
+    def _info(self, scene: Scene, gaze: Gaze) -> dict[str, Any]:
+        first, stop = gaze.frames
+        info: dict[str, Any] = {
+            "time_s": float(stop / self.model.frame_rate_hz),
+            "frame": int(stop),
+            "gaze": np.array(gaze.stop),
+        }
+        if self.ground_truth:
+            truth = scene.truth((first + stop) / 2, gaze)
+            info |= {"radiance": truth.radiance, "flow": truth.flow, "object_id": truth.object_id}
+            info["poses"] = {name: np.array(pose) for name, pose in truth.poses.items()}
+        return info
+
+    def _checked(self, scene: Scene) -> Scene:
+        rate = self.model.frame_rate_hz
+        if (scene.shape, scene.frame_rate_hz) != (self.shape, rate):
+            raise InputError(
+                f"the scene is {scene.shape} at {scene.frame_rate_hz} Hz; the camera {self.shape} at {rate} Hz"
+            )
+        return scene
+
+
+def _observation_space(shape: tuple[int, int], frames: int, packed: bool) -> spaces.MultiBinary | spaces.Box:
+    if packed:
+        return spaces.Box(0, 255, (frames, packed_bytes(shape)), np.uint8)
+    return spaces.MultiBinary((frames, *shape))

@@ -1,0 +1,159 @@
+"""Recordings in HDF5.
+
+/spikes           (T, ceil(H W / 8)) uint8, packed as in `packing`, chunked in time
+/truth/<name>     (N, ...) ground truth, /truth/frame (N,) float64 the frames it belongs to; optional
+attributes        format = "spikecam-recording/1", height, width, package_version,
+                  frame_rate_hz (absent where unknown), and what the writer added: model, seed, scene, ...
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spikecam_env import __version__
+from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.streams.packing import as_spikes, check_shape, pack_frames, packed_bytes, unpack_frames
+from spikecam_env.streams.whole import beside_path, check_range, existing_file
+
+FORMAT = "spikecam-recording/1"
+CHUNK_BYTES = 1 << 20
+RESERVED = ("format", "height", "width", "frame_rate_hz", "package_version")
+
+
+class SpikeWriter:
+    """Writes a recording piece by piece; the file appears whole when the `with` block ends without an exception.
+
+        with SpikeWriter("disk.h5", (250, 400), 40_000.0, model="scsim", seed=0, scene="disk") as writer:
+            writer.append(spikes)
+
+    shape: (rows, columns).  frame_rate_hz: None where unknown.  attributes: text, numbers or bools.
+    Errors: InputError for an attribute of another type or a reserved name, or spikes of another shape.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        shape: tuple[int, int],
+        frame_rate_hz: float | None,
+        **attributes: object,
+    ) -> None:
+        self.path = Path(path)
+        self.shape = check_shape(shape)
+        self._beside = beside_path(self.path)
+        self._attributes = _file_attributes(self.shape, frame_rate_hz, attributes)
+        self._file: h5py.File | None = None
+
+    def __enter__(self) -> SpikeWriter:
+        self._file = h5py.File(self._beside, "w")
+        self._file.attrs.update(self._attributes)
+        size = packed_bytes(self.shape)
+        chunk = (max(1, CHUNK_BYTES // size), size)
+        self._file.create_dataset("spikes", (0, size), np.uint8, maxshape=(None, size), chunks=chunk)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._open_file().close()
+        self._file = None
+        if kind is None:
+            os.replace(self._beside, self.path)
+        else:
+            self._beside.unlink(missing_ok=True)
+
+    def append(self, spikes: ArrayLike) -> None:
+        """Add frames: (T, H, W) spikes."""
+        frames = as_spikes(spikes)
+        if frames.shape[1:] != self.shape:
+            raise InputError(
+                f"frames of {frames.shape[1:]} pixels for a recording of {self.shape}; one recording has one shape"
+            )
+        _grow(self._open_file()["spikes"], pack_frames(frames))
+
+    def append_truth(self, frame: float, **arrays: ArrayLike) -> None:
+        """Add ground truth at a frame, e.g. radiance, flow: the same names, shapes and dtypes at each call."""
+        group = self._open_file().require_group("truth")
+        for name, value in {"frame": np.float64(frame), **arrays}.items():
+            array = np.asarray(value)
+            if name not in group:
+                group.create_dataset(
+                    name, (0, *array.shape), array.dtype, maxshape=(None, *array.shape), chunks=(1, *array.shape)
+                )
+            if group[name].shape[1:] != array.shape:
+                raise InputError(f"truth {name} is {array.shape}; it was {group[name].shape[1:]} before")
+            _grow(group[name], array[None])
+
+    def _open_file(self) -> h5py.File:
+        if self._file is None:
+            raise NotReadyError("the recording is not open; use it as `with SpikeWriter(...) as writer:`")
+        return self._file
+
+
+def read_hdf5(
+    path: str | Path, *, first: int = 0, count: int | None = None
+) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+    """A recording -> (T, H, W) uint8 spikes and its attributes; only the frames asked are read.
+
+    Errors: InputError if the file is absent, truncated, not HDF5, or of another format.
+    """
+    with _opened(path) as file:
+        attributes = {name: _plain(value) for name, value in file.attrs.items()}
+        shape = (attributes["height"], attributes["width"])
+        first, stop = check_range(first, count, len(file["spikes"]), str(path))
+        return unpack_frames(file["spikes"][first:stop], shape), attributes
+
+
+def read_truth(path: str | Path) -> dict[str, NDArray[Any]]:
+    """Ground truth beside a recording: name -> (N, ...), with "frame" (N,); empty where there is none."""
+    with _opened(path) as file:
+        return {name: dataset[:] for name, dataset in file["truth"].items()} if "truth" in file else {}
+
+
+def _opened(path: str | Path) -> h5py.File:
+    source = existing_file(path)
+    try:
+        file = h5py.File(source, "r")
+    except OSError as error:
+        raise InputError(f"{source} is truncated or not an HDF5 file ({error}); record it again") from error
+    if file.attrs.get("format") == FORMAT and {"height", "width"} <= set(file.attrs) and "spikes" in file:
+        return file
+    found = file.attrs.get("format", "no format attribute")
+    file.close()
+    raise InputError(f"{source} is not a recording of this package: found {found!r}, need {FORMAT!r}")
+
+
+def _file_attributes(
+    shape: tuple[int, int], frame_rate_hz: float | None, added: dict[str, object]
+) -> dict[str, object]:
+    for name, value in added.items():
+        if name in RESERVED:
+            raise InputError(f"attribute {name} is written by the recording itself; choose another name")
+        if not isinstance(value, str | int | float | bool | np.number):
+            raise InputError(f"attribute {name} is a {type(value).__name__}; give text, a number or a bool")
+    own: dict[str, object] = {
+        "format": FORMAT,
+        "height": shape[0],
+        "width": shape[1],
+        "package_version": __version__,
+    }
+    if frame_rate_hz is not None:
+        if not 0 < frame_rate_hz < np.inf:
+            raise InputError(f"frame_rate_hz is {frame_rate_hz}; it must be positive, or None where unknown")
+        own["frame_rate_hz"] = float(frame_rate_hz)
+    return {**own, **added}
+
+
+def _grow(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
+    dataset.resize(len(dataset) + len(rows), axis=0)
+    dataset[len(dataset) - len(rows) :] = rows
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

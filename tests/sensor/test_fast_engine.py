@@ -1,0 +1,189 @@
+"""The fast engine: same bits however the stream is cut and however many threads run, also in a forked process."""
+
+from __future__ import annotations
+
+import copy
+import multiprocessing
+import pickle
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
+from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.light import GRAINS, Segment, ramp
+from spikecam_env.sensor.model import generator
+
+KEYS = 4
+
+
+def wild_light(pixels: int, seed: int = 0) -> NDArray[np.float32]:
+    """(KEYS, P) radiance at keys 64 frames apart: dim, bright, over two thresholds a frame, and dark."""
+    rng = np.random.default_rng(seed)
+    light = np.exp(rng.uniform(np.log(0.005), np.log(1.5), (KEYS, pixels)))
+    light[:, : pixels // 50] = 0.0
+    light[1:3, pixels // 50 : pixels // 25] = 5.0
+    return light.astype(np.float32)
+
+
+def started(pixels: int, preset: str = "scsim", seed: int = 3) -> fast.FastState:
+    unit = SensorModel.preset(preset).draw_unit((1, pixels), seed)
+    return fast.start(unit, generator(seed, "phase").random(pixels), seed)
+
+
+def film(state: fast.FastState, light: NDArray[np.float32], cuts: list[int], threads: int = 1) -> NDArray[np.uint8]:
+    """All frames of `light`, every key interval served in chunks of these lengths."""
+    frames = []
+    for start, stop in pairwise(light):
+        first = 0
+        for count in cuts * 64:
+            count = min(count, 64 - first)
+            if count:
+                frames.append(fast.run(state, Segment(start, stop, 64, first, count), threads=threads))
+            first += count
+    return np.concatenate(frames)
+
+
+@pytest.mark.parametrize("pixels", [40_000, 1009])
+@pytest.mark.parametrize("cuts", [[1], [16], [33], [5, 17, 1, 40, 1]])
+def test_cutting_a_stream_changes_no_bit(pixels: int, cuts: list[int]) -> None:
+    light = wild_light(pixels)
+    whole, cut = started(pixels), started(pixels)
+    assert np.array_equal(film(whole, light, [64]), film(cut, light, cuts))
+    assert np.array_equal(whole.remaining, cut.remaining) and np.array_equal(whole.fired, cut.fired)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_threads_change_no_bit(threads: int) -> None:
+    light = wild_light(40_000)
+    assert np.array_equal(film(started(40_000), light, [64]), film(started(40_000), light, [64], threads))
+
+
+def test_a_region_of_a_camera_is_that_camera_cut_out() -> None:
+    """A pixel's draws depend on its number and its unit alone, not on the array's size."""
+    light = wild_light(4000)
+    whole = started(4000, "ideal")
+    part = started(4000, "ideal")
+    first = film(whole, light, [64])[:, :1000]
+    law = fast.PixelLaw(part.law.gain[:1024], part.law.dark[:1024], part.law.spread[:1024], part.law.polynomial)
+    part = fast.FastState(law, part.remaining[:1024].copy(), part.fired[:1024].copy(), part.seeds)
+    assert np.array_equal(first, film(part, light[:, :1000], [64]))
+
+
+@pytest.mark.parametrize("pixels", [1, 7, 63, 64, 65, 256, 257, 1000])
+def test_packed_frames_are_the_bytes_of_a_dat_file(pixels: int) -> None:
+    light = wild_light(pixels)
+    segment = Segment(light[0], light[1], 64, 0, 64)
+    packed = fast.run_packed(started(pixels), segment)
+    spikes = fast.run(started(pixels), segment)
+    assert spikes.shape == (64, pixels)
+    assert np.array_equal(packed, np.packbits(spikes, axis=1, bitorder="little"))
+    out = np.empty((64, pixels), dtype=np.uint8)
+    assert fast.run(started(pixels), segment, out) is out
+    assert np.array_equal(out, spikes)
+
+
+def test_an_already_passed_threshold_fires_in_the_first_lit_frame() -> None:
+    unit = SensorModel.preset("scsim").draw_unit((1, 2000), 0)
+    state = fast.start(unit, np.full(2000, np.nextafter(1.0, 0.0)), 0)
+    assert state.remaining.min() >= 1
+    light = np.full(2000, 0.1, dtype=np.float32)
+    assert fast.run(state, Segment(light, light, 64, 0, 1)).all()
+
+
+def test_no_light_no_spike() -> None:
+    dark = np.zeros(500, dtype=np.float32)
+    assert not fast.run(started(500, "ideal"), Segment(dark, dark, 64, 0, 64)).any()
+
+
+@pytest.mark.parametrize("interval", [1000.0, 10_000.0])
+@pytest.mark.parametrize("swing", [0.0, 0.3, -0.3])
+def test_dim_light_is_collected_without_bias(interval: float, swing: float) -> None:
+    """Mean charge over pixels whose light differs a little, so that rounding to grains averages; limit 1e-3."""
+    pixels, blocks = 4096, 10
+    level = np.linspace(0.9, 1.1, pixels) / interval
+    start, stop = ((level * (1 + s)).astype(np.float32) for s in (0.0, swing))
+    state = started(pixels, "ideal")
+    before = state.remaining[:pixels].astype(np.int64)
+    for _ in range(blocks):
+        fast.run(state, Segment(start, stop, 64, 0, 64))
+    collected = before - state.remaining[:pixels] + state.fired[:pixels].astype(np.int64) * GRAINS
+    expected = 64 * blocks * GRAINS * (start.astype(np.float64) + stop) / 2
+    error = collected.sum() / expected.sum() - 1
+    print(f"interval {interval:g}, swing {swing:+g}: {error:+.1e}")
+    assert abs(error) < 1e-3
+
+
+def test_state_is_copied_and_pickled_whole() -> None:
+    light = wild_light(1009)
+    state = started(1009)
+    film(state, light, [64])
+    copies = [copy.deepcopy(state), pickle.loads(pickle.dumps(state))]
+    bits = film(state, light, [64])
+    for other in copies:
+        assert np.array_equal(film(other, light, [64]), bits)
+
+
+def test_inputs_that_cannot_be_written_to_compile_nothing_new() -> None:
+    from spikecam_env.sensor.kernels import loop
+
+    light = wild_light(300)
+    fast.run(started(300), Segment(light[0], light[1], 64, 0, 64))
+    known = len(loop.advance.signatures)
+    light.flags.writeable = False
+    fast.run(started(300), Segment(light[0], light[1], 64, 0, 64))
+    fast.run(started(150), Segment(light[0, ::2], light[1, ::2], 64, 0, 64))
+    assert len(loop.advance.signatures) == known
+
+
+def _count_spikes(queue: multiprocessing.Queue[int]) -> None:
+    queue.put(int(film(started(40_000), wild_light(40_000), [64], threads=2).sum()))
+
+
+def test_a_forked_process_goes_on_using_threads() -> None:
+    """As vector environments do; numba's own OpenMP threads would abort there."""
+    if "fork" not in multiprocessing.get_all_start_methods():
+        pytest.skip("this platform does not fork")
+    here = int(film(started(40_000), wild_light(40_000), [64], threads=2).sum())
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    process = context.Process(target=_count_spikes, args=(queue,))
+    process.start()
+    there = queue.get(timeout=60)
+    process.join()
+    assert there == here
+
+
+def test_what_the_engine_does_not_carry_is_refused_by_name() -> None:
+    scsim = SensorModel.preset("scsim")
+    few = scsim.with_effect(CATALOGUE["shot_noise"](quanta=10))
+    with pytest.raises(InputError, match=r"quanta=10 \(below 20\)"):
+        SpikeSensor(few, (4, 4), engine="fast")
+    assert SpikeSensor(few, (4, 4), engine="auto").engine == "reference"
+    assert fast.missing(scsim.effects) == []
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 7, 33, 63, 64])
+def test_collected_light_never_falls_and_is_right_within_a_grain(length: int) -> None:
+    """Every pair of levels up to 150 grains, and ramps up to a threshold a frame.
+
+    An engine that jumps to the crossing sees what one that steps sees only if F is monotone, to the grain.
+    """
+    rng = np.random.default_rng(length)
+    dim = np.array(np.meshgrid(np.arange(150), np.arange(150))).reshape(2, -1)
+    steep = rng.integers(0, GRAINS, (2, 20_000))
+    fading = np.array([rng.integers(0, GRAINS, 20_000), np.zeros(20_000, dtype=np.int64)])
+    start, stop = np.concatenate([dim, steep, fading, fading[::-1]], axis=1).astype(np.float32)
+    one, none = np.ones_like(start), np.zeros_like(start)
+    law = ramp(Segment(start, stop, length, 0, length), one, none)
+    collected = np.array([law.collected(k) for k in range(length + 1)])
+    k = np.arange(length + 1.0)[:, None]
+    exact = start * k + (stop.astype(np.float64) - start) * k**2 / (2 * length)
+    error = collected - exact
+    print(f"length {length}: {error.min():+.2f} .. {error.max():+.2f} grains")
+    assert np.diff(collected, axis=0).min() >= 0
+    assert error.min() > -1.0
+    assert error.max() < 1.0
