@@ -36,6 +36,14 @@ def niqe(picture: NDArray[np.floating]) -> float:
         return float(np.ravel(measure.niqe(np.clip(grey * 255, 0, 255).astype(np.float32)))[0])
 
 
+def niqe_or_none(picture: NDArray[np.floating]) -> float | None:
+    """`niqe`, or None where it cannot be had: without scikit-video, or for a small picture."""
+    try:
+        return niqe(picture)
+    except InputError:
+        return None
+
+
 def _scikit_video() -> Any:
     try:
         import skvideo.measure
