@@ -41,10 +41,10 @@ class Denoise:
 
     def run(self) -> None:
         import numpy as np
-        from denoiser.niqe import niqe_or_none
         from tqdm import tqdm
 
         from denoiser import OnlineDnSS
+        from denoiser.niqe import niqe_or_none
         from spikecam_env.cli.files import out_folder, write_json
         from spikecam_env.cli.film import Panel, compose, write_film, write_picture
         from spikecam_env.cli.table import table

@@ -8,11 +8,11 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from denoiser.metrics import gap_closed, psnr_db
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from denoiser import OnlineDnSS
+from denoiser.metrics import gap_closed, psnr_db
 from scenes.protocol import Gaze
 from spikecam_env.cli.film import Panel, compose
 from spikecam_env.errors import InputError

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from denoiser.evaluate import HELD_OUT_KINDS, PICTURES, report, evaluate_quick, held_out_textures
+from denoiser.evaluate import HELD_OUT_KINDS, PICTURES, evaluate_quick, held_out_textures, report
 from denoiser.pairs import TRAINING_KINDS
 
 
