@@ -1,10 +1,7 @@
-"""Where in their first interval the pixels of a denoised stream start.
+"""Where in their first interval the pixels of a denoised stream start: uniform, independent, the same in every stream.
 
-    u(x, y) = frac(52.9829189 frac(0.06711056 x + 0.00583715 y)), in [0, 1)
-
-Interleaved gradient noise (Jimenez, "Next generation post processing in Call of Duty", SIGGRAPH 2014): uniform, and
-neighbours are far apart, so neighbouring pixels of one rate do not fire together.  A fixed pattern: the same rates
-give the same spikes.
+As in a camera.  An ordered pattern (interleaved gradient noise was tried) spreads the quantisation of neighbours more
+evenly, but shows as a texture in pictures from few spikes: NIQE of a low-light recording doubled.
 """
 
 from __future__ import annotations
@@ -12,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+SEED = 20_040
+
 
 def starting_phase(shape: tuple[int, int]) -> NDArray[np.float64]:
     """(H, W) float64 in [0, 1), the share of the first interval that is over at the start of frame 0."""
-    y, x = np.arange(shape[0])[:, None], np.arange(shape[1])[None, :]
-    return (52.9829189 * ((0.06711056 * x + 0.00583715 * y) % 1.0)) % 1.0
+    return np.random.default_rng(SEED).random(shape)

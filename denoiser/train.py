@@ -22,7 +22,7 @@ import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -58,14 +58,14 @@ class TrainConfig:
     mode: str = "best"
     out: Path = Path("training")
     steps: int = 20_000
-    minutes: float | None = None
-    seed: int = 0
     batch: int = 16
-    patch: int = 64
-    lr: float = 1.5e-3
-    steps_per_clip: int = 8
+    seed: int = 0
     threads: int = 1
     resume: bool = True
+    minutes: float | None = None
+    patch: int = 64
+    lr: float = 1e-3
+    steps_per_clip: int = 8
     save_every_s: float = 60.0
     refresh_every: int = 1000
 
@@ -279,13 +279,20 @@ def _training_record(config: TrainConfig, run: _Run) -> dict[str, Any]:
         package = "not installed"
     options = {k: v for k, v in asdict(config).items() if k not in ("out", "resume", "save_every_s")}
     return {
-        "command": f"spikecam train {config.mode}",
+        "command": _command(config),
         "options": options,
         "steps": run.step,
         "minutes": round(run.seconds / 60, 1),
         "resumed_at": run.resumed_at,
         "package": package,
     }
+
+
+def _command(config: TrainConfig) -> str:
+    """What to type to train so."""
+    given = [f for f in fields(config) if f.name != "out" and getattr(config, f.name) != f.default]
+    options = " ".join(f"--{f.name.replace('_', '-')} {getattr(config, f.name)}" for f in given)
+    return f"python -m denoiser.train --out OUT {options}".rstrip()
 
 
 def _plot(curve: list[dict[str, float]], path: Path) -> None:

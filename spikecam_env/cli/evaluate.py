@@ -26,14 +26,14 @@ class Evaluate:
     """Weights of the `best` mode to evaluate instead of the shipped ones."""
     scenes: int = 2
     """Scenes in each class of speed and light; the same count again gives a finer mean."""
-    seed: int = 7
+    seed: int = 0
     """Seed of the held-out scenes, cameras and noise."""
 
     def run(self) -> None:
-        from denoiser.evaluate import as_text, evaluate_quick
+        from denoiser.evaluate import evaluate_quick, report
 
         weights = {mode: path for mode, path in (("paper", self.paper), ("best", self.best)) if path is not None}
         result = evaluate_quick(weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=self.out)
-        print(as_text(result), end="")
+        print(report(result), end="")
         if self.out is not None:
             print(f"wrote evaluate.json and evaluate.txt in {self.out}")

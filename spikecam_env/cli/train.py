@@ -24,7 +24,7 @@ class Train:
     """End by the clock instead."""
     batch: int = 16
     """Patches a step, 64 x 64 pixels."""
-    lr: float = 1.5e-3
+    lr: float = 1e-3
     """Highest rate of learning."""
     seed: int = 0
     """Seed of network, scenes, cameras and noise."""

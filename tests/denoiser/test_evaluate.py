@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from denoiser.evaluate import HELD_OUT_KINDS, PICTURES, as_text, evaluate_quick, held_out_textures
+from denoiser.evaluate import HELD_OUT_KINDS, PICTURES, evaluate_quick, held_out_textures, report
 from denoiser.pairs import TRAINING_KINDS
 
 
@@ -23,7 +23,7 @@ def result(tmp_path_factory):
     out = tmp_path_factory.mktemp("evaluation")
     found = evaluate_quick(("best",), scenes_a_class=1, shape=(48, 48), frames=152, out=out)
     assert json.loads((out / "evaluate.json").read_text())["settings"] == found["settings"]
-    assert (out / "evaluate.txt").read_text() == as_text(found)
+    assert (out / "evaluate.txt").read_text() == report(found)
     return found
 
 
