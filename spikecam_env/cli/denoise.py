@@ -70,10 +70,8 @@ class Denoise:
         parts.append(online.flush())
         clean = np.concatenate(parts)
 
-        kept: dict[str, object] = {
-            k: recording.attributes[k] for k in ("model", "seed", "scene") if k in recording.attributes
-        }
-        attributes = {**kept, "denoiser": self.mode, "source": self.file.name}
+        attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
+        attributes |= {"denoiser": self.mode, "source": self.file.name}
         with SpikeWriter(folder / "denoised.h5", clean.shape[1:], recording.frame_rate_hz, **attributes) as writer:
             writer.append(clean)
 
