@@ -150,7 +150,7 @@ class Effect:
         return threshold, memory
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
-        """Charge left after a reset on the pixels that fired (n,), given the charge over threshold and the charge a frame."""
+        """Charge left on the pixels that fired (n,), given what is over their threshold and their charge a frame."""
         return residual
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
