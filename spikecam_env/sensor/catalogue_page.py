@@ -150,15 +150,15 @@ class SlowShutter(Effect):
 ```
 
 That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))` and `[[effect]]`
-in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made anew.
-The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero changes no
-bit, alone and among all others; the same bits however a stream is cut, saved and restored; docs, bounds, twins that
-exist; and a test of your own, `test_slow_shutter_...`, of a closed form.
+in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
+anew. The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
+changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
+cut, saved and restored; docs, bounds, twins that exist; and a test of your own, `test_slow_shutter_...`, of its law.
 
-Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine carries
-them); `collect`, `compare`, `after_reset`, `spiked`, `read_out` for what happens from frame to frame. What must be
-remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator of the effect's
-own, so that no other effect's draws change. Time is `now.number`, absolute, never a count of calls.
+Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
+carries them); `collect`, `compare`, `after_reset`, `spiked`, `read_out` for what happens from frame to frame. What must
+be remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator of the
+effect's own, so that no other effect's draws change. Time is `now.number`, absolute, never a count of calls.
 '''
 
 

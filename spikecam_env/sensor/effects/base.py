@@ -109,6 +109,8 @@ class Effect:
                 raise InputError(
                     f"{self.name}.{f.name} = {value!r} is outside {bounds[0]:g} .. {bounds[1]:g} {f.metadata['unit']}"
                 )
+            if isinstance(f.default, int) and not number.is_integer():
+                raise InputError(f"{self.name}.{f.name} = {value!r} must be a whole number")
 
     @classmethod
     def neutralised(cls) -> Effect:

@@ -6,7 +6,7 @@ import importlib
 import math
 import pickle
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from laws import camera, population, with_effects
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor, catalogue_page
 from spikecam_env.sensor.catalogue_page import SECTIONS, Sheet
+from spikecam_env.sensor.effects.base import Exposure
 
 SHAPE = (10, 12)
 EVERY = sorted(CATALOGUE)
@@ -81,6 +82,34 @@ def test_strong_effect_changes_bits_the_same_however_cut_saved_and_restored(name
     np.testing.assert_array_equal(sensor.step(light, 160), whole)
 
 
+def frozen(memory):
+    """The same, its arrays read-only."""
+    for part in memory if isinstance(memory, tuple) else (memory,):
+        if isinstance(part, tuple):
+            frozen(part)
+        elif isinstance(part, np.ndarray):
+            part.flags.writeable = False
+    return memory
+
+
+@pytest.mark.parametrize("name", [n for n in EVERY if not CATALOGUE[n].is_fixed()])
+def test_hooks_change_nothing_in_place_and_keep_shapes(name: str) -> None:
+    effect, rng = strong(name), np.random.default_rng(0)
+    first = Exposure(0, 40_000.0, SHAPE, SensorModel.preset("scsim").draw_unit(SHAPE, 0))
+    memory = frozen(effect.begin(first, np.random.default_rng(1)))
+    for number in range(5):
+        now = replace(first, number=number)
+        light, dark, threshold, charge, rate = frozen(tuple(rng.random((5, *SHAPE))))
+        spikes = frozen(rng.random(SHAPE) < 0.3)
+        *charges, memory = effect.collect(light, dark, now, frozen(memory))
+        compared, memory = effect.compare(threshold, now, frozen(memory))
+        residual = effect.after_reset(frozen(charge[spikes]), frozen(rate[spikes]), now)
+        left, memory = effect.spiked(charge, spikes, rate, now, frozen(memory))
+        read, memory = effect.read_out(spikes, now, frozen(memory))
+        assert all(a.shape == SHAPE and a.dtype == np.float64 for a in (*charges, compared, left))
+        assert residual.shape == (spikes.sum(),) and read.shape == SHAPE and read.dtype == np.bool_
+
+
 def test_all_effects_at_once_are_one_stream_however_cut() -> None:
     model = with_effects("scsim", *(strong(name) for name in EVERY))
     light = moving_light()
@@ -137,6 +166,12 @@ def test_is_bounded(name: str) -> None:
             if bad != math.inf:
                 with pytest.raises(InputError, match=f"{name}.{parameter}"):
                     effect(**{parameter: bad})
+
+
+@pytest.mark.parametrize("name, parameter", [("afterpulsing", "delay_frames"), ("threshold_flicker_noise", "octaves")])
+def test_whole_numbers_are_asked_for(name: str, parameter: str) -> None:
+    with pytest.raises(InputError, match=f"{name}.{parameter} = 2.5 must be a whole number"):
+        CATALOGUE[name](**{parameter: 2.5})
 
 
 def test_every_effect_has_a_test_of_its_own() -> None:
