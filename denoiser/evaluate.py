@@ -128,22 +128,27 @@ def held_out_textures(seed: int, size: int = 256) -> list[Texture]:
     return textures + [random_texture(rng, size, (kind,)) for kind in HELD_OUT_KINDS for _ in range(2)]
 
 
-def summary(scores: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, float]]]:
+Summary = dict[str, dict[str, dict[str, float | None]]]
+"""row -> picture -> measure; None where a measure has no value (a picture against itself, a gap that is none)."""
+
+
+def summary(scores: list[dict[str, Any]]) -> Summary:
     """Mean of the scores by row and picture, and the share of the gap that the means close."""
     rows = dict.fromkeys(s["row"] for s in scores)
-    table: dict[str, dict[str, dict[str, float]]] = {}
+    table: Summary = {}
     for row in rows:
         table[row] = {}
         for picture in PICTURES:
             taken = [s for s in scores if (s["row"], s["picture"]) == (row, picture)]
             table[row][picture] = {
-                name: round(float(np.mean([s[name] for s in taken if np.isfinite(s[name])] or [np.nan])), 4)
+                name: _plain(np.mean([s[name] for s in taken]))
                 for name in ("light_db", "light_ssim", "clean_db", "clean_ssim")
             }
     for row in rows:
         for picture in PICTURES:
-            noisy, mine, clean = (table[r][picture]["light_db"] for r in ("noisy", row, "clean"))
-            table[row][picture]["gap_closed"] = round(gap_closed(noisy, mine, clean), 4)
+            levels = [table[r][picture]["light_db"] for r in ("noisy", row, "clean")]
+            known = [level for level in levels if level is not None]
+            table[row][picture]["gap_closed"] = _plain(gap_closed(*known)) if len(known) == 3 else None
     return table
 
 
@@ -223,18 +228,26 @@ def _linear_square(photograph: NDArray, size: int) -> Texture:
     return ((square - square.min()) / (square.max() - square.min())).astype(np.float32)
 
 
-def _table(title: str, table: dict[str, dict[str, dict[str, float]]]) -> str:
+def _plain(value: Any) -> float | None:
+    """For JSON, which knows neither infinity nor NaN."""
+    return round(float(value), 4) if np.isfinite(value) else None
+
+
+def _table(title: str, table: Summary) -> str:
     head = f"{title}\n{'':12}" + "".join(f"| {picture:^43}" for picture in PICTURES)
     names = f"{'':12}" + "| light dB  SSIM   gap | clean twin dB  SSIM " * len(PICTURES)
-    lines = [head, names]
-    for row, pictures in table.items():
-        cells = [
-            f"| {s['light_db']:7.2f} {s['light_ssim']:6.3f} {100 * s['gap_closed']:5.0f} % "
-            f"| {s['clean_db']:9.2f} {s['clean_ssim']:8.3f}  "
-            for s in pictures.values()
-        ]
-        lines.append(f"{row:12}" + "".join(cells))
-    return "\n".join(lines)
+    rows = (f"{row:12}" + "".join(map(_cell, pictures.values())) for row, pictures in table.items())
+    return "\n".join([head, names, *rows])
+
+
+def _cell(s: dict[str, float | None]) -> str:
+    gap = None if s["gap_closed"] is None else 100 * s["gap_closed"]
+    light = f"| {_shown(s['light_db'], 7, 2)} {_shown(s['light_ssim'], 6, 3)} {_shown(gap, 5, 0)} % "
+    return light + f"| {_shown(s['clean_db'], 9, 2)} {_shown(s['clean_ssim'], 8, 3)}  "
+
+
+def _shown(value: float | None, width: int, digits: int) -> str:
+    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
 
 
 def _write(folder: Path, result: dict[str, Any]) -> None:
