@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ class HeldOut:
 def evaluate_quick(
     modes: Sequence[str] = ("paper", "best"),
     *,
-    weights: dict[str, str | os.PathLike[str]] | None = None,
+    weights: Mapping[str, str | os.PathLike[str]] | None = None,
     scenes_a_class: int = 2,
     shape: tuple[int, int] = (96, 96),
     frames: int = 280,

@@ -292,7 +292,7 @@ def _command(config: TrainConfig) -> str:
     """What to type to train so."""
     given = [f for f in fields(config) if f.name != "out" and getattr(config, f.name) != f.default]
     options = " ".join(f"--{f.name.replace('_', '-')} {getattr(config, f.name)}" for f in given)
-    return f"python -m denoiser.train --out OUT {options}".rstrip()
+    return f"spikecam train --out OUT {options}".rstrip()
 
 
 def _plot(curve: list[dict[str, float]], path: Path) -> None:

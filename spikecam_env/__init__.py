@@ -4,7 +4,6 @@ Importing it registers the environments with Gymnasium, which looks for none by 
 """
 
 from spikecam_env import envs
-
-__version__ = "0.1.0"
+from spikecam_env.version import __version__
 
 __all__ = ["__version__", "envs"]

@@ -35,7 +35,7 @@ class Record:
         import numpy as np
         from tqdm import trange
 
-        from scenes import Collage, RotatingDisk
+        from scenes import Collage, RotatingDisk, Scene
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SensorModel, SpikeSensor
         from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
@@ -49,6 +49,7 @@ class Record:
             raise InputError(f"--frames {self.frames}; record at least 1")
         model = SensorModel.load(self.model)
         sensor = SpikeSensor(model, (self.height, self.width), self.seed, engine="auto")
+        scene: Scene
         if self.scene == "disk":
             scene = RotatingDisk((self.height, self.width), rpm=self.rpm, frame_rate_hz=model.frame_rate_hz)
         else:

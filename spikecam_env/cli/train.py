@@ -11,24 +11,32 @@ from typing import Literal
 class Train:
     """Train DnSS on noisy and clean streams simulated on the fly; goes on from its last checkpoint.
 
-    example:  spikecam train --mode best --minutes 45 --out runs/best
+    example:  spikecam train --mode best --out runs/best
     """
 
     out: Path
-    """Folder of the run: checkpoint, validation curve (JSON, PNG), finished weights."""
+    """Folder of the run: weights, checkpoint to resume from, validation curve (JSON, PNG)."""
     mode: Literal["best", "paper"] = "best"
     """`paper`: the paper's network and loss; `best`: many rate planes a pass, trained on true light."""
-    steps: int = 9000
-    """Training steps in all; the learning rate falls to zero over them."""
+    steps: int = 20_000
+    """Training steps in all; the rate of learning falls to nothing over them."""
+    minutes: float | None = None
+    """End by the clock instead."""
     batch: int = 16
-    """Patches a step."""
+    """Patches a step, 64 x 64 pixels."""
+    lr: float = 1e-3
+    """Highest rate of learning."""
     seed: int = 0
+    """Seed of network, scenes, cameras and noise."""
     threads: int = 2
-    """Torch threads."""
+    """Threads of the network; the simulation has a process of its own."""
     resume: bool = True
-    """Go on from a checkpoint in the folder; otherwise start again."""
+    """Go on from the folder's checkpoint where there is one."""
 
     def run(self) -> None:
         from denoiser.train import TrainConfig, train
+        from spikecam_env.cli.files import out_folder
 
-        train(TrainConfig(self.mode, self.out, self.steps, self.batch, self.seed, self.threads, self.resume))
+        out_folder(self.out)
+        path = train(TrainConfig(**vars(self)))
+        print(f"wrote {path}")

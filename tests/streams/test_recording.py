@@ -6,9 +6,9 @@ import h5py
 import numpy as np
 import pytest
 
-from spikecam_env import __version__
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.streams import SpikeWriter, read_recording, read_truth, save_npz, save_vidar_dat
+from spikecam_env.version import __version__
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "data" / "real"
 needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="needs the shared data folder")

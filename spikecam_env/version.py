@@ -1,0 +1,3 @@
+"""The package's version, written into files that it makes."""
+
+__version__ = "0.1.0"

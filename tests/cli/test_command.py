@@ -1,0 +1,116 @@
+"""The `spikecam` command as a user meets it: results as files, tables, and one line for what is wrong."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+
+from spikecam_env.cli.main import COMMANDS, run
+from spikecam_env.streams import load_vidar_dat, read_recording
+
+SMALL = ("--height", "64", "--width", "96")
+
+
+def spikecam(*args: object) -> int:
+    return run([str(a) for a in args])
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_explains_itself_with_an_example(name: str, capsys) -> None:
+    with pytest.raises(SystemExit) as end:
+        spikecam(name, "--help")
+    assert end.value.code == 0
+    assert f"example:  spikecam {name}" in capsys.readouterr().out
+
+
+def test_help_needs_no_torch() -> None:
+    code = "import sys; from spikecam_env.cli.main import run\ntry: run(['--help'])\nexcept SystemExit: pass\n"
+    code += "assert 'torch' not in sys.modules and 'numba' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("suffix", ["h5", "dat", "npz"])
+def test_a_recording_reads_back_and_denoises(suffix: str, tmp_path: Path, capsys) -> None:
+    file = tmp_path / f"disk.{suffix}"
+    assert spikecam("record", "--frames", 130, "--out", file, *SMALL) == 0
+    shape = {"height": 64, "width": 96} if suffix == "dat" else {}
+    spikes = read_recording(file, **shape).spikes
+    assert spikes.shape == (130, 64, 96)
+    assert 0.05 < spikes.mean() < 0.6
+    assert spikecam("denoise", file, "--out", tmp_path / "out", *(SMALL if shape else ())) == 0
+    assert "denoised rate" in capsys.readouterr().out
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert names == {"denoised.h5", "pictures.png", "film.mp4", "summary.json"}
+    assert read_recording(tmp_path / "out" / "denoised.h5").spikes.shape == spikes.shape
+    assert len(json.loads((tmp_path / "out" / "summary.json").read_text())["rows"]) == 3
+
+
+def test_the_same_seed_records_the_same_bits(tmp_path: Path) -> None:
+    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
+        spikecam("record", "--frames", 70, "--seed", seed, "--out", tmp_path / f"{name}.dat", *SMALL)
+    a, b, c = ((tmp_path / f"{name}.dat").read_bytes() for name in "abc")
+    assert a == b != c
+    assert load_vidar_dat(tmp_path / "a.dat", height=64, width=96).shape == (70, 64, 96)
+
+
+def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys) -> None:
+    assert spikecam("demo", "--frames", 500, "--out", tmp_path, *SMALL) == 0
+    printed = capsys.readouterr().out
+    assert "clean twin" in printed and "x real time" in printed
+    figures = json.loads((tmp_path / "demo.json").read_text())
+    assert [row["stream"] for row in figures["table"]] == ["noisy", "paper", "best", "clean twin"]
+    film = imageio.get_reader(tmp_path / "demo.mp4")
+    assert film.count_frames() == 500 // 25 - 6
+    assert imageio.imread(tmp_path / "demo.png").shape[2] == 3
+
+
+@pytest.mark.parametrize(
+    "args, message",
+    [
+        (("record", "--out", "x.avi"), "unknown file type '.avi'; use .h5, .dat or .npz"),
+        (("record", "--out", "nowhere/x.h5"), "there is no folder nowhere"),
+        (("record", "--out", "x.h5", "--model", "scs"), "unknown preset 'scs'; choose one of ideal, physical, scsim"),
+        (("record", "--out", "x.h5", "--model", "no.toml"), "cannot read model file no.toml"),
+        (("record", "--out", "x.h5", "--frames", "0"), "--frames 0"),
+        (("record", "--out", "x.h5", "--height", "0"), "shape = (0, 400)"),
+        (("demo", "--frames", "10"), "10 frames are too few"),
+        (("demo", "--model", "scs"), "unknown preset 'scs'"),
+        (("demo", "--rpm", "nan"), "rpm"),
+        (("denoise", "absent.dat"), "absent.dat"),
+        (("denoise", "odd.dat"), "12345"),
+        (("denoise", "broken.h5"), "broken.h5"),
+        (("denoise", "text.npz"), "text.npz"),
+        (("denoise", "good.dat", "--window", "4"), "--window 4"),
+        (("denoise", "good.dat", "--out", "good.dat"), "good.dat"),
+        (("train", "--out", "runs", "--steps", "0"), "steps 0"),
+        (("evaluate", "--best", "text.npz"), "text.npz"),
+    ],
+)
+def test_what_is_wrong_ends_in_one_line_and_code_2(args, message: str, tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("odd.dat").write_bytes(bytes(12345))
+    Path("good.dat").write_bytes(bytes(12500 * 50))
+    Path("text.npz").write_text("not an array")
+    with h5py.File("whole.h5", "w") as file:
+        file["data"] = np.arange(10_000)
+    Path("broken.h5").write_bytes(Path("whole.h5").read_bytes()[:3000])
+    before = {p.name for p in tmp_path.iterdir()}
+    assert spikecam(*args) == 2
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert error.startswith("spikecam: ") and message in error
+    left = {p.name for p in tmp_path.iterdir()} - before
+    assert not any((tmp_path / name).is_file() or list((tmp_path / name).iterdir()) for name in left), left
+
+
+def test_unknown_options_end_with_code_2() -> None:
+    for args in (["demo", "--modes", "best"], ["bench", "everything"], ["fly"], []):
+        with pytest.raises(SystemExit) as end:
+            spikecam(*args)
+        assert end.value.code == 2
