@@ -67,7 +67,7 @@ def evaluate_quick(
     *,
     weights: Mapping[str, str | os.PathLike[str]] | None = None,
     scenes_a_class: int = 2,
-    shape: tuple[int, int] = (128, 128),
+    shape: tuple[int, int] = (96, 96),
     frames: int = 280,
     seed: int = 0,
     out: str | os.PathLike[str] | None = None,
