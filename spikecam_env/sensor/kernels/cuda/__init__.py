@@ -1,0 +1,69 @@
+"""The cuda engine: batches of cameras on a GPU, by the fast engine's law and with its bits.
+
+`state` holds B cameras' pixels as (B, P) tensors.  Two kernels advance them: `jump` (Triton, on CUDA devices) goes from
+spike to spike, `dense` (plain torch, on any device) from frame to frame.  Charge is 32-bit integers, every draw a hash of
+(seed, pixel, spike number) through a float32 polynomial without fused multiply-add, so both give the bits of `fast`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.util import find_spec
+
+import torch
+
+from spikecam_env.errors import InputError
+from spikecam_env.sensor.effects import Effect
+from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.kernels.cuda import dense
+from spikecam_env.sensor.kernels.cuda.state import BatchSegment, BatchState, start
+
+__all__ = ["BatchSegment", "BatchState", "checked_device", "kernel_on", "missing", "run", "start"]
+
+
+def missing(effects: Sequence[Effect]) -> list[str]:
+    """Names of effects, or options of them, that this engine does not carry: those that `fast` does not."""
+    return fast.missing(effects)
+
+
+def run(state: BatchState, segment: BatchSegment, out: torch.Tensor | None = None) -> torch.Tensor:
+    """Advance `state` over a segment; returns spikes (B, count, P) uint8, 0 or 1, in `out` where that is given.
+
+    out: (B, count, P) uint8 on the state's device, any strides over cameras and frames, pixels adjoining.
+    """
+    if out is None:
+        out = torch.empty((state.cameras, segment.count, state.pixels), dtype=torch.uint8, device=state.device)
+    if kernel_on(state.device) == "triton":
+        from spikecam_env.sensor.kernels.cuda import jump
+
+        jump.advance(state, segment, out)
+    else:
+        dense.advance(state, segment, out)
+    return out
+
+
+def kernel_on(device: torch.device) -> str:
+    """Which kernel runs on a device: "triton" on CUDA where Triton is installed, else "torch"."""
+    return "triton" if device.type == "cuda" and _has_triton() else "torch"
+
+
+def checked_device(device: str | torch.device) -> torch.device:
+    """A device that the engine can run on; raises InputError for CUDA where there is none, and for other kinds."""
+    try:
+        chosen = torch.device(device)
+    except (RuntimeError, TypeError):
+        chosen = torch.device("meta")
+    if chosen.type not in ("cuda", "cpu"):
+        raise InputError(f"device = {str(device)!r}; it must be 'cuda', 'cuda:N' or 'cpu'")
+    if chosen.type == "cuda" and (chosen.index or 0) >= torch.cuda.device_count():
+        raise InputError(
+            f"device = {str(device)!r}, but torch {torch.__version__} sees {torch.cuda.device_count()} CUDA devices; "
+            "use engine='fast', or SpikeSensorBatch(..., device='cpu') for batches on the processor"
+        )
+    return chosen
+
+
+@lru_cache(maxsize=1)
+def _has_triton() -> bool:
+    return find_spec("triton") is not None
