@@ -1,18 +1,34 @@
 """The pixel: models of ordered effects, and the sensor that steps them."""
 
+from typing import TYPE_CHECKING, Any
+
 from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
 from spikecam_env.sensor.light import Keyframes
 from spikecam_env.sensor.model import SensorModel
 from spikecam_env.sensor.sensor import SensorState, SpikeSensor
 from spikecam_env.sensor.unit import Circuit
 
+if TYPE_CHECKING:
+    from spikecam_env.sensor.batch import SensorBatchState, SpikeSensorBatch
+
 __all__ = [
     "CATALOGUE",
     "Circuit",
     "Effect",
     "Keyframes",
+    "SensorBatchState",
     "SensorModel",
     "SensorState",
     "SpikeSensor",
+    "SpikeSensorBatch",
     "Stage",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Batches need torch, which takes seconds to import: only when asked for."""
+    if name in ("SensorBatchState", "SpikeSensorBatch"):
+        from spikecam_env.sensor import batch
+
+        return getattr(batch, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import copy
 import operator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -12,12 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import reference
-from spikecam_env.sensor.effects.base import Exposure
+from spikecam_env.sensor.effects.base import Effect, Exposure
 from spikecam_env.sensor.kernels import fast
 from spikecam_env.sensor.light import Keyframes, Segment, as_light, segments
 from spikecam_env.sensor.model import SensorModel, generator
 
-ENGINES = ("auto", "fast", "reference")
+ENGINES = ("auto", "cuda", "fast", "reference")
 
 
 @dataclass(frozen=True)
@@ -42,10 +45,11 @@ class SpikeSensor:
     model: what kind of camera; a SensorModel, a preset's name or a TOML path.
     seed: which unit of it (fixed pattern), its starting phase and its temporal noise; same seed, same bits,
         for any cutting of the stream into steps and any number of threads.
-    engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification, every effect), or
-        "auto" (fast where it carries every effect of the model, else reference).
-    Raises InputError for an unknown engine, a shape that is not two positive whole numbers, a negative seed, and for
-    engine="fast" with an effect that it does not carry.
+    engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification, every effect), "cuda"
+        (a GPU, bits of fast; for many cameras at once see SpikeSensorBatch), or "auto" (fast where it carries every
+        effect of the model, else reference).
+    Raises InputError for an unknown engine, a shape that is not two positive whole numbers, a negative seed, for
+    engine="fast" or "cuda" with an effect that it does not carry, and for engine="cuda" without a CUDA device.
 
     >>> sensor = SpikeSensor(SensorModel.preset("ideal"), shape=(2, 2), seed=0)
     >>> sensor.step(np.full((2, 2), 0.25, np.float32), frames=8).sum(axis=0).tolist()
@@ -60,15 +64,15 @@ class SpikeSensor:
         engine: str = "fast",
     ) -> None:
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
-        self.shape = _checked_shape(shape)
+        self.shape = checked_shape(shape)
         self.engine = _chosen_engine(engine, self.model)
         self._optics = tuple(e for e in self.model.effects if e.overrides("image"))
         self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
-        self._start(_checked_seed(seed), phase=None)
+        self._start(checked_seed(seed), phase=None)
 
     def reset(self, seed: int | None = None) -> None:
         """Back to frame 0; with a seed, as another unit."""
-        self._start(self.seed if seed is None else _checked_seed(seed), phase=None)
+        self._start(self.seed if seed is None else checked_seed(seed), phase=None)
 
     def step(self, radiance: Keyframes | ArrayLike, frames: int = 1) -> NDArray[np.uint8]:
         """Expose the next frames; returns spikes (frames, H, W) uint8, 0 or 1.
@@ -76,12 +80,12 @@ class SpikeSensor:
         radiance: (H, W) held throughout, or Keyframes on the stream's absolute frame numbers; 1.0 makes the nominal
         pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light or frames < 1.
         """
-        frames = _checked_frames(frames)
+        frames = checked_frames(frames)
         light = as_light(radiance, self.shape)
         spikes = np.empty((frames, self.shape[0] * self.shape[1]), dtype=np.uint8)
         done = 0
         for segment in segments(light, self.frame, frames):
-            self._run(self._imaged(segment), spikes[done : done + segment.count])
+            self._run(imaged(segment, self._optics, self.shape), spikes[done : done + segment.count])
             done += segment.count
         self.frame += frames
         return spikes.reshape(frames, *self.shape)
@@ -122,12 +126,19 @@ class SpikeSensor:
         flat = self.phase.reshape(-1)
         if self.engine == "fast":
             self._pixels = fast.start(self.unit, flat, seed)
+        elif self.engine == "cuda":
+            cuda = _cuda()
+            self._pixels = cuda.start([self.unit], [flat], [seed], cuda.checked_device("cuda"))
         else:
             self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, seed)
 
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
         if self.engine == "fast":
             fast.run(self._pixels, segment, out)
+        elif self.engine == "cuda":
+            cuda = _cuda()
+            batch = cuda.BatchSegment.of([segment], self._pixels.device)
+            out[:] = cuda.run(self._pixels, batch)[0].cpu().numpy()
         else:
             out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
 
@@ -137,17 +148,18 @@ class SpikeSensor:
     def _first_exposure(self) -> Exposure:
         return Exposure(0, self.model.frame_rate_hz, self.shape, self.unit)
 
-    def _imaged(self, segment: Segment) -> Segment:
-        """Light as it reaches the pixels: optics are linear, so they act on the ramp's two ends."""
-        for effect in self._optics:
-            start = effect.image(segment.radiance0.reshape(self.shape)).reshape(-1)
-            held = segment.radiance1 is segment.radiance0
-            end = start if held else effect.image(segment.radiance1.reshape(self.shape)).reshape(-1)
-            segment = replace(segment, radiance0=start, radiance1=end)
-        return segment
+
+def imaged(segment: Segment, optics: Sequence[Effect], shape: tuple[int, int]) -> Segment:
+    """Light as it reaches the pixels: optics are linear, so they act on the ramp's two ends."""
+    for effect in optics:
+        start = effect.image(segment.radiance0.reshape(shape)).reshape(-1)
+        held = segment.radiance1 is segment.radiance0
+        end = start if held else effect.image(segment.radiance1.reshape(shape)).reshape(-1)
+        segment = replace(segment, radiance0=start, radiance1=end)
+    return segment
 
 
-def _checked_shape(shape: Any) -> tuple[int, int]:
+def checked_shape(shape: Any) -> tuple[int, int]:
     try:
         rows, columns = (operator.index(n) for n in shape)
     except (TypeError, ValueError):
@@ -157,7 +169,7 @@ def _checked_shape(shape: Any) -> tuple[int, int]:
     return rows, columns
 
 
-def _checked_frames(frames: Any) -> int:
+def checked_frames(frames: Any) -> int:
     try:
         number = operator.index(frames)
     except TypeError:
@@ -167,7 +179,7 @@ def _checked_frames(frames: Any) -> int:
     return number
 
 
-def _checked_seed(seed: Any) -> int:
+def checked_seed(seed: Any) -> int:
     try:
         number = operator.index(seed)
     except TypeError:
@@ -183,6 +195,13 @@ def _chosen_engine(engine: str, model: SensorModel) -> str:
     missing = fast.missing(model.effects)
     if engine == "auto":
         return "reference" if missing else "fast"
-    if engine == "fast" and missing:
-        raise InputError(f"the fast engine does not carry {', '.join(missing)}; use engine='reference' or 'auto'")
+    if engine in ("cuda", "fast") and missing:
+        raise InputError(f"the {engine} engine does not carry {', '.join(missing)}; use engine='reference' or 'auto'")
+    if engine == "cuda":
+        _cuda().checked_device("cuda")
     return engine
+
+
+def _cuda() -> ModuleType:
+    """Imported when first asked for: torch takes seconds."""
+    return import_module("spikecam_env.sensor.kernels.cuda")

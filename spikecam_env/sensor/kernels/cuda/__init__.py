@@ -1,8 +1,8 @@
 """The cuda engine: batches of cameras on a GPU, by the fast engine's law and with its bits.
 
 `state` holds B cameras' pixels as (B, P) tensors.  Two kernels advance them: `jump` (Triton, on CUDA devices) goes from
-spike to spike, `dense` (plain torch, on any device) from frame to frame.  Charge is 32-bit integers, every draw a hash of
-(seed, pixel, spike number) through a float32 polynomial without fused multiply-add, so both give the bits of `fast`.
+spike to spike, `dense` (plain torch, on any device) from frame to frame.  Charge is 32-bit integers, every draw a hash
+of (seed, pixel, spike number) through a float32 polynomial without fused multiply-add: both give the bits of `fast`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ def run(state: BatchState, segment: BatchSegment, out: torch.Tensor | None = Non
     if kernel_on(state.device) == "triton":
         from spikecam_env.sensor.kernels.cuda import jump
 
-        jump.advance(state, segment, out)
+        with torch.cuda.device(state.device):  # Triton launches on the current device, whatever the tensors'
+            jump.advance(state, segment, out)
     else:
         dense.advance(state, segment, out)
     return out

@@ -105,8 +105,8 @@ def start(
 class BatchSegment:
     """`count` frames of every camera, its light linear over a key interval of its own; see `light.Segment`.
 
-    radiance0, radiance1: (B, P) or (1, P) float32.  timing: (B, 3) or (1, 3) int32: the segment's first frame in the key
-    interval, and of an interval of n frames 2n and ceil(2^18 / 2n).  per_twice: (B, 1) or (1, 1) float32, 1 / 2n.
+    radiance0, radiance1: (B, P) or (1, P) float32.  timing: (B, 3) or (1, 3) int32: the segment's first frame in the
+    key interval, and of an interval of n frames 2n and ceil(2^18 / 2n).  per_twice: (B, 1) or (1, 1) float32, 1 / 2n.
     """
 
     radiance0: torch.Tensor

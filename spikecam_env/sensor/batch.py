@@ -1,0 +1,229 @@
+"""Many cameras stepped at once, on a GPU: for training agents and for seas of simulated data."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from spikecam_env.errors import InputError
+from spikecam_env.sensor.kernels import cuda
+from spikecam_env.sensor.light import MAX_SEGMENT, Keyframes, Segment, as_light, check_radiance, segments
+from spikecam_env.sensor.model import SensorModel, generator
+from spikecam_env.sensor.sensor import checked_frames, checked_seed, checked_shape, imaged
+
+
+@dataclass(frozen=True)
+class SensorBatchState:
+    """A batch mid-stream: what its cameras are, each one's next frame (B,), phase (B, H, W), pixels.  Picklable."""
+
+    models: tuple[SensorModel, ...]
+    seeds: tuple[int, ...]
+    frame: NDArray[np.int64]
+    phase: NDArray[np.float64]
+    pixels: cuda.BatchState
+
+
+class SpikeSensorBatch:
+    """B spike cameras of `shape` (rows, columns) pixels.  Each gives the bits of SpikeSensor(engine="fast").
+
+    models: one model for all (SensorModel, preset's name or TOML path), or B of them.
+    seeds: B whole numbers, one a camera; see SpikeSensor.
+    device: "cuda", "cuda:1" or "cpu".  On CUDA the Triton kernel runs where Triton is installed, else plain torch;
+        `kernel` says which.  The processor runs plain torch: made for tests, many times slower than the fast engine.
+    frame: (B,) int64, absolute index of each camera's next frame.
+    Raises InputError for a device that is not there, an effect that the engine does not carry, and bad arguments.
+
+    >>> cameras = SpikeSensorBatch("ideal", shape=(2, 2), seeds=[0, 1], device="cpu")
+    >>> cameras.step(np.full((2, 2), 0.25, np.float32), frames=8).sum(dim=1).tolist()
+    [[[2, 2], [2, 2]], [[2, 2], [2, 2]]]
+    """
+
+    def __init__(
+        self,
+        models: SensorModel | str | Sequence[SensorModel | str] = "scsim",
+        shape: tuple[int, int] = (250, 400),
+        seeds: Sequence[int] = (0,),
+        device: str | torch.device = "cuda",
+    ) -> None:
+        self.device = cuda.checked_device(device)
+        self.kernel = cuda.kernel_on(self.device)
+        self.shape = checked_shape(shape)
+        self.seeds = _checked_seeds(seeds)
+        self.models = _checked_models(models, len(self.seeds))
+        self._alike = all(model == self.models[0] for model in self.models)
+        self._optics = [tuple(e for e in model.effects if e.overrides("image")) for model in self.models]
+        self.frame = np.zeros(len(self.seeds), dtype=np.int64)
+        self.phase = np.stack([generator(seed, "phase").random(self.shape) for seed in self.seeds])
+        self._pixels = self._started(range(len(self.seeds)))
+
+    def __len__(self) -> int:
+        return len(self.seeds)
+
+    def step(
+        self, radiance: Keyframes | Sequence[Keyframes] | torch.Tensor | ArrayLike, frames: int = 1
+    ) -> torch.Tensor:
+        """Expose the next frames of every camera; returns spikes (B, frames, H, W) uint8, 0 or 1, on the device.
+
+        radiance: (H, W) or (B, H, W) held throughout, as an array or a tensor; Keyframes for all cameras, or a list of
+        B, on each camera's own absolute frame numbers.  Optics (blur, vignetting) act on the host: a tensor on the GPU
+        is copied there and back once a step.  Raises InputError as SpikeSensor.step does.
+        """
+        frames = checked_frames(frames)
+        pieces = self._pieces(radiance, frames)
+        spikes = torch.empty((len(self), frames, self._pixels.pixels), dtype=torch.uint8, device=self.device)
+        done = 0
+        for piece in pieces:
+            cuda.run(self._pixels, piece, spikes[:, done : done + piece.count])
+            done += piece.count
+        self.frame += frames
+        return spikes.reshape(len(self), frames, *self.shape)
+
+    def reset(self, seeds: Sequence[int] | None = None, mask: ArrayLike | None = None) -> None:
+        """Back to frame 0: all cameras, or those where mask (B,) is True; with B seeds, those become other units."""
+        chosen = np.arange(len(self)) if mask is None else np.flatnonzero(_checked_mask(mask, len(self)))
+        new = self.seeds if seeds is None else _checked_seeds(seeds)
+        if len(new) != len(self):
+            raise InputError(f"{len(new)} seeds for {len(self)} cameras; give one a camera, also where mask is False")
+        if not chosen.size:
+            return
+        self.seeds = tuple(new[b] if b in chosen else seed for b, seed in enumerate(self.seeds))
+        self.phase = self.phase.copy()
+        for b in chosen:
+            self.phase[b] = generator(self.seeds[b], "phase").random(self.shape)
+        self._pixels = self._pixels.replaced(chosen, self._started(chosen))
+        self.frame[chosen] = 0
+
+    def state(self) -> SensorBatchState:
+        """A copy of everything that the next step depends on."""
+        return SensorBatchState(
+            self.models, self.seeds, self.frame.copy(), self.phase.copy(), copy.deepcopy(self._pixels)
+        )
+
+    def restore(self, state: SensorBatchState) -> None:
+        """Go on from a saved state, of any device; raises InputError for other models, another number or shape."""
+        if state.phase.shape != (len(self), *self.shape):
+            raise InputError(
+                f"this state is of (cameras, rows, columns) = {state.phase.shape}; this batch is "
+                f"{(len(self), *self.shape)}"
+            )
+        if state.models != self.models:
+            raise InputError("this state is of cameras of other models; build the batch with those (state.models)")
+        self.seeds, self.frame, self.phase = state.seeds, state.frame.copy(), state.phase.copy()
+        self._pixels = copy.deepcopy(state.pixels).to(self.device)
+
+    def clean_twin(self) -> SpikeSensorBatch:
+        """Noise-free cameras at frame 0 with these ones' initial phases: on the same scenes they give clean streams."""
+        models = [model.noise_free() for model in self.models]
+        twin = SpikeSensorBatch(models, self.shape, self.seeds, self.device)
+        twin.phase = self.phase.copy()
+        twin._pixels = twin._started(range(len(twin)))
+        return twin
+
+    def _started(self, cameras: Sequence[int] | NDArray[np.int64]) -> cuda.BatchState:
+        units = [self.models[b].draw_unit(self.shape, self.seeds[b]) for b in cameras]
+        phases = [self.phase[b].reshape(-1) for b in cameras]
+        return cuda.start(units, phases, [self.seeds[b] for b in cameras], self.device)
+
+    def _pieces(self, radiance: Any, frames: int) -> Iterator[cuda.BatchSegment]:
+        """The light of the next frames, checked before any is exposed, cut to what a kernel takes in one go."""
+        if isinstance(radiance, Keyframes) and self._alike and np.all(self.frame == self.frame[0]):
+            return self._moving([as_light(radiance, self.shape)], frames)
+        if isinstance(radiance, Keyframes):
+            radiance = [radiance] * len(self)
+        if isinstance(radiance, (list, tuple)) and any(isinstance(light, Keyframes) for light in radiance):
+            if len(radiance) != len(self):
+                raise InputError(f"{len(radiance)} lights for {len(self)} cameras; give one a camera, or one for all")
+            return self._moving([as_light(light, self.shape) for light in radiance], frames)
+        return self._still(self._checked_pictures(radiance), frames)
+
+    def _moving(self, lights: Sequence[Keyframes | NDArray[np.float32]], frames: int) -> Iterator[cuda.BatchSegment]:
+        films = [segments(light, int(self.frame[b]), frames) for b, light in enumerate(lights)]
+        for cut in cut_alike(films):
+            seen = [imaged(segment, self._optics[b], self.shape) for b, segment in enumerate(cut)]
+            yield cuda.BatchSegment.of(seen, self.device)
+
+    def _still(self, pictures: torch.Tensor, frames: int) -> Iterator[cuda.BatchSegment]:
+        """pictures: (B, H, W) or (1, H, W) float32."""
+        light = pictures.reshape(len(pictures), -1)
+        if any(self._optics):
+            light = torch.from_numpy(self._seen(light.cpu().numpy()))
+        light = light.to(self.device)
+        for done in range(0, frames, MAX_SEGMENT):
+            yield cuda.BatchSegment.held(light, min(MAX_SEGMENT, frames - done))
+
+    def _seen(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Held light (B, P) or (1, P) through each camera's optics."""
+        if not self._alike:
+            light = np.broadcast_to(light, (len(self), light.shape[1]))
+        held = [Segment(picture, picture, MAX_SEGMENT, 0, MAX_SEGMENT) for picture in light]
+        return np.stack([imaged(segment, self._optics[b], self.shape).radiance0 for b, segment in enumerate(held)])
+
+    def _checked_pictures(self, radiance: Any) -> torch.Tensor:
+        if isinstance(radiance, torch.Tensor):
+            pictures = radiance.detach().to(torch.float32)
+        else:
+            pictures = torch.from_numpy(np.array(radiance, dtype=np.float32))
+        if pictures.shape == self.shape:
+            pictures = pictures[None]
+        if pictures.shape not in ((1, *self.shape), (len(self), *self.shape)):
+            raise InputError(
+                f"radiance has shape {tuple(pictures.shape)}, the batch is {(len(self), *self.shape)}; give (H, W) or "
+                "(B, H, W) to hold, Keyframes, or a list of them"
+            )
+        check_radiance(torch.stack(torch.aminmax(pictures)).cpu().numpy())
+        return pictures.contiguous()
+
+
+def cut_alike(films: Sequence[Iterator[Segment]]) -> Iterator[list[Segment]]:
+    """Segments of several cameras, cut so that each step has one count for all; no cut changes a bit.
+
+    films: each of the same number of frames.
+    """
+    rest: list[Segment | None] = [next(film, None) for film in films]
+    while all(rest):
+        now = [segment for segment in rest if segment is not None]
+        count = min(segment.count for segment in now)
+        yield [replace(segment, count=count) for segment in now]
+        rest = [
+            replace(segment, first=segment.first + count, count=segment.count - count)
+            if segment.count > count
+            else next(film, None)
+            for segment, film in zip(now, films, strict=True)
+        ]
+
+
+def _checked_seeds(seeds: Any) -> tuple[int, ...]:
+    try:
+        checked = tuple(checked_seed(seed) for seed in seeds)
+    except TypeError:
+        checked = ()
+    if not checked:
+        raise InputError(f"seeds = {seeds!r}; give a list of whole numbers, one a camera")
+    return checked
+
+
+def _checked_models(models: Any, cameras: int) -> tuple[SensorModel, ...]:
+    given = [models] * cameras if isinstance(models, (SensorModel, str)) else list(models)
+    if len(given) != cameras:
+        raise InputError(f"{len(given)} models for {cameras} seeds; give one model a seed, or one for all")
+    loaded = tuple(model if isinstance(model, SensorModel) else SensorModel.load(model) for model in given)
+    for model in loaded:
+        missing = cuda.missing(model.effects)
+        if missing:
+            raise InputError(
+                f"the cuda engine does not carry {', '.join(missing)}; use SpikeSensor, engine='reference'"
+            )
+    return loaded
+
+
+def _checked_mask(mask: ArrayLike, cameras: int) -> NDArray[np.bool_]:
+    checked = np.asarray(mask)
+    if checked.shape != (cameras,) or checked.dtype != bool:
+        raise InputError(f"mask is {checked.dtype} {checked.shape}; it must be bool, one a camera: ({cameras},)")
+    return checked
