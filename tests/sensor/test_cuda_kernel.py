@@ -37,9 +37,17 @@ def jump() -> ModuleType:
         if "triton" in sys.modules and os.environ.get("TRITON_INTERPRET") != "1":
             pytest.skip("triton was loaded before; run this file by itself, or with TRITON_INTERPRET=1")
         os.environ["TRITON_INTERPRET"] = "1"
+    import triton
+
+    if DEVICE.type == "cpu" and _version(triton) < (3, 9) and _version(np) >= (2, 4):
+        pytest.skip(f"the interpreter of triton {triton.__version__} does not run under numpy {np.__version__}")
     from spikecam_env.sensor.kernels.cuda import jump
 
     return jump
+
+
+def _version(module: ModuleType) -> tuple[int, ...]:
+    return tuple(int(number) for number in module.__version__.split(".")[:2])
 
 
 def started(pixels: int, preset: str) -> cuda.BatchState:
