@@ -1,0 +1,127 @@
+"""From maps of pixels to a model: which pixels are odd, and the spreads of those that are not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from spikecam_env.sensor import CATALOGUE, Circuit, Effect, SensorModel
+
+Array = NDArray[np.float64]
+
+FLAGS = {
+    "unidentified": 1,
+    "dead": 2,
+    "hot": 4,
+    "misfit": 8,
+}
+"""Bits of a pixel's flag.  unidentified: fewer than two levels below saturation.  dead: responds to light by less than
+a tenth of the median pixel.  hot: dark current beyond what fits the rest (`hot_limit`).  misfit: no straight line."""
+
+_DEAD_SHARE = 0.1
+_HOT_SIGMAS = 5.0
+_MISFIT_P = 1e-7
+
+
+def pixel_flags(
+    gain: Array, dark: Array, chi2: Array, freedom: NDArray[np.int64], excess: float
+) -> NDArray[np.uint8]:
+    """uint8 bits of FLAGS, of the arrays' shape; chi2 is reduced, excess: pooled chi2."""
+    flags = np.zeros(gain.shape, dtype=np.uint8)
+    unknown = ~np.isfinite(gain)
+    flags[unknown] |= FLAGS["unidentified"]
+    dead = ~unknown & (np.nan_to_num(gain) < _DEAD_SHARE * np.nanmedian(gain))
+    flags[dead] |= FLAGS["dead"]
+    live = ~unknown & ~dead
+    flags[live & (np.nan_to_num(dark) > hot_limit(dark[live]))] |= FLAGS["hot"]
+    p = stats.chi2.sf(chi2 / max(excess, 1.0) * freedom, np.maximum(freedom, 1))
+    flags[live & (freedom > 0) & (p < _MISFIT_P)] |= FLAGS["misfit"]
+    return flags
+
+
+def hot_limit(dark: Array) -> float:
+    """Dark level above which a pixel is hot: five standard deviations of ln(dark), taken from its upper middle."""
+    low, high = np.quantile(dark, [0.5, 0.8413])
+    low = max(low, 1e-12)
+    return float(low * (max(high, low) / low) ** _HOT_SIGMAS) if high > 0 else np.inf
+
+
+@dataclass(frozen=True)
+class DarkLaw:
+    """Dark level over pixels.  law: 'normal' (first, second: mean, sd) or 'log-normal' (median, sigma of ln)."""
+
+    law: str
+    first: float
+    second: float
+
+
+def dark_law(dark: Array) -> DarkLaw:
+    """Normal or log-normal, whichever is the likelier for these pixels (hot ones left out)."""
+    mean, sd = float(dark.mean()), float(dark.std())
+    if sd <= 0 or dark.min() <= 0:
+        return DarkLaw("normal", mean, sd)
+    logs = np.log(dark)
+    normal = stats.norm.logpdf(dark, mean, sd).sum()
+    log_normal = (stats.norm.logpdf(logs, logs.mean(), logs.std()) - logs).sum()
+    if log_normal > normal:
+        return DarkLaw("log-normal", float(np.exp(logs.mean())), float(logs.std()))
+    return DarkLaw("normal", mean, sd)
+
+
+def spread(values: Array, sd: Array) -> float:
+    """Standard deviation over mean, less what the measurement's own errors add."""
+    return float(np.sqrt(max(values.var() - np.mean(sd**2), 0.0)) / values.mean())
+
+
+def fitted_model(
+    name: str,
+    circuit: Circuit,
+    frame_rate_hz: float,
+    *,
+    gain: Array,
+    gain_sd: Array,
+    dark: Array,
+    flags: NDArray[np.uint8],
+    electrons: float,
+    reset_noise_mV: float,
+    swing_V: Array | None,
+) -> SensorModel:
+    """A model with the spreads of these maps; gain relative to its mean, dark [thresholds/frame] as current.
+
+    Without swing_V all multiplicative spread goes into the conversion gain: rates at one V_d cannot tell alpha, C_S
+    and V_S apart, and together they act as one.
+    """
+    good = flags == 0
+    per_volt = np.ones_like(gain) if swing_V is None else swing_V / swing_V[good].mean()
+    effects: list[Effect] = []
+    if np.isfinite(electrons):
+        effects.append(CATALOGUE["shot_noise"](quanta=float(electrons)))
+    if reset_noise_mV > 0:
+        effects.append(CATALOGUE["reset_noise"](sigma_mV=float(reset_noise_mV)))
+    effects.append(CATALOGUE["conversion_gain_spread"](sigma=spread((gain * per_volt)[good], (gain_sd * per_volt)[good])))
+    if swing_V is not None:
+        effects.append(CATALOGUE["bias_voltage_spread"](sigma_V=float(swing_V[good].std())))
+    pA = circuit.capacitance_fF * circuit.swing_V * frame_rate_hz * 1e-3
+    known = flags & (FLAGS["unidentified"] | FLAGS["dead"] | FLAGS["misfit"]) == 0
+    effects += dark_effects(np.maximum(dark * per_volt, 0.0)[known] * pA, (flags & FLAGS["hot"] > 0)[known])
+    dead = np.mean(flags & FLAGS["dead"] > 0)
+    if dead > 0:
+        effects.append(CATALOGUE["dead_pixels"](fraction=float(dead)))
+    return SensorModel(name, circuit, frame_rate_hz, tuple(effects))
+
+
+def dark_effects(current_pA: Array, hot: NDArray[np.bool_]) -> list[Effect]:
+    """Effects whose dark current is distributed as these pixels' (P,); hot ones are a population of their own."""
+    law = dark_law(current_pA[~hot])
+    effects = [CATALOGUE["dark_current"](mean_pA=law.first)]
+    if law.law == "normal":
+        effects.append(CATALOGUE["dark_current_spread"](sigma_pA=law.second))
+    else:
+        effects.append(CATALOGUE["dark_current_tail"](sigma=law.second))
+    if np.any(hot):
+        extra = float(np.mean(current_pA[hot] - law.first))
+        effects.append(CATALOGUE["hot_pixels"](fraction=float(np.mean(hot)), mean_pA=extra))
+    return effects
