@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.sensor import reference
+from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.kernels import fast
 from spikecam_env.sensor.light import GRAINS, Keyframes, Segment, ramp, segments
 from spikecam_env.sensor.model import SensorModel, generator
@@ -103,8 +104,9 @@ def _contestants(
     rng = generator(seed, "bench")
     charge = np.floor(phase * GRAINS)
     yield "numpy, exact Poisson", 1, blocks[:1], lambda part: numpy_step(unit, charge, part, rng)
-    state = reference.start(unit, phase, generator(seed, "temporal"))
-    yield "reference", 1, blocks[:1], lambda part: reference.run(unit, (), 40_000.0, state, part)
+    first = Exposure(0, 40_000.0, SHAPE, unit)
+    state = reference.start(first, (), phase, seed)
+    yield "reference", 1, blocks[:1], lambda part: reference.run(first, (), state, part)
     pixels = fast.start(unit, phase, seed)
     out = np.empty((BLOCK, unit.gain.size), dtype=np.uint8)
 

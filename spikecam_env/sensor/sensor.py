@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import reference
+from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.kernels import fast
 from spikecam_env.sensor.light import Keyframes, Segment, as_light, segments
 from spikecam_env.sensor.model import SensorModel, generator
@@ -59,8 +60,9 @@ class SpikeSensor:
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
         self.shape = _checked_shape(shape)
         self.engine = _chosen_engine(engine, self.model)
-        self._extras = tuple(e for e in self.model.effects if e.name not in fast.CARRIES)
         self.take = _checked_seed(take, "take")
+        self._optics = tuple(e for e in self.model.effects if e.overrides("image"))
+        self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
         self._start(_checked_seed(seed), phase=None)
 
     def reset(self, seed: int | None = None) -> None:
@@ -78,7 +80,7 @@ class SpikeSensor:
         spikes = np.empty((frames, self.shape[0] * self.shape[1]), dtype=np.uint8)
         done = 0
         for segment in segments(light, self.frame, frames):
-            self._run(segment, spikes[done : done + segment.count])
+            self._run(self._imaged(segment), spikes[done : done + segment.count])
             done += segment.count
         self.frame += frames
         return spikes.reshape(frames, *self.shape)
@@ -117,13 +119,25 @@ class SpikeSensor:
         if self.engine == "fast":
             self._pixels = fast.start(self.unit, flat, noise_seed)
         else:
-            self._pixels = reference.start(self.unit, flat, generator(noise_seed, "temporal"))
+            self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed)
 
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
         if self.engine == "fast":
             fast.run(self._pixels, segment, out)
         else:
-            out[:] = reference.run(self.unit, self._extras, self.model.frame_rate_hz, self._pixels, segment)
+            out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
+
+    def _first_exposure(self) -> Exposure:
+        return Exposure(0, self.model.frame_rate_hz, self.shape, self.unit)
+
+    def _imaged(self, segment: Segment) -> Segment:
+        """Light as it reaches the pixels: optics are linear, so they act on the ramp's two ends."""
+        for effect in self._optics:
+            start = effect.image(segment.radiance0.reshape(self.shape)).reshape(-1)
+            held = segment.radiance1 is segment.radiance0
+            end = start if held else effect.image(segment.radiance1.reshape(self.shape)).reshape(-1)
+            segment = replace(segment, radiance0=start, radiance1=end)
+        return segment
 
 
 def _checked_shape(shape: Any) -> tuple[int, int]:

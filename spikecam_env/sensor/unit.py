@@ -80,6 +80,7 @@ class Unit:
 
     gain: thresholds a frame at radiance 1.  dark: thresholds a frame.  electrons: electrons to a threshold.
     kappa: relative standard deviation of the threshold, drawn at each reset.  swing_V: voltage from reset to reference.
+    threshold_fC: charge of a threshold.
     shot: whether charge is Poisson; dark_is_noisy: whether that holds for dark charge too.
     """
 
@@ -88,6 +89,7 @@ class Unit:
     electrons: NDArray[np.float64]
     kappa: NDArray[np.float64]
     swing_V: NDArray[np.float64]
+    threshold_fC: NDArray[np.float64]
     shot: bool
     dark_is_noisy: bool
 
@@ -109,6 +111,7 @@ def firing_law(pixels: PixelArray) -> Unit:
         electrons=(quanta * threshold_fC / nominal_fC).reshape(-1),
         kappa=(1e-3 * pixels.reset_noise_mV / pixels.swing_V).reshape(-1),
         swing_V=pixels.swing_V.reshape(-1),
+        threshold_fC=threshold_fC.reshape(-1),
         shot=pixels.quanta > 0,
         dark_is_noisy=pixels.dark_is_noisy,
     )

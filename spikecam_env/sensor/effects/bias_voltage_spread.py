@@ -21,6 +21,7 @@ class BiasVoltageSpread(Effect):
     sigma_V: float = parameter(0.0497, unit="V", bounds=(0.0, 0.5), doc="standard deviation over pixels")
 
     stage = Stage.THRESHOLD
+    strength = "sigma_V"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         swing = pixels.swing_V + self.sigma_V * rng.standard_normal(pixels.gain.shape)

@@ -21,6 +21,7 @@ class CapacitorSpread(Effect):
     sigma_fF: float = parameter(0.0128, unit="fF", bounds=(0.0, 1.0), doc="standard deviation over pixels")
 
     stage = Stage.INTEGRATION
+    strength = "sigma_fF"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         capacitance = pixels.capacitance_fF + self.sigma_fF * rng.standard_normal(pixels.gain.shape)

@@ -21,6 +21,7 @@ class ConversionGainSpread(Effect):
     sigma: float = parameter(0.0584 / 1.0128, unit="relative", bounds=(0.0, 1.0), doc="standard deviation over mean")
 
     stage = Stage.PHOTODIODE
+    strength = "sigma"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         factor = 1.0 + self.sigma * rng.standard_normal(pixels.gain.shape)

@@ -20,6 +20,7 @@ class DarkCurrent(Effect):
     mean_pA: float = parameter(0.4442, unit="pA", bounds=(0.0, 1e3), doc="mean dark current of a pixel")
 
     stage = Stage.PHOTODIODE
+    strength = "mean_pA"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return replace(pixels, dark_current_pA=pixels.dark_current_pA + self.mean_pA)

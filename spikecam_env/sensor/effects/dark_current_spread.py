@@ -2,7 +2,7 @@
 
     I_dark(x, y) += sigma n,  n ~ N(0, 1) a pixel; a current below zero counts as zero
 
-Stage: photodiode.  Seen in: dark recordings, pixel by pixel.  Twin: dark_current_tail.
+Stage: photodiode.  Seen in: dark recordings, pixel by pixel.  Twins: dark_current_tail.
 Source: paper (9); published 0.1731 pA.
 """
 
@@ -21,6 +21,7 @@ class DarkCurrentSpread(Effect):
     sigma_pA: float = parameter(0.1731, unit="pA", bounds=(0.0, 1e3), doc="standard deviation over pixels")
 
     stage = Stage.PHOTODIODE
+    strength = "sigma_pA"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         current = pixels.dark_current_pA + self.sigma_pA * rng.standard_normal(pixels.gain.shape)

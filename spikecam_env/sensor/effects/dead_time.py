@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Array, Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,7 @@ class DeadTime(Effect):
     tau_us: float = parameter(0.1, unit="us", bounds=(0.0, 25.0), doc="time without integration after a spike")
 
     stage = Stage.RESET
+    strength = "tau_us"
 
-    def after_reset(self, residual: Array, rate: Array, frame_rate_hz: float) -> Array:
-        return residual - rate * (self.tau_us * 1e-6 * frame_rate_hz)
+    def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
+        return residual - rate * (self.tau_us * 1e-6 * now.frame_rate_hz)

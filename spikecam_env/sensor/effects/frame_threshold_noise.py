@@ -9,11 +9,11 @@ Source: SCSim's public script (6.36 mV), kept for comparison with it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Stage, parameter
-from spikecam_env.sensor.unit import Unit
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class FrameThresholdNoise(Effect):
     sigma_mV: float = parameter(6.36, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a frame's reference")
 
     stage = Stage.THRESHOLD
+    strength = "sigma_mV"
 
-    def frame_threshold(self, threshold: Array, unit: Unit, rng: np.random.Generator) -> Array:
-        return threshold + 1e-3 * self.sigma_mV / unit.swing_V * rng.standard_normal(threshold.shape)
+    def compare(self, threshold: Array, now: Exposure, memory: np.random.Generator) -> tuple[Array, Any]:
+        return threshold + now.share_of_swing(self.sigma_mV) * memory.standard_normal(now.shape), memory

@@ -3,12 +3,14 @@
     phi = (C + C_S)(V_d + V_S + V_T),   V_T ~ N(0, sigma^2)
     thermal: sigma = sqrt(kT/C) = 0.976 mV at 300 K, 4.348 fF
 
-Stage: threshold.  Seen in: the k-slope of A_k, T^2 kappa^2.  Twin: shot_noise (separated by a second V_d).
+Stage: threshold.  Seen in: the k-slope of A_k, T^2 kappa^2.
+Twins: excess_threshold_noise, shot_noise (separated by a second V_d).
 Source: paper (7), (12).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +24,7 @@ class ResetNoise(Effect):
     sigma_mV: float = parameter(0.976, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a reset's voltage")
 
     stage = Stage.THRESHOLD
+    strength = "sigma_mV"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
-        return replace(pixels, reset_noise_mV=self.sigma_mV)
+        return replace(pixels, reset_noise_mV=math.hypot(pixels.reset_noise_mV, self.sigma_mV))

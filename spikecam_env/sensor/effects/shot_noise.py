@@ -8,6 +8,7 @@ drawn; here it is the collected electrons, dark ones included.  SCSim's script c
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,14 +22,17 @@ class ShotNoise(Effect):
     quanta: float = parameter(
         29648.0,
         unit="electrons",
-        bounds=(2.0, 1e9),
-        doc="electrons to a nominal threshold; C V / q by default",
+        bounds=(2.0, math.inf),
+        doc="electrons to a nominal threshold; C V / q by default, infinite for no shot noise",
     )
     dark_is_noisy: bool = parameter(
         True, unit="", doc="dark charge is Poisson too (physics); False is the paper's literal (11)"
     )
 
     stage = Stage.INTEGRATION
+    strength = "quanta"
+    neutral = math.inf
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
-        return replace(pixels, quanta=self.quanta, dark_is_noisy=self.dark_is_noisy)
+        quanta = self.quanta if math.isfinite(self.quanta) else 0.0
+        return replace(pixels, quanta=quanta, dark_is_noisy=self.dark_is_noisy)

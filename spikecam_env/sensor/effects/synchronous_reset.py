@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from spikecam_env.sensor.effects.base import Array, Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -22,6 +20,7 @@ class SynchronousReset(Effect):
     )
 
     stage = Stage.RESET
+    strength = "fraction"
 
-    def after_reset(self, residual: Array, rate: Array, frame_rate_hz: float) -> Array:
-        return residual * np.float64(1.0 - self.fraction)
+    def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
+        return residual * (1.0 - self.fraction)

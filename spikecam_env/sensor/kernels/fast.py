@@ -21,24 +21,15 @@ import numpy as np
 from numba import config
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects import Effect
+from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.kernels import loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.light import GRAINS, Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 
-CARRIES: frozenset[str] = frozenset(
-    {
-        "shot_noise",
-        "reset_noise",
-        "conversion_gain_spread",
-        "dark_current",
-        "dark_current_spread",
-        "capacitor_spread",
-        "bias_voltage_spread",
-    }
-)
+CARRIES: frozenset[str] = frozenset(name for name, effect in CATALOGUE.items() if effect.is_fixed())
+"""Every effect that does nothing from frame to frame: fixed patterns, static optics, noise drawn at a reset."""
 
 _WORTH_A_THREAD = 400_000
 """Pixel-steps below which handing work to another thread costs more than it saves (0.1 ms)."""

@@ -1,0 +1,40 @@
+"""Clock jitter: the read-out comes early or late, for all pixels alike.
+
+    frame t lasts 1 + j_(t+1) - j_t frames,  j ~ N(0, sigma^2)        (each edge is off by itself; no drift)
+
+Stage: read-out.  Seen in: spikes a frame over the whole array: variance 2 (x sigma)^2, lag-1 correlation -1/2.
+Twins: common_threshold_noise (does not grow with light), light_flicker (a line).
+Source: period jitter of a clock; nanoseconds in practice.  Light within a frame counts as steady.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+class Edge(NamedTuple):
+    """at: how late the last read-out came [standard deviations].  rng: what draws the next."""
+
+    at: float
+    rng: np.random.Generator
+
+
+@dataclass(frozen=True)
+class ClockJitter(Effect):
+    sigma_ns: float = parameter(20.0, unit="ns", bounds=(0.0, 5000.0), doc="standard deviation of an edge")
+
+    stage = Stage.READOUT
+    strength = "sigma_ns"
+
+    def begin(self, first: Exposure, rng: np.random.Generator) -> Edge:
+        return Edge(rng.standard_normal(), rng)
+
+    def collect(self, light: Array, dark: Array, now: Exposure, memory: Edge) -> tuple[Array, Array, Edge]:
+        end = memory.rng.standard_normal()
+        length = 1.0 + (end - memory.at) * (self.sigma_ns * 1e-9 * now.frame_rate_hz)
+        return light * length, dark * length, Edge(end, memory.rng)

@@ -1,0 +1,29 @@
+"""Column fixed pattern: the pixels of a column share an offset of their reference line.
+
+    V_d(column) += sigma n,  n ~ N(0, 1) a column
+
+Stage: threshold.  Seen in: flats and the dark alike: stripes along columns, constant in time.
+Twins: row_fixed_pattern (other direction).
+Source: EMVA 1288 release 4 (column non-uniformity); 5 mV is about 0.5 % of the swing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.unit import PixelArray
+
+
+@dataclass(frozen=True)
+class ColumnFixedPattern(Effect):
+    sigma_mV: float = parameter(5.0, unit="mV", bounds=(0.0, 200.0), doc="standard deviation over columns")
+
+    stage = Stage.THRESHOLD
+    strength = "sigma_mV"
+
+    def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
+        offset = 1e-3 * self.sigma_mV * rng.standard_normal((1, pixels.gain.shape[1]))
+        return replace(pixels, swing_V=np.maximum(pixels.swing_V + offset, 0.01 * pixels.circuit.swing_V))

@@ -1,0 +1,30 @@
+"""Common threshold noise: the reference of all comparators moves together, anew every frame.
+
+    fires when charge >= 1 + sigma n_t / V_d,  n_t ~ N(0, 1) a frame, one for all pixels
+    share of a large array that fires in a frame: x + sigma (n_(t-1) - n_t) / V_d
+
+Stage: threshold.  Seen in: spikes a frame over the whole array: variance 2 sigma^2/V_d^2, lag-1 correlation -1/2.
+Twins: row_temporal_noise (rows), clock_jitter (in proportion to light), supply_ripple (a line).
+Source: EMVA 1288 (temporal noise common to a frame); white by assumption.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class CommonThresholdNoise(Effect):
+    sigma_mV: float = parameter(1.0, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of the common reference")
+
+    stage = Stage.THRESHOLD
+    strength = "sigma_mV"
+
+    def compare(
+        self, threshold: Array, now: Exposure, memory: np.random.Generator
+    ) -> tuple[Array, np.random.Generator]:
+        return threshold + now.share_of_swing(self.sigma_mV) * memory.standard_normal(), memory

@@ -1,0 +1,27 @@
+"""Comparator delay: the comparator trips late, the later the slower the ramp; that light is lost.
+
+    T = 1/x + c / sqrt(x)        x: charge a frame over threshold, T: mean interval [frames]
+
+Stage: reset.  Seen in: flats at several levels (intervals longer by an amount that grows as 1/sqrt(x)).
+Twins: dead_time (the same at all levels), photo_response_nonlinearity.
+Source: delay of a comparator on a slow ramp, square root of the time to cross a window (regenerative comparator).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class ComparatorDelay(Effect):
+    delay_us: float = parameter(0.1, unit="us", bounds=(0.0, 25.0), doc="delay c at one spike a frame (x = 1)")
+
+    stage = Stage.RESET
+    strength = "delay_us"
+
+    def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
+        return residual - np.sqrt(rate) * (self.delay_us * 1e-6 * now.frame_rate_hz)

@@ -1,0 +1,28 @@
+"""Dark-current drift: the die warms up after switch-on, and its dark current with it.
+
+    I_dark <- I_dark (1 + a (1 - exp(-t/tau)))
+
+Stage: photodiode.  Seen in: dark recordings: the rate climbs; lit ones hardly.
+Twins: lamp_drift (in the light), random_telegraph_noise (pixel by pixel).
+Source: dark current doubles every 6 to 8 K (Janesick, Photon Transfer); the exponential is first-order warming.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class DarkCurrentDrift(Effect):
+    rise: float = parameter(0.3, unit="relative", bounds=(-1.0, 100.0), doc="final change a over the start")
+    tau_ms: float = parameter(50.0, unit="ms", bounds=(1e-3, 1e8), doc="time constant of the warming")
+
+    stage = Stage.PHOTODIODE
+    strength = "rise"
+
+    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
+        return light, dark * (1.0 - self.rise * math.expm1(-1e3 * now.middle_s / self.tau_ms)), memory

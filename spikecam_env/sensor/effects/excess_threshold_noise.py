@@ -1,0 +1,29 @@
+"""Excess threshold noise: the comparator adds to the noise of a reset, drawn anew at each reset.
+
+    kappa^2 = (sigma_reset^2 + sigma^2) / V_d^2
+
+Stage: threshold.  Seen in: the k-slope of A_k, T^2 kappa^2, above what kT/C and shot noise give.
+Twins: reset_noise (same law, its strength known from C), shot_noise (separated by a second V_d).
+Source: comparator input noise, white and sampled once a spike; about 1 mV rms in CMOS comparators.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.unit import PixelArray
+
+
+@dataclass(frozen=True)
+class ExcessThresholdNoise(Effect):
+    sigma_mV: float = parameter(2.0, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a spike's threshold")
+
+    stage = Stage.THRESHOLD
+    strength = "sigma_mV"
+
+    def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
+        return replace(pixels, reset_noise_mV=math.hypot(pixels.reset_noise_mV, self.sigma_mV))

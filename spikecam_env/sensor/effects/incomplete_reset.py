@@ -1,0 +1,39 @@
+"""Incomplete reset: a reset leaves some charge behind, the more the longer the interval before it.
+
+    charge after a reset = f (1 - exp(-T/tau)) of a threshold,  T: the interval that has just ended
+    steady light: T = (1 - f (1 - exp(-T/tau))) / x;   a long interval is followed by a shorter one
+
+Stage: reset.  Seen in: flats over a wide range of levels; steps of light (the first interval after one is off).
+Twins: photodiode_lag (follows the light, in static light nothing), dead_time (the same at all levels).
+Source: image lag of a soft reset (Pain et al. 2000); exponential filling of slow states assumed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Spikes, Stage, parameter
+
+
+@dataclass(frozen=True)
+class IncompleteReset(Effect):
+    fraction: float = parameter(0.02, unit="relative", bounds=(0.0, 0.5), doc="charge f left after a long interval")
+    tau_us: float = parameter(250.0, unit="us", bounds=(0.1, 1e7), doc="time constant of filling")
+
+    stage = Stage.RESET
+    strength = "fraction"
+
+    def begin(self, first: Exposure, rng: np.random.Generator) -> Array:
+        return np.full(first.shape, -np.inf)
+
+    def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Array) -> tuple[Array, Array]:
+        at = np.flatnonzero(spikes)
+        over = np.clip(charge.flat[at] / np.maximum(rate.flat[at], 1e-12), 0.0, 1.0)
+        crossing, last = now.number + 1.0 - over, memory.copy()
+        tau = self.tau_us * 1e-6 * now.frame_rate_hz
+        left = charge.copy()
+        left.flat[at] -= self.fraction * np.expm1(-(crossing - memory.flat[at]) / tau)
+        last.flat[at] = crossing
+        return left, last

@@ -1,0 +1,36 @@
+"""IR drop: spikes of a row load its supply line, and the threshold of the whole row moves.
+
+    phi_t <- phi (1 + d a_(t-1)),  a: share of the row's pixels that fired in the frame before
+    uniform row, steady light: rate = x (1 - d rate / (1 + d rate)) = x / (1 + d rate)
+
+Stage: threshold.  Seen in: dim pixels beside bright ones in the same row; on flats, as a non-linearity.
+Twins: photo_response_nonlinearity (inseparable on flats), row_temporal_noise, blooming (neighbours, not rows).
+Source: resistance of the supply grid; first order in the current, one frame late by assumption.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Spikes, Stage, parameter
+
+
+@dataclass(frozen=True)
+class IrDrop(Effect):
+    droop: float = parameter(
+        0.005, unit="relative", bounds=(-0.2, 0.2), doc="threshold's rise d when the whole row fires; below 0: a fall"
+    )
+
+    stage = Stage.THRESHOLD
+    strength = "droop"
+
+    def begin(self, first: Exposure, rng: np.random.Generator) -> Array:
+        return np.zeros((first.shape[0], 1))
+
+    def compare(self, threshold: Array, now: Exposure, memory: Array) -> tuple[Array, Array]:
+        return threshold * (1.0 + self.droop * memory), memory
+
+    def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Array) -> tuple[Array, Array]:
+        return charge, spikes.mean(axis=1, keepdims=True)

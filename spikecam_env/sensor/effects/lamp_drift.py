@@ -1,0 +1,43 @@
+"""Lamp drift: the light wanders slowly, for all pixels alike.
+
+    L(t) <- L(t) max(1 + w(t), 0),   w a random walk with w(0) = 0 and variance sigma^2 t
+
+Stage: optics.  Seen in: lit recordings: the population's rate wanders, variance growing with time, dark does not.
+Twins: light_flicker (a line), dark_current_drift (in the dark).
+Source: form assumed; a random walk is the usual model of a free-running source (1/f^2 power, Allan deviation ~ sqrt(t)).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+class Walk(NamedTuple):
+    """at: the walk's value.  rng: what drives it."""
+
+    at: float
+    rng: np.random.Generator
+
+
+@dataclass(frozen=True)
+class LampDrift(Effect):
+    sigma_per_root_s: float = parameter(
+        0.02, unit="1/sqrt(s)", bounds=(0.0, 10.0), doc="relative standard deviation after one second"
+    )
+
+    stage = Stage.OPTICS
+    strength = "sigma_per_root_s"
+
+    def begin(self, first: Exposure, rng: np.random.Generator) -> Walk:
+        return Walk(0.0, rng)
+
+    def collect(self, light: Array, dark: Array, now: Exposure, memory: Walk) -> tuple[Array, Array, Walk]:
+        step = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz) * memory.rng.standard_normal()
+        at = memory.at + step
+        return light * max(1.0 + at, 0.0), dark, Walk(at, memory.rng)

@@ -1,0 +1,30 @@
+"""Light flicker: the lamp's brightness swings with the mains or its driver.
+
+    L(t) <- L(t) (1 + m sin(2 pi (f t + p)))        at the middle of the frame
+
+Stage: optics.  Seen in: any lit recording: a line at f in the population's rate, absent in the dark.
+Twins: supply_ripple (also in the dark, and of opposite sign), lamp_drift (no line).
+Source: lamps on 50 Hz mains swing at 100 Hz, by some per cent (LED) to tens (IEEE 1789); the sine is its first harmonic.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class LightFlicker(Effect):
+    modulation: float = parameter(0.05, unit="relative", bounds=(0.0, 1.0), doc="amplitude m over the mean")
+    frequency_hz: float = parameter(100.0, unit="Hz", bounds=(0.0, 1e6), doc="frequency f")
+    phase_cycles: float = parameter(0.0, unit="cycles", bounds=(0.0, 1.0), doc="phase p at frame 0")
+
+    stage = Stage.OPTICS
+    strength = "modulation"
+
+    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
+        wave = math.sin(2.0 * math.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))
+        return light * (1.0 + self.modulation * wave), dark, memory

@@ -1,0 +1,32 @@
+"""Missed spikes: the read-out loses a spike now and then; the pixel was reset all the same.
+
+    rate <- rate (1 - p);   intervals are now and then the sum of two
+
+Stage: read-out.  Seen in: static light: intervals of twice the length.
+Twins: dead_pixels (for ever), dead_time (all intervals longer, none doubled).
+Source: a flag latched too late or overwritten; independent by assumption.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, parameter
+
+
+@dataclass(frozen=True)
+class MissedSpikes(Effect):
+    probability: float = parameter(1e-3, unit="relative", bounds=(0.0, 1.0), doc="chance p to lose a spike")
+
+    stage = Stage.READOUT
+    strength = "probability"
+
+    def read_out(
+        self, spikes: Spikes, now: Exposure, memory: np.random.Generator
+    ) -> tuple[Spikes, np.random.Generator]:
+        at = np.flatnonzero(spikes)
+        kept = spikes.copy()
+        kept.flat[at] = memory.random(at.size) >= self.probability
+        return kept, memory

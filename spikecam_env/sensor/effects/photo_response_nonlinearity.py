@@ -1,0 +1,26 @@
+"""Photo-response non-linearity: the photodiode collects less than in proportion as light grows.
+
+    x <- x (1 - beta x)        x: charge from light a frame over threshold
+
+Stage: photodiode.  Seen in: flats over a wide range of levels, up to x = 0.6.
+Twins: ir_drop (inseparable on flats), dead_time (T = 1/x + tau), comparator_delay.
+Source: second-order term of the response, EMVA 1288 (linearity error); typical 1 % at full scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class PhotoResponseNonlinearity(Effect):
+    beta: float = parameter(0.01, unit="per threshold a frame", bounds=(-0.25, 0.25), doc="loss at one spike a frame")
+
+    stage = Stage.PHOTODIODE
+    strength = "beta"
+
+    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
+        return light * (1.0 - self.beta * light), dark, memory

@@ -1,0 +1,54 @@
+"""Random telegraph noise: a trap in some pixels switches an extra dark current on and off.
+
+    I_dark(t) += a s(t),  s in {0, 1}, leaving each state at rate 1/dwell
+    count in a window W: variance (a/2)^2 2 (d W - d^2 (1 - exp(-W/d))),  d = dwell/2
+
+Stage: photodiode.  Seen in: dark recordings: counts of these pixels have two levels, windows shorter than the dwell.
+Twins: spurious_spikes (no levels), threshold_flicker_noise (all pixels, also in the light).
+Source: dark-current RTN in irradiated CMOS pixels (Hopkins and Hopkinson 1993); one trap a pixel, even dwell times assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+class Traps(NamedTuple):
+    """pixels: flat indices (n,) of those with a trap.  upper: (n,) which are in the upper state.
+
+    charge: (n,) thresholds a frame in that state.  rng: what switches them.
+    """
+
+    pixels: NDArray[np.intp]
+    upper: NDArray[np.bool_]
+    charge: Array
+    rng: np.random.Generator
+
+
+@dataclass(frozen=True)
+class RandomTelegraphNoise(Effect):
+    amplitude_pA: float = parameter(0.5, unit="pA", bounds=(0.0, 1e4), doc="extra current a in the upper state")
+    fraction: float = parameter(0.02, unit="relative", bounds=(0.0, 1.0), doc="share of pixels with a trap")
+    dwell_ms: float = parameter(10.0, unit="ms", bounds=(1e-3, 1e7), doc="mean time in a state")
+
+    stage = Stage.PHOTODIODE
+    strength = "amplitude_pA"
+
+    def begin(self, first: Exposure, rng: np.random.Generator) -> Traps:
+        pixels = np.flatnonzero(rng.random(first.shape) < self.fraction)
+        charge = first.charge_of(self.amplitude_pA).reshape(-1)[pixels]
+        return Traps(pixels, rng.random(pixels.size) < 0.5, charge, rng)
+
+    def collect(self, light: Array, dark: Array, now: Exposure, memory: Traps) -> tuple[Array, Array, Traps]:
+        leaves = -math.expm1(-2e3 / (self.dwell_ms * now.frame_rate_hz)) / 2.0
+        upper = memory.upper ^ (memory.rng.random(memory.upper.size) < leaves)
+        raised = dark.reshape(-1).copy()
+        raised[memory.pixels] += memory.charge * upper
+        return light, raised.reshape(dark.shape), memory._replace(upper=upper)

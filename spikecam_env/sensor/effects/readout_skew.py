@@ -1,0 +1,36 @@
+"""Read-out skew: rows are read one after the other, the first earlier than the last.
+
+    row r is read s (1 - r/(H - 1)) frames before the end of the frame that its bit is counted in
+
+Stage: read-out.  Seen in: steps of light (a row's response comes up to s frames later), moving edges (a slant).
+Twins: none in static light, where it changes nothing.
+Source: sequential read-out of rows, as in a rolling shutter.  Charge within a frame is taken as collected evenly: a row's
+frame is s' of the frame before and 1 - s' of this one; light before frame 0 as steady.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class ReadoutSkew(Effect):
+    span: float = parameter(0.9, unit="frames", bounds=(0.0, 1.0), doc="time s that reading all rows takes")
+
+    stage = Stage.READOUT
+    strength = "span"
+
+    def begin(self, first: Exposure, rng: np.random.Generator) -> None:
+        return None
+
+    def collect(
+        self, light: Array, dark: Array, now: Exposure, memory: Array | None
+    ) -> tuple[Array, Array, Array | None]:
+        rows = now.shape[0]
+        early = self.span * (1.0 - np.arange(rows)[:, None] / max(rows - 1, 1))
+        before = light if memory is None else memory
+        return (1.0 - early) * light + early * before, dark, light

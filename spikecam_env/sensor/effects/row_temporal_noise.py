@@ -1,0 +1,30 @@
+"""Row temporal noise: the reference line of a row moves, anew every frame.
+
+    fires when charge >= 1 + sigma n_(row, t) / V_d,  n ~ N(0, 1) a row and frame
+
+Stage: threshold.  Seen in: spikes a frame of a row: pixels of one row move together, rows do not.
+Twins: common_threshold_noise (all rows together), row_fixed_pattern (constant in time), ir_drop (follows activity).
+Source: EMVA 1288 release 4 (temporal row noise); a real wall recording shows none above 0.1 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class RowTemporalNoise(Effect):
+    sigma_mV: float = parameter(1.0, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a row's reference")
+
+    stage = Stage.THRESHOLD
+    strength = "sigma_mV"
+
+    def compare(
+        self, threshold: Array, now: Exposure, memory: np.random.Generator
+    ) -> tuple[Array, np.random.Generator]:
+        rows = memory.standard_normal((now.shape[0], 1))
+        return threshold + now.share_of_swing(self.sigma_mV) * rows, memory

@@ -1,0 +1,31 @@
+"""Vignetting: the lens passes less light towards the corners.
+
+    alpha(r) <- alpha (1 - v r^2 / r_corner^2)        r from the middle of the array
+
+Stage: optics.  Seen in: flats: a radial bowl, in proportion to light; absent in the dark.
+Twins: conversion_gain_spread (rough, not radial).
+Source: first order of the cos^4 law, v = 2 tan^2(field angle); measured flat maps show 4 to 5 % of smooth shading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.unit import PixelArray
+
+
+@dataclass(frozen=True)
+class Vignetting(Effect):
+    falloff: float = parameter(0.1, unit="relative", bounds=(0.0, 1.0), doc="light lost in the corners, v")
+
+    stage = Stage.OPTICS
+    strength = "falloff"
+
+    def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
+        rows, columns = pixels.gain.shape
+        y, x = np.mgrid[:rows, :columns]
+        square = (y - (rows - 1) / 2) ** 2 + (x - (columns - 1) / 2) ** 2
+        return replace(pixels, gain=pixels.gain * (1.0 - self.falloff * square / max(square.max(), 1.0)))
