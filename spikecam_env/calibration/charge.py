@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Charge:
-    """electrons: N a nominal threshold.  reset_noise_mV: sigma of a reset.  prior: which of the two was assumed, if any.
+    """electrons: N a nominal threshold.  reset_noise_mV: sigma of a reset.  prior: which of them was assumed.
 
     sd: standard errors, 0 for what is prior.  electrons is inf where the noise is below the reset noise assumed.
     """

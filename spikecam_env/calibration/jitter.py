@@ -34,7 +34,7 @@ class Jitter:
 
     slow_fitted: whether b was kept; it is dropped (0) where it is not four standard errors above nothing.
     weight: (P,) share of each pixel in s^2, which is the mean of their own with these weights.
-    steps, measured, model, sd_measured: (K,) the pooled A_k they were fitted to.
+    steps, by_step, by_step_sd: (K,) what each k alone gives for s^2 + k b / 2; flat without slow noise.
     """
 
     white: float
@@ -44,9 +44,8 @@ class Jitter:
     slow_fitted: bool
     weight: Array
     steps: NDArray[np.int64]
-    measured: Array
-    model: Array
-    sd_measured: Array
+    by_step: Array
+    by_step_sd: Array
 
 
 def second_difference(k: ArrayLike, interval: ArrayLike, white: float, slow: float = 0.0) -> Array:
@@ -93,28 +92,25 @@ def fit_jitter(steps: NDArray[np.int64], square: Array, terms: Array, rate: Arra
         return None
     interval = np.where(usable, 1.0 / np.where(usable, rate, 1.0), 1.0)[..., None]
     both = _fit(steps, square, terms, interval, slow=True)
-    keep = both.slow > 4 * both.slow_sd
+    keep = bool(both.slow > 4 * both.slow_sd)
     fit = both if keep else _fit(steps, square, terms, interval, slow=False)
-    white, slow = fit.white, fit.slow
-    model = second_difference(steps, interval, white, slow)
-    n = terms.sum(axis=(0, 1))
-    used = n > 0
-    per_pixel = (np.where(terms > 0, square - terms * model, 0.0)).sum(axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        measured, expected = square.sum(axis=(0, 1), where=terms > 0) / n, (terms * model).sum(axis=(0, 1)) / n
-        scatter = np.sqrt((per_pixel**2).sum(axis=0)) / n
+    used = terms.sum(axis=(0, 1)) > 0
+    by_step, by_step_sd = _by_step(steps, square, terms, interval, fit)
     return Jitter(
-        white,
-        fit.white_sd,
-        slow,
-        both.slow_sd,
-        bool(keep),
-        fit.weight,
-        steps[used],
-        measured[used],
-        expected[used],
-        scatter[used],
+        fit.white, fit.white_sd, fit.slow, both.slow_sd, keep, fit.weight, steps[used], by_step[used], by_step_sd[used]
     )
+
+
+def _by_step(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array, fit: _Fit) -> tuple[Array, Array]:
+    """What each k alone gives for s^2 + k b / 2, and its standard error, (K,)."""
+    fraction = _quantisation(steps, interval, fit.white)[0]
+    shape = 2 * steps * interval**2
+    weight = shape / np.maximum((fit.white + steps * fit.slow / 2) * shape + fraction, 0.05) ** 2
+    above = (weight * np.where(terms > 0, square - terms * fraction, 0.0)).sum(axis=0)
+    per = (weight * shape * terms).sum(axis=0)
+    total = np.maximum(per.sum(axis=0), 1e-300)
+    value = above.sum(axis=0) / total
+    return value, np.sqrt(((above - value * per) ** 2).sum(axis=0)) / total
 
 
 class _Fit(NamedTuple):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from spikecam_env.sensor import CATALOGUE, Circuit, Effect, SensorModel
+from spikecam_env.sensor.effects.base import build
 
 Array = NDArray[np.float64]
 
@@ -26,9 +27,7 @@ _HOT_SIGMAS = 5.0
 _MISFIT_P = 1e-7
 
 
-def pixel_flags(
-    gain: Array, dark: Array, chi2: Array, freedom: NDArray[np.int64], excess: float
-) -> NDArray[np.uint8]:
+def pixel_flags(gain: Array, dark: Array, chi2: Array, freedom: NDArray[np.int64], excess: float) -> NDArray[np.uint8]:
     """uint8 bits of FLAGS, of the arrays' shape; chi2 is reduced, excess: pooled chi2."""
     flags = np.zeros(gain.shape, dtype=np.uint8)
     unknown = ~np.isfinite(gain)
@@ -98,30 +97,34 @@ def fitted_model(
     per_volt = np.ones_like(gain) if swing_V is None else swing_V / swing_V[good].mean()
     effects: list[Effect] = []
     if np.isfinite(electrons):
-        effects.append(CATALOGUE["shot_noise"](quanta=float(electrons)))
+        effects.append(_effect("shot_noise", quanta=float(electrons)))
     if reset_noise_mV > 0:
-        effects.append(CATALOGUE["reset_noise"](sigma_mV=float(reset_noise_mV)))
-    effects.append(CATALOGUE["conversion_gain_spread"](sigma=spread((gain * per_volt)[good], (gain_sd * per_volt)[good])))
+        effects.append(_effect("reset_noise", sigma_mV=float(reset_noise_mV)))
+    effects.append(_effect("conversion_gain_spread", sigma=spread((gain * per_volt)[good], (gain_sd * per_volt)[good])))
     if swing_V is not None:
-        effects.append(CATALOGUE["bias_voltage_spread"](sigma_V=float(swing_V[good].std())))
+        effects.append(_effect("bias_voltage_spread", sigma_V=float(swing_V[good].std())))
     pA = circuit.capacitance_fF * circuit.swing_V * frame_rate_hz * 1e-3
     known = flags & (FLAGS["unidentified"] | FLAGS["dead"] | FLAGS["misfit"]) == 0
     effects += dark_effects(np.maximum(dark * per_volt, 0.0)[known] * pA, (flags & FLAGS["hot"] > 0)[known])
     dead = np.mean(flags & FLAGS["dead"] > 0)
     if dead > 0:
-        effects.append(CATALOGUE["dead_pixels"](fraction=float(dead)))
+        effects.append(_effect("dead_pixels", fraction=float(dead)))
     return SensorModel(name, circuit, frame_rate_hz, tuple(effects))
 
 
 def dark_effects(current_pA: Array, hot: NDArray[np.bool_]) -> list[Effect]:
     """Effects whose dark current is distributed as these pixels' (P,); hot ones are a population of their own."""
     law = dark_law(current_pA[~hot])
-    effects = [CATALOGUE["dark_current"](mean_pA=law.first)]
+    effects = [_effect("dark_current", mean_pA=law.first)]
     if law.law == "normal":
-        effects.append(CATALOGUE["dark_current_spread"](sigma_pA=law.second))
+        effects.append(_effect("dark_current_spread", sigma_pA=law.second))
     else:
-        effects.append(CATALOGUE["dark_current_tail"](sigma=law.second))
+        effects.append(_effect("dark_current_tail", sigma=law.second))
     if np.any(hot):
         extra = float(np.mean(current_pA[hot] - law.first))
-        effects.append(CATALOGUE["hot_pixels"](fraction=float(np.mean(hot)), mean_pA=extra))
+        effects.append(_effect("hot_pixels", fraction=float(np.mean(hot)), mean_pA=extra))
     return effects
+
+
+def _effect(name: str, **parameters: float) -> Effect:
+    return build(CATALOGUE, name, parameters)

@@ -123,8 +123,8 @@ def together(parts: list[Rates]) -> Rates:
 class Lines:
     """Fitted lines, (P,): gain, dark and their variances and covariance; NaN where two levels are not there.
 
-    chi2, freedom: weighted squared residuals and their degrees of freedom.  residual: (R, P) in standard deviations,
-    NaN where not used.
+    chi2, freedom: weighted squared residuals and their degrees of freedom.  used: recordings in the line.
+    residual: (R, P) distance from the line over its own standard deviation (less than the rate's: the line was drawn through it); NaN where not used or exact.
     """
 
     gain: Array
@@ -134,6 +134,7 @@ class Lines:
     covariance: Array
     chi2: Array
     freedom: NDArray[np.int64]
+    used: NDArray[np.int64]
     residual: Array
 
 
@@ -158,10 +159,15 @@ def fit_lines(light: Array, rates: Rates, white: float, use: NDArray[np.bool_] |
         divisor = np.where(good, determinant, np.nan)
         gain, dark = (sw * slr - sl * sr) / divisor, (sll * sr - sl * slr) / divisor
         expected = np.where(good, np.maximum(gain * light + dark, 1e-6), expected)
-    residual = np.where(told, (measured - gain * light - dark) / np.sqrt(rates.variance(expected, white)), np.nan)
-    chi2 = np.where(fitted, np.nan_to_num(residual) ** 2, 0.0).sum(0)
+    variance = rates.variance(expected, white)
+    distance = measured - gain * light - dark
+    chi2 = np.where(fitted & good, distance**2 / variance, 0.0).sum(0)
+    of_line = (sll - 2 * light * sl + light**2 * sw) / divisor
+    left = variance + np.where(fitted, -of_line, of_line)
+    known = told & (left > 0.01 * variance)
+    residual = np.where(known, distance / np.sqrt(np.where(known, left, 1.0)), np.nan)
     freedom = np.where(good, fitted.sum(0) - 2, 0)
-    return Lines(gain, dark, sw / divisor, sll / divisor, -sl / divisor, chi2, freedom, residual)
+    return Lines(gain, dark, sw / divisor, sll / divisor, -sl / divisor, chi2, freedom, fitted.sum(0), residual)
 
 
 def best_possible(gain: Array, dark: Array, light: Array, frames: Array, white: float | Array) -> tuple[Array, Array]:

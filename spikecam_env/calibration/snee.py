@@ -47,9 +47,10 @@ class Level:
 
 @dataclass(frozen=True)
 class Setting:
-    """All of one V_d.  light, rate: (R, H*W) radiance and measured rates.  Maps are (H, W): gain = alpha/phi [thresholds/frame at radiance 1], dark = I_dark/phi
+    """All of one V_d.  Maps are (H, W): gain = alpha/phi [thresholds/frame at radiance 1], dark = I_dark/phi
     [thresholds/frame], their standard deviations, reduced chi-square, and recordings used.
 
+    light, rate, residual: (R, H*W) radiance, measured rate, and its distance from the line in standard deviations.
     excess: pooled reduced chi-square; where above one, standard deviations were widened by its root.
     """
 
@@ -67,6 +68,7 @@ class Setting:
     jitter: Jitter | None
     light: Array
     rate: Array
+    residual: Array
 
 
 @dataclass(frozen=True)
@@ -222,11 +224,13 @@ def _fit_setting(
         "covariance": widen**2 * lines.covariance,
         "chi2": reduced,
         "flags": flags,
-        "used": np.isfinite(np.where(use[:, None], lines.residual, np.nan)).sum(0),
+        "used": lines.used,
     }
     maps = {name: values.reshape(campaign.shape) for name, values in shaped.items()}
-    levels = _levels(recordings, light, rates, lines)
-    return Setting(v_d, levels, **maps, excess=excess, jitter=jitter, light=light, rate=rates.rate)
+    levels = _levels(recordings, light, rates, lines, flags == 0)
+    return Setting(
+        v_d, levels, **maps, excess=excess, jitter=jitter, light=light, rate=rates.rate, residual=lines.residual
+    )
 
 
 def _check_levels(light: Array, v_d: float | None) -> None:
@@ -277,11 +281,15 @@ def _pooled_excess(lines: Lines) -> float:
 
 
 def _levels(
-    recordings: list[tuple[CampaignRecording, Array]], light: Array, rates: Rates, lines: Lines
+    recordings: list[tuple[CampaignRecording, Array]],
+    light: Array,
+    rates: Rates,
+    lines: Lines,
+    regular: NDArray[np.bool_],
 ) -> tuple[Level, ...]:
     fitted = lines.gain * light + lines.dark
     with np.errstate(invalid="ignore", divide="ignore"):
-        off = np.where(rates.saturated, np.nan, rates.rate / fitted - 1.0)
+        off = np.where(rates.saturated | ~regular, np.nan, rates.rate / fitted - 1.0)
     return tuple(
         Level(
             r.name,
