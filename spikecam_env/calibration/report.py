@@ -26,7 +26,8 @@ table { border-collapse: collapse; margin: .7em 0 }
 td, th { padding: .25em .8em; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top }
 td.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap }
 img { max-width: 100% } figure { margin: 1em 0 } figcaption { color: #555 }
-.identified { color: #14663a } .assumed { color: #8a5a00 } .not { color: #9a1c1c } .warn { background: #fff4d6; padding: .5em 1em }
+.identified { color: #14663a } .assumed { color: #8a5a00 } .not { color: #9a1c1c }
+.warn { background: #fff4d6; padding: .5em 1em }
 """
 
 
@@ -44,15 +45,15 @@ def report(calibration: Calibration, findings: Sequence[Finding]) -> str:
         _findings_table(findings),
     ]
     figures: list[tuple[str, Callable[[Figure, Setting, Calibration], None], tuple[float, float], str]] = [
-        ("Response", _response, (10, 4), "Left: rate over light of 40 pixels and the median pixel's line. Right: what each "
-         "label is off by, were the line exact: points are medians over pixels, the bar is 10 to 90 % of them."),
-        ("Residuals", _residuals, (10, 3.6), "Left: residuals of all pixels and levels in standard deviations of the law, "
-         "with a normal curve. Right: reduced chi-square of each pixel."),
-        ("Temporal noise", _noise, (10, 4), "A_k less what reading in whole frames adds, pooled over pixels and levels, "
-         "and the fitted law. A straight line is noise drawn anew for each spike."),
+        ("Response", _response, (10, 4), "Left: rate over light of 40 pixels and the median pixel's line. "
+         "Right: what each label is off by, were the line exact: medians over pixels, bars from 10 to 90 % of them."),
+        ("Residuals", _residuals, (10, 3.6), "Left: residuals of all pixels and levels in standard deviations of the "
+         "law, with a normal curve. Right: reduced chi-square of each pixel."),
+        ("Temporal noise", _noise, (10, 4), "A_k less what reading in whole frames adds, pooled over pixels and "
+         "levels, and the fitted law. A straight line is noise drawn anew for each spike."),
         ("Maps", _maps, (10, 4), "alpha/phi and I_dark/phi of every pixel, and which pixels are odd."),
-        ("Distributions", _histograms, (10, 3.6), "Regular pixels; the dark level on a logarithmic axis with normal and "
-         "log-normal of the same moments."),
+        ("Distributions", _histograms, (10, 3.6), "Regular pixels; the dark level on a logarithmic axis with normal "
+         "and log-normal of the same moments."),
     ]  # fmt: skip
     for setting in c.settings:
         for title, draw, size, caption in figures:
@@ -84,10 +85,12 @@ def _findings_table(findings: Sequence[Finding]) -> str:
 
 
 def _levels_table(setting: Setting) -> str:
-    head = "<tr><th>recording</th><th>use</th><th>frames</th><th>radiance</th><th>rate</th><th>saturated</th><th>off</th></tr>"
+    names = ("recording", "use", "frames", "radiance", "rate", "saturated", "off")
+    head = f"<tr>{''.join(f'<th>{name}</th>' for name in names)}</tr>"
     lines = [
-        f'<tr><td>{html.escape(v.name)}</td><td>{v.use}</td><td class="n">{v.frames}</td><td class="n">{v.radiance:.4g}</td>'
-        f'<td class="n">{v.rate:.5f}</td><td class="n">{v.saturated:.1%}</td><td class="n">{v.residual:+.2e}</td></tr>'
+        f'<tr><td>{html.escape(v.name)}</td><td>{v.use}</td><td class="n">{v.frames}</td>'
+        f'<td class="n">{v.radiance:.4g}</td><td class="n">{v.rate:.5f}</td>'
+        f'<td class="n">{v.saturated:.1%}</td><td class="n">{v.residual:+.2e}</td></tr>'
         for v in setting.levels
     ]
     return f"<table>{head}{''.join(lines)}</table>"
@@ -105,9 +108,8 @@ def _figure(
     held = io.BytesIO()
     figure.savefig(held, format="png", dpi=110)
     data = base64.b64encode(held.getvalue()).decode("ascii")
-    return (
-        f'<figure><img alt="{caption}" src="data:image/png;base64,{data}"><figcaption>{caption}</figcaption></figure>'
-    )
+    image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
+    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
 
 
 def _response(figure: Figure, s: Setting, c: Calibration) -> None:
@@ -185,7 +187,7 @@ def _histograms(figure: Figure, s: Setting, c: Calibration) -> None:
     dark = s.dark[good & (s.dark > 0)]
     if dark.size < 2 or dark.max() <= dark.min():
         return
-    edges = np.geomspace(max(dark.min(), dark.max() * 1e-4), dark.max(), 60)
+    edges = np.geomspace(0.5 * np.quantile(dark, 0.02), dark.max(), 50)
     right.hist(dark, edges, density=True, color="tab:blue", alpha=0.6)
     logs = np.log(dark)
     bell = np.exp(-((np.log(edges) - logs.mean()) ** 2) / (2 * logs.var())) / (edges * np.sqrt(2 * np.pi * logs.var()))

@@ -23,7 +23,7 @@ from spikecam_env.calibration.spike_times import SpikeTimes
 Array = NDArray[np.float64]
 
 SATURATION = 0.97
-"""Rate above which a recording of a pixel is left out: with jitter some intervals are below a frame, and one is lost."""
+"""Rate above which a recording of a pixel is left out: jitter makes some intervals shorter than a frame: lost."""
 
 _ITERATIONS = 4
 
@@ -71,7 +71,7 @@ def rates_from_times(times: list[SpikeTimes]) -> Rates:
     rate, ends = _rate_between_ends(count, first, last, frames[:, None])
     after = np.where(count == 1, first + 0.5, 0.0)
     empty = np.maximum(after, frames[:, None] - after)
-    rate = np.where(count == 0, 1 / (3 * empty), np.where(count == 1, 2 / (3 * empty), rate))
+    rate = np.where(count > 1, rate, np.where(count == 1, 2.0, 1.0) / (3 * empty))
     limit = np.where(count <= 1, 1 / (np.sqrt(18.0) * empty), np.nan)
     counted = np.zeros(len(times), dtype=bool)
     return Rates(rate, count - 1.0, ends, limit, frames, counted, count / frames[:, None] > SATURATION)
@@ -87,7 +87,7 @@ def _rate_between_ends(
         begin, begin_variance = _within_frame(first, span / intervals)
         end, end_variance = _within_frame(frames - 1 - last, span / intervals)
         span = np.where(count > 1, frames - end - begin, 1.0)
-    return intervals / span, begin_variance + end_variance
+    return np.asarray(intervals / span, dtype=np.float64), begin_variance + end_variance
 
 
 def _within_frame(frame: Array | NDArray[np.int64], interval: Array) -> tuple[Array, Array]:
@@ -97,7 +97,7 @@ def _within_frame(frame: Array | NDArray[np.int64], interval: Array) -> tuple[Ar
 
 
 def rates_from_counts(rate: Array, frames: float) -> Rates:
-    """One recording (1, P) of rates only: its count is known to the ends of the recording, variance 1/6 and the walk."""
+    """One recording (1, P) of rates only: counts to the ends of it, variance 1/6 and the walk."""
     return Rates(
         rate[None],
         rate[None] * frames,
@@ -124,7 +124,8 @@ class Lines:
     """Fitted lines, (P,): gain, dark and their variances and covariance; NaN where two levels are not there.
 
     chi2, freedom: weighted squared residuals and their degrees of freedom.  used: recordings in the line.
-    residual: (R, P) distance from the line over its own standard deviation (less than the rate's: the line was drawn through it); NaN where not used or exact.
+    residual: (R, P) distance from the line over its own standard deviation, which is less than the rate's, since the
+    line was drawn through it; NaN where not used or exact.
     """
 
     gain: Array

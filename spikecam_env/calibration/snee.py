@@ -8,7 +8,9 @@ alpha, C_S and I_dark in ampere stay prior: rates know charge only in thresholds
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +35,7 @@ Z90 = 1.6448536
 class Level:
     """One recording's part.  radiance, rate: medians over pixels.  saturated: share of pixels left out for it.
 
-    residual: median over pixels of measured over fitted rate, less one: what the label is wrong by, if the line is right.
+    residual: median over pixels of measured over fitted rate, less one: the label's error, if the line is right.
     """
 
     name: str
@@ -216,7 +218,7 @@ def _fit_setting(
         jitter = _pooled_jitter(spikes, flags == 0) or jitter
     if jitter is not None and jitter.slow_fitted:
         warnings.append(f"A_k rises with k^2 too: slow noise, b = {jitter.slow:.2g} +- {jitter.slow_sd:.1g}")
-    shaped = {
+    shaped: dict[str, Any] = {
         "gain": lines.gain,
         "gain_sd": widen * np.sqrt(lines.var_gain),
         "dark": lines.dark,
@@ -253,7 +255,7 @@ def _check_order(
     if lit.size and lit.max() <= 2 / rates.frames.max():
         raise InputError("no pixel responds to light in any recording: was the cap on, or are these the right files?")
     order = np.argsort(label, kind="stable")
-    for a, b in zip(order, order[1:], strict=False):
+    for a, b in pairwise(order):
         if label[b] > label[a] and rate[b] < 0.99 * rate[a] - 2 / min(rates.frames[a], rates.frames[b]):
             raise InputError(
                 f"recordings {recordings[a][0].name!r} and {recordings[b][0].name!r} contradict their labels: radiance "

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numba import config, njit
@@ -55,7 +56,7 @@ def spike_times(
     workers = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
     cuts = np.linspace(0, bits.shape[1], max(1, min(workers, bits.shape[1])) + 1).astype(int)
     with ThreadPoolExecutor(len(cuts) - 1) as pool:
-        jobs = [pool.submit(_scan, bits, a, b, ks, ends, square, terms) for a, b in zip(cuts, cuts[1:], strict=False)]
+        jobs = [pool.submit(_scan, bits, a, b, ks, ends, square, terms) for a, b in pairwise(cuts)]
         for job in jobs:
             job.result()
     count, first, last = ends[:pixels].T
