@@ -4,8 +4,8 @@
     while charge >= threshold:  spike;  charge -= threshold;  threshold = 1 + kappa n      (drawn at each reset)
 
 Reset is asynchronous: charge after the crossing is kept.  A frame reports one bit; further crossings in it are lost.
-Charge is in grains of the pixel's own threshold (`light`), so without noise all sums are exact integers.  Effects see it
-in thresholds, a power of two away, so that to go there and back changes no bit.
+Charge is in grains of the pixel's own threshold (`light`), so without noise all sums are exact integers.  Effects see
+it in thresholds, a power of two away, so that to go there and back changes no bit.
 """
 
 from __future__ import annotations

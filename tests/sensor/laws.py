@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
+from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor
 
 Array = NDArray[np.float64]
 
@@ -42,3 +42,37 @@ def check_mean(name: str, values: Array, expected: float, groups: int = 40, limi
     z = (means.mean() - expected) / error
     print(f"{name}: {means.mean():.6g}, expected {expected:.6g} +- {error:.2g} (z = {z:+.2f})")
     assert abs(z) < limit
+
+
+def with_effects(base: str, *effects: Effect) -> SensorModel:
+    """A preset with effects added."""
+    model = SensorModel.preset(base)
+    for effect in effects:
+        model = model.with_effect(effect)
+    return model
+
+
+def camera(
+    name: str, shape: tuple[int, int], seed: int = 0, engine: str = "auto", base: str = "ideal", **parameters: float
+) -> SpikeSensor:
+    """An ideal camera with one effect of the catalogue."""
+    return SpikeSensor(with_effects(base, CATALOGUE[name](**parameters)), shape, seed, engine)
+
+
+def rates(sensor: SpikeSensor, light: float | Array, frames: int) -> Array:
+    """Spikes a frame (H, W) under steady light, counted over `frames` frames."""
+    picture = np.broadcast_to(np.float32(light), sensor.shape)
+    return sensor.step(picture, frames).mean(axis=0)
+
+
+def population(sensor: SpikeSensor, light: float, frames: int) -> Array:
+    """Share of the array that fires in each frame (frames,) under steady light, alike everywhere."""
+    picture = np.full(sensor.shape, light, dtype=np.float32)
+    shares = [sensor.step(picture, min(64, frames - n)).mean(axis=(1, 2)) for n in range(0, frames, 64)]
+    return np.concatenate(shares)
+
+
+def check(name: str, value: float, expected: float, tolerance: float) -> None:
+    """`value` is `expected` within `tolerance`; prints all three."""
+    print(f"{name}: {value:.6g}, expected {expected:.6g} +- {tolerance:.2g}")
+    assert abs(value - expected) <= tolerance

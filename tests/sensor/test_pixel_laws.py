@@ -114,37 +114,6 @@ def test_dark_current_rate_is_charge_over_threshold(engine: str) -> None:
     assert abs(expected - 0.00234) < 1e-5
 
 
-def test_synchronous_reset_locks_intervals_to_whole_frames() -> None:
-    """Lag-1 = 0, mean interval + 1/2, intervals ceil(T)."""
-    model = SensorModel.preset("ideal").with_effect(CATALOGUE["synchronous_reset"]())
-    intervals = np.linspace(4.0, 5.0, 400, endpoint=False) + 1e-4
-    gaps = np.diff(spike_frames(model, intervals, 20, "reference", slack=1.4), axis=1)
-    assert np.array_equal(gaps, np.broadcast_to(np.ceil(intervals)[:, None], gaps.shape))
-    assert abs((gaps - intervals[:, None]).mean() - 0.5) < 2e-3
-
-
-def test_dead_time_lengthens_every_interval_by_tau() -> None:
-    """T = 1/x + tau: at x = 0.5 and 2.5 us, 0.1 frames, the mean interval is 2.1."""
-    model = SensorModel.preset("ideal").with_effect(CATALOGUE["dead_time"](tau_us=2.5))
-    t = spike_frames(model, np.full(50, 2.0), 500, "reference")
-    mean = (t[:, -1] - t[:, 0]).mean() / 499
-    print(f"mean interval {mean:.5f}")
-    assert abs(mean - 2.1) < 1.0 / 499
-
-
-def test_frame_threshold_noise_shortens_dim_intervals() -> None:
-    """Of many draws before a crossing the lowest wins, so the mean interval falls below T, the more the dimmer."""
-    model = SensorModel.preset("ideal").with_effect(CATALOGUE["frame_threshold_noise"](sigma_mV=30.0))
-    shortening = []
-    for interval in (3.0, 30.0, 300.0):
-        t = spike_frames(model, np.full(200, interval), 12, "reference", slack=1.5)
-        ratio = (t[:, -1] - t[:, 0]) / (11 * interval)
-        shortening.append((1 - ratio.mean(), ratio.std() / np.sqrt(ratio.size)))
-    print("shortening at T = 3, 30, 300:", [f"{m:.4f} +- {e:.4f}" for m, e in shortening])
-    for (dim, e1), (bright, e0) in zip(shortening[1:], shortening[:-1], strict=True):
-        assert dim - bright > 4 * np.hypot(e0, e1)
-
-
 @pytest.mark.parametrize("preset, percent", [("scsim", 0.734), ("physical", 0.588)])
 def test_noise_per_spike_of_the_presets(preset: str, percent: float) -> None:
     unit = SensorModel.preset(preset).without("bias_voltage_spread").without("capacitor_spread").draw_unit((1, 1), 0)

@@ -109,6 +109,8 @@ class Effect:
                 raise InputError(
                     f"{self.name}.{f.name} = {value!r} is outside {bounds[0]:g} .. {bounds[1]:g} {f.metadata['unit']}"
                 )
+            if isinstance(f.default, int) and not number.is_integer():
+                raise InputError(f"{self.name}.{f.name} = {value!r} must be a whole number")
 
     @classmethod
     def neutralised(cls) -> Effect:
@@ -150,7 +152,7 @@ class Effect:
         return threshold, memory
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
-        """Charge left after a reset on the pixels that fired (n,), given the charge over threshold and the charge a frame."""
+        """Charge left on the pixels that fired (n,), given what is over their threshold and their charge a frame."""
         return residual
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:

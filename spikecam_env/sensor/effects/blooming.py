@@ -4,7 +4,7 @@
 
 Stage: photodiode.  Seen in: pictures with lights brighter than one spike a frame: a halo in the pixels next to them.
 Twins: optical_blur (at all levels), crosstalk (at all rates).
-Source: overflow model of CCD and CMOS texts (Janesick, Photon Transfer).  Light counts up to x = 2 only, the engines' cap.
+Source: overflow model of CCD and CMOS texts (Janesick, Photon Transfer).  Light counts up to x = 2, the engines' cap.
 """
 
 from __future__ import annotations

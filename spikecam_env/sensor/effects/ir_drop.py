@@ -1,9 +1,10 @@
 """IR drop: spikes of a row load its supply line, and the threshold of the whole row moves.
 
     phi_t <- phi (1 + d a_(t-1)),  a: share of the row's pixels that fired in the frame before
-    uniform row, steady light: rate = x (1 - d rate / (1 + d rate)) = x / (1 + d rate)
+    uniform row, steady light: rate = x / (1 + d rate)
 
 Stage: threshold.  Seen in: dim pixels beside bright ones in the same row; on flats, as a non-linearity.
+Pixels of a row that are exactly alike and free of noise fall into step (pulse-coupled oscillators).
 Twins: photo_response_nonlinearity (inseparable on flats), row_temporal_noise, blooming (neighbours, not rows).
 Source: resistance of the supply grid; first order in the current, one frame late by assumption.
 """

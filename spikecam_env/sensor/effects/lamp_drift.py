@@ -4,7 +4,7 @@
 
 Stage: optics.  Seen in: lit recordings: the population's rate wanders, variance growing with time, dark does not.
 Twins: light_flicker (a line), dark_current_drift (in the dark).
-Source: form assumed; a random walk is the usual model of a free-running source (1/f^2 power, Allan deviation ~ sqrt(t)).
+Source: form assumed; a random walk is the usual model of a free-running source (power as 1/f^2).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 Stage: optics.  Seen in: any lit recording: a line at f in the population's rate, absent in the dark.
 Twins: supply_ripple (also in the dark, and of opposite sign), lamp_drift (no line).
-Source: lamps on 50 Hz mains swing at 100 Hz, by some per cent (LED) to tens (IEEE 1789); the sine is its first harmonic.
+Source: lamps on 50 Hz mains swing at 100 Hz, by per cents (LED) to tens of them (IEEE 1789); here its first harmonic.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """Read-out skew: rows are read one after the other, the first earlier than the last.
 
-    row r is read s (1 - r/(H - 1)) frames before the end of the frame that its bit is counted in
+    row r is read e = s (1 - r/(H - 1)) frames before the end of the frame that its bit is counted in
+    light of its frame: x_t <- (1 - e) x_t + e x_(t-1)
 
-Stage: read-out.  Seen in: steps of light (a row's response comes up to s frames later), moving edges (a slant).
-Twins: none in static light, where it changes nothing.
-Source: sequential read-out of rows, as in a rolling shutter.  Charge within a frame is taken as collected evenly: a row's
-frame is s' of the frame before and 1 - s' of this one; light before frame 0 as steady.
+Stage: read-out.  Seen in: steps of light (a row's response comes up to s frames later), moving edges (a slant);
+nothing in static light.
+Source: sequential read-out of rows, as in a rolling shutter.  Light within a frame, and before
+frame 0, is taken as steady.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
     phi(t) <- phi (1 + rho sin(2 pi (f t + p)));   slow ripple: rate = x / (1 + rho sin)
 
-Stage: threshold.  Seen in: light and dark: a line at f in the population's rate, of relative amplitude rho at all levels.
+Stage: threshold.  Seen in: light and dark: a line at f in the population's rate, amplitude rho at all levels.
 Twins: light_flicker (dark separates them), common_threshold_noise (no line).
 Source: rectified mains ripples at 100 or 120 Hz, converters from 100 kHz; 0.1 % of the supply is typical.
 """

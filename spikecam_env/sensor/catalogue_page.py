@@ -1,0 +1,166 @@
+"""The catalogue of effects as a page, made from the effects' own declarations.
+
+python -m spikecam_env.sensor.catalogue_page docs/effects.md
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+import sys
+from dataclasses import Field, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from spikecam_env.errors import InputError
+from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
+
+SECTIONS = ("Stage", "Seen in", "Twins", "Source")
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What an effect's module says of it: its first line, the law (indented as it stands), and the named sections."""
+
+    summary: str
+    law: str
+    sections: dict[str, str]
+
+    @classmethod
+    def of(cls, effect: type[Effect]) -> Sheet:
+        """Read a module's docstring; raises InputError where it has no law."""
+        text = inspect.getdoc(sys.modules[effect.__module__]) or ""
+        head, *rest = re.split(rf"\b({'|'.join(SECTIONS)}):\s", text)
+        summary, _, law = head.partition("\n")
+        if "    " not in law:
+            raise InputError(
+                f"the docstring of {effect.name} has no indented equation; write its law below the first line"
+            )
+        named = {name: " ".join(body.split()) for name, body in zip(rest[::2], rest[1::2], strict=True)}
+        return cls(summary.strip(), law.strip("\n").rstrip(), named)
+
+    @property
+    def twins(self) -> tuple[str, ...]:
+        """Catalogue names that the twins section speaks of."""
+        return tuple(word for word in re.findall(r"\w+", self.sections.get("Twins", "")) if word in CATALOGUE)
+
+
+def page() -> str:
+    """The whole page, Markdown."""
+    stages = {stage: [e for e in CATALOGUE.values() if e.stage is stage] for stage in Stage}
+    return "\n".join([_HEAD, _contents(stages), *(_chapter(stage, of) for stage, of in stages.items()), _TAIL])
+
+
+def main() -> None:
+    """Write the page to the file named on the command line; it appears whole."""
+    if len(sys.argv) != 2:
+        raise SystemExit("usage: python -m spikecam_env.sensor.catalogue_page docs/effects.md")
+    beside = Path(f"{sys.argv[1]}.part")
+    beside.write_text(page(), encoding="utf-8")
+    os.replace(beside, sys.argv[1])
+
+
+def _contents(stages: dict[Stage, list[type[Effect]]]) -> str:
+    rows = [f"| {_title(stage)} | {', '.join(f'[{e.name}](#{e.name})' for e in of)} |" for stage, of in stages.items()]
+    return "\n".join(["| stage | effects |", "|---|---|", *rows, ""])
+
+
+def _chapter(stage: Stage, effects: list[type[Effect]]) -> str:
+    return "\n".join([f"## {_title(stage).capitalize()}", "", *map(_entry, effects)])
+
+
+def _entry(effect: type[Effect]) -> str:
+    sheet = Sheet.of(effect)
+    said = [f"- {name}: {text}" for name, text in sheet.sections.items() if name != "Stage"]
+    return "\n".join(
+        [
+            f"### {effect.name}",
+            "",
+            sheet.summary,
+            "",
+            "```",
+            inspect.cleandoc(sheet.law),
+            "```",
+            "",
+            "| parameter | default | unit | bounds | meaning |",
+            "|---|---|---|---|---|",
+            *(_row(f, effect) for f in fields(effect)),
+            "",
+            *said,
+            f"- Engines: {'all' if effect.is_fixed() else 'reference'}",
+            "",
+        ]
+    )
+
+
+def _row(f: Field[Any], effect: type[Effect]) -> str:
+    low_high = f.metadata["bounds"]
+    bounds = "" if low_high is None else f"{low_high[0]:g} .. {low_high[1]:g}"
+    strength = f"; **strength**, {effect.neutral:g} changes nothing" if f.name == effect.strength else ""
+    default = f"{f.default:.5g}" if isinstance(f.default, float) else str(f.default).lower()
+    return f"| `{f.name}` | {default} | {f.metadata['unit']} | {bounds} | {f.metadata['doc']}{strength} |"
+
+
+def _title(stage: Stage) -> str:
+    return {Stage.READOUT: "read-out"}.get(stage, stage.name.lower())
+
+
+_HEAD = """# Effects
+
+Made by `python -m spikecam_env.sensor.catalogue_page docs/effects.md` from the effects' own files, one a file in
+`spikecam_env/sensor/effects`; a test keeps it up to date. Do not edit it.
+
+Effects act in physical order, whatever order a model lists them in. x is the charge of a frame over the threshold phi,
+T the mean interval in frames, N the electrons to a threshold, kappa the relative noise of a spike's threshold; A_k is
+E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of spike times t. At the strength said to change nothing, no bit changes.
+"""
+
+_TAIL = '''## Adding an effect
+
+One new file. `spikecam_env/sensor/effects/slow_shutter.py`:
+
+```python
+"""Slow shutter: the light comes on over the first frames.
+
+    x <- x (1 - exp(-t/tau))
+
+Stage: optics.  Seen in: the first frames of a recording.  Twins: lamp_drift.  Source: a shutter's data sheet.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class SlowShutter(Effect):
+    tau_us: float = parameter(500.0, unit="us", bounds=(0.0, 1e6), doc="time to open")
+
+    stage = Stage.OPTICS
+    strength = "tau_us"
+
+    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
+        open_by_now = -math.expm1(-1e6 * now.middle_s / self.tau_us) if self.tau_us else 1.0
+        return light * open_by_now, dark, memory
+```
+
+That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))` and `[[effect]]`
+in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
+anew. The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
+changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
+cut, saved and restored; docs, bounds, twins that exist; and a test of your own, `test_slow_shutter_...`, of its law.
+
+Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
+carries them); `collect`, `compare`, `after_reset`, `spiked`, `read_out` for what happens from frame to frame. What must
+be remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator of the
+effect's own, so that no other effect's draws change. Time is `now.number`, absolute, never a count of calls.
+'''
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+"""What every effect of the catalogue owes, by its declaration alone."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import pickle
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laws import camera, population, with_effects
+
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor, catalogue_page
+from spikecam_env.sensor.catalogue_page import SECTIONS, Sheet
+from spikecam_env.sensor.effects.base import Exposure
+
+SHAPE = (10, 12)
+EVERY = sorted(CATALOGUE)
+
+
+def moving_light(brightest: float = 1.2) -> Keyframes:
+    """Light of all levels that moves, some of it dark, some saturated."""
+    keys = np.arange(0, 161, 16)
+    light = np.random.default_rng(0).uniform(-0.1, brightest, (keys.size, *SHAPE))
+    return Keyframes(keys, np.maximum(light, 0.0))
+
+
+def stream(model: SensorModel, engine: str = "reference") -> np.ndarray:
+    return SpikeSensor(model, SHAPE, 4, engine).step(moving_light(), 160)
+
+
+@pytest.mark.parametrize("base", ["ideal", "scsim"])
+@pytest.mark.parametrize("name", EVERY)
+def test_strength_zero_changes_no_bit(name: str, base: str) -> None:
+    model = SensorModel.preset(base)
+    if base == "scsim" and name in {e.name for e in model.effects}:
+        model = model.without(name)
+    neutral = model.with_effect(CATALOGUE[name].neutralised())
+    np.testing.assert_array_equal(stream(neutral), stream(model))
+    if CATALOGUE[name].is_fixed():
+        np.testing.assert_array_equal(stream(neutral, "fast"), stream(model, "fast"))
+
+
+def test_all_effects_at_strength_zero_together_change_no_bit() -> None:
+    """Nor do they draw from the base model's noise, which each has a generator of its own to spare."""
+    scsim = SensorModel.preset("scsim")
+    others = [e.neutralised() for e in CATALOGUE.values() if e.name not in {own.name for own in scsim.effects}]
+    np.testing.assert_array_equal(stream(with_effects("scsim", *others)), stream(scsim))
+
+
+def strong(name: str):
+    """The effect at a strength that shows in a few frames: 400 times the default, up to half its bound."""
+    effect = CATALOGUE[name]
+    bounds = {f.name: f.metadata["bounds"] for f in fields(effect)}[effect.strength]
+    if math.isinf(effect.neutral):
+        return effect(**{effect.strength: 50.0})
+    default = getattr(effect(), effect.strength)
+    return effect(**{effect.strength: min(400 * default, bounds[1] / 2)})
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_strong_effect_changes_bits_the_same_however_cut_saved_and_restored(name: str) -> None:
+    model = with_effects("scsim", strong(name))
+    light = moving_light(brightest=3.0)
+    whole = SpikeSensor(model, SHAPE, 4, "reference").step(light, 160)
+    assert not np.array_equal(whole, SpikeSensor("scsim", SHAPE, 4, "reference").step(light, 160))
+    sensor = SpikeSensor(model, SHAPE, 4, "reference")
+    parts = [sensor.step(light, n) for n in (1, 1, 30, 5, 43)]
+    state = pickle.loads(pickle.dumps(sensor.state()))
+    rest = sensor.step(light, 80)
+    np.testing.assert_array_equal(np.concatenate([*parts, rest]), whole)
+    other = SpikeSensor(model, SHAPE, 99, "reference")
+    other.restore(state)
+    np.testing.assert_array_equal(other.step(light, 80), rest)
+    sensor.restore(state)
+    np.testing.assert_array_equal(sensor.step(light, 80), rest)
+    sensor.reset()
+    np.testing.assert_array_equal(sensor.step(light, 160), whole)
+
+
+def frozen(memory):
+    """The same, its arrays read-only."""
+    for part in memory if isinstance(memory, tuple) else (memory,):
+        if isinstance(part, tuple):
+            frozen(part)
+        elif isinstance(part, np.ndarray):
+            part.flags.writeable = False
+    return memory
+
+
+@pytest.mark.parametrize("name", [n for n in EVERY if not CATALOGUE[n].is_fixed()])
+def test_hooks_change_nothing_in_place_and_keep_shapes(name: str) -> None:
+    effect, rng = strong(name), np.random.default_rng(0)
+    first = Exposure(0, 40_000.0, SHAPE, SensorModel.preset("scsim").draw_unit(SHAPE, 0))
+    memory = frozen(effect.begin(first, np.random.default_rng(1)))
+    for number in range(5):
+        now = replace(first, number=number)
+        light, dark, threshold, charge, rate = frozen(tuple(rng.random((5, *SHAPE))))
+        spikes = frozen(rng.random(SHAPE) < 0.3)
+        *charges, memory = effect.collect(light, dark, now, frozen(memory))
+        compared, memory = effect.compare(threshold, now, frozen(memory))
+        residual = effect.after_reset(frozen(charge[spikes]), frozen(rate[spikes]), now)
+        left, memory = effect.spiked(charge, spikes, rate, now, frozen(memory))
+        read, memory = effect.read_out(spikes, now, frozen(memory))
+        assert all(a.shape == SHAPE and a.dtype == np.float64 for a in (*charges, compared, left))
+        assert residual.shape == (spikes.sum(),) and read.shape == SHAPE and read.dtype == np.bool_
+
+
+def test_all_effects_at_once_are_one_stream_however_cut() -> None:
+    model = with_effects("scsim", *(strong(name) for name in EVERY))
+    light = moving_light()
+    whole = SpikeSensor(model, SHAPE, 4, "auto").step(light, 160)
+    sensor = SpikeSensor(model, SHAPE, 4, "auto")
+    np.testing.assert_array_equal(np.concatenate([sensor.step(light, n) for n in (7, 1, 120, 32)]), whole)
+    assert 0.01 < whole.mean() < 0.99
+
+
+@pytest.mark.parametrize("name", [n for n in EVERY if CATALOGUE[n].is_fixed()])
+def test_fast_engine_carries_what_does_nothing_from_frame_to_frame(name: str) -> None:
+    """Fixed patterns and optics: the reference's bits, with the temporal noise taken away."""
+    model = with_effects("ideal", CATALOGUE["dark_current"](), strong(name))
+    for temporal in {"shot_noise", "reset_noise", "excess_threshold_noise"} & {name}:
+        model = model.without(temporal)
+    assert SpikeSensor(model, SHAPE, engine="auto").engine == "fast"
+    np.testing.assert_array_equal(stream(model, "fast"), stream(model, "reference"))
+
+
+@pytest.mark.parametrize("name", [n for n in EVERY if not CATALOGUE[n].is_fixed()])
+def test_fast_engine_refuses_the_rest_by_name(name: str) -> None:
+    model = with_effects("ideal", CATALOGUE[name]())
+    assert SpikeSensor(model, SHAPE, engine="auto").engine == "reference"
+    with pytest.raises(InputError, match=f"does not carry {name}"):
+        SpikeSensor(model, SHAPE, engine="fast")
+
+
+def test_clean_twin_has_no_effects() -> None:
+    sensor = SpikeSensor(with_effects("scsim", *(e() for e in CATALOGUE.values())), SHAPE, 4, "auto")
+    assert sensor.clean_twin().model.effects == ()
+    ideal = SpikeSensor("ideal", SHAPE, 4, "reference").step(moving_light(), 160)
+    np.testing.assert_array_equal(sensor.clean_twin().step(moving_light(), 160), ideal)
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_is_documented(name: str) -> None:
+    effect = CATALOGUE[name]
+    sheet = Sheet.of(effect)
+    assert {"Stage", "Seen in", "Source"} <= set(sheet.sections) <= set(SECTIONS)
+    assert sheet.sections["Stage"].rstrip(".").replace("-", "").upper() == effect.stage.name
+    assert all(f.metadata["doc"] and f.metadata["unit"] is not None for f in fields(effect))
+    if "Twins" in sheet.sections:
+        assert sheet.twins and name not in sheet.twins
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_is_bounded(name: str) -> None:
+    effect = CATALOGUE[name]
+    bounds = {f.name: f.metadata["bounds"] for f in fields(effect) if f.metadata["bounds"]}
+    low, high = bounds[effect.strength]
+    assert low <= effect.neutral <= high
+    for parameter, (low, high) in bounds.items():
+        for bad in (low - 1, high + 1, float("nan"), "much"):
+            if bad != math.inf:
+                with pytest.raises(InputError, match=f"{name}.{parameter}"):
+                    effect(**{parameter: bad})
+
+
+@pytest.mark.parametrize("name, parameter", [("afterpulsing", "delay_frames"), ("threshold_flicker_noise", "octaves")])
+def test_whole_numbers_are_asked_for(name: str, parameter: str) -> None:
+    with pytest.raises(InputError, match=f"{name}.{parameter} = 2.5 must be a whole number"):
+        CATALOGUE[name](**{parameter: 2.5})
+
+
+def test_every_effect_has_a_test_of_its_own() -> None:
+    text = "".join(p.read_text(encoding="utf-8") for p in Path(__file__).parent.glob("test_*.py"))
+    missing = [n for n in EVERY if not re.search(rf"^def test_{n}_", text, flags=re.MULTILINE)]
+    assert not missing, f"no test_<name>_... in tests/sensor/effects for {', '.join(missing)}"
+
+
+def test_page_of_effects_is_up_to_date() -> None:
+    shipped = (Path(__file__).parents[3] / "docs" / "effects.md").read_text(encoding="utf-8")
+    assert shipped == catalogue_page.page(), "run: python -m spikecam_env.sensor.catalogue_page docs/effects.md"
+
+
+def test_effect_of_the_page_on_adding_one_works(tmp_path, monkeypatch) -> None:
+    """The example of docs/effects.md, run as a file: from frame 0 the light comes on as 1 - exp(-t/tau)."""
+    code = re.findall(r"```python\n(.*?)```", catalogue_page.page(), flags=re.DOTALL)[-1]
+    (tmp_path / "slow_shutter.py").write_text(code, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    slow_shutter = importlib.import_module("slow_shutter").SlowShutter
+    monkeypatch.setitem(CATALOGUE, "slow_shutter", slow_shutter)
+    assert Sheet.of(slow_shutter).twins == ("lamp_drift",)
+    rate = population(camera("slow_shutter", (1, 20_000), tau_us=500.0), 0.5, 40)
+    expected = 0.5 * (1 - np.exp(-(np.arange(40) + 0.5) / 20.0))
+    assert np.abs(rate - expected).max() < 4.5 * 0.5 / np.sqrt(20_000)
