@@ -87,7 +87,8 @@ def _rate_between_ends(
         begin, begin_variance = _within_frame(first, span / intervals)
         end, end_variance = _within_frame(frames - 1 - last, span / intervals)
         span = np.where(count > 1, frames - end - begin, 1.0)
-    return np.asarray(intervals / span, dtype=np.float64), begin_variance + end_variance
+    rate: Array = intervals / span
+    return rate, begin_variance + end_variance
 
 
 def _within_frame(frame: Array | NDArray[np.int64], interval: Array) -> tuple[Array, Array]:
