@@ -1,6 +1,6 @@
 """SNEE on simulated units it does not know: errors beside the best possible, N, V_S, coverage, time.
 
-    python benchmarks/snee_acceptance.py            25 levels, 64 x 64, 20 000 frames each; about three minutes
+python benchmarks/snee_acceptance.py            25 levels, 64 x 64, 20 000 frames each; about three minutes
 """
 
 from __future__ import annotations
@@ -71,9 +71,7 @@ def judged(case: Case, calibration: Calibration, shape: tuple[int, int], frames:
     return row
 
 
-def _line(
-    name: str, setting: Setting, truth: np.ndarray, bound: np.ndarray, regular: np.ndarray
-) -> dict[str, float]:
+def _line(name: str, setting: Setting, truth: np.ndarray, bound: np.ndarray, regular: np.ndarray) -> dict[str, float]:
     error = (getattr(setting, name).reshape(-1) - truth)[regular]
     sd = getattr(setting, f"{name}_sd").reshape(-1)[regular]
     best = bound[regular]

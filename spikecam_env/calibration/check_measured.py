@@ -1,6 +1,6 @@
 """How true presets are to the real recordings: static wall pixels, and the flat maps' distributions.
 
-    python -m spikecam_env.calibration.check_measured ../shared/data/real
+python -m spikecam_env.calibration.check_measured ../shared/data/real
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from spikecam_env.calibration.real import (
     QUANTILES,
     STEPS,
     WallStatistics,
+    plausible_rates,
     read_flat_maps,
     read_wall,
     wall_statistics,
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 
 MODELS = ("measured", "scsim", "physical", "ideal")
 PERCENTILES = (10, 50, 90, 99)
+
+_JITTER = 4e-5
+"""s^2 with which rates are drawn; it matters little beside reading in whole frames."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +51,14 @@ class SimulatedWall:
 
 
 def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[int, int], takes: int) -> SimulatedWall:
-    """A unit of the model shown light that gives each pixel the rate of the wall's, `takes` times.
+    """A unit of the model in light that gives its pixels rates the wall's may have had (`plausible_rates`).
 
     shape: rows, columns of the wall.  Pixels whose dark level alone exceeds the wall's rate get no light.
     """
-    runs = [wall_statistics(record_wall(model, wall.rate, shape, take, wall.times.frames)) for take in range(takes)]
+    runs = []
+    for take in range(takes):
+        rate = plausible_rates(wall.times, _JITTER, np.random.default_rng(take))
+        runs.append(wall_statistics(record_wall(model, rate, shape, take, wall.times.frames)))
     excess = np.mean([r.excess for r in runs], axis=0)
     covariance = excess_covariance(wall)
     gap = wall.excess - excess

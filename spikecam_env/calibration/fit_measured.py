@@ -42,7 +42,7 @@ _HOT_RATES = (0.03, 0.05, 0.1)
 
 @dataclass(frozen=True)
 class MeasuredConstants:
-    """The preset's constants.  shading: spread of the smooth part; its falloff is that of a centred bowl of that spread.
+    """The preset's constants.  shading: spread of the smooth part; falloff: of a centred bowl of that spread.
 
     shading_explained: share of the smooth part's variance that the best centred bowl has.
     response_at_flat: median rate at 335 lux [spikes/frame].  dark_median [spikes/frame], dark_sigma: of the logarithm.
@@ -61,9 +61,7 @@ class MeasuredConstants:
     reset_noise_mV: float
 
 
-def fit_measured(
-    folder: str | Path, circuit: Circuit | None = None, *, progress: bool = False
-) -> MeasuredConstants:
+def fit_measured(folder: str | Path, circuit: Circuit | None = None, *, progress: bool = False) -> MeasuredConstants:
     """Fit all constants to the files in `folder`."""
     circuit = circuit or Circuit()
     light, dark = read_flat_maps(folder)
@@ -198,7 +196,7 @@ sigma_mV = {c.reset_noise_mV:.3f}
 name = "threshold_flicker_noise"
 sigma_mV = {octave_mV:.3f}
 octaves = {OCTAVES}
-"""
+"""  # noqa: E501
 
 
 def main(

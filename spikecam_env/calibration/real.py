@@ -100,6 +100,21 @@ def wall_statistics(spikes: NDArray[np.uint8]) -> WallStatistics:
     )
 
 
+def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -> Array:
+    """(P,) rates drawn from what each pixel's first and last spike leave open, under jitter s^2 = white.
+
+    Measured rates crowd at simple fractions: a pixel of interval 5.004 shows one of 5 for a hundred spikes.  A camera
+    simulated at exactly such rates has second differences that no real one has; drawn rates lie as the true ones do.
+    """
+    n = np.maximum(times.count - 1, 1)
+    interval = np.maximum(times.last - times.first, 1) / n
+    after = times.frames - 1 - times.last
+    begin = times.first + rng.random(n.size) * np.clip(interval - times.first, 0.0, 1.0)
+    end = times.frames - after - rng.random(n.size) * np.clip(interval - after, 0.0, 1.0)
+    walk = np.sqrt(n * white) * interval * rng.standard_normal(n.size)
+    return n / (end - begin + walk)
+
+
 def ideal_second_difference(k: NDArray[np.int64], interval: Array) -> Array:
     """A_k of a noise-free pixel of interval T, phase uniform: 2 min(x, 1 - x), x the fractional part of kT."""
     x = np.mod(k * interval, 1.0)

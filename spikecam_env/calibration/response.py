@@ -74,7 +74,9 @@ def rates_from_times(times: list[SpikeTimes]) -> Rates:
     rate = np.where(count > 1, rate, np.where(count == 1, 2.0, 1.0) / (3 * empty))
     limit = np.where(count <= 1, 1 / (np.sqrt(18.0) * empty), np.nan)
     counted = np.zeros(len(times), dtype=bool)
-    return Rates(rate, count - 1.0, ends, limit, frames, counted, count / frames[:, None] > SATURATION)
+    return Rates(
+        rate, (count - 1).astype(np.float64), ends, limit, frames, counted, count / frames[:, None] > SATURATION
+    )
 
 
 def _rate_between_ends(

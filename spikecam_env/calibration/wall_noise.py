@@ -2,7 +2,8 @@
 
 The closed law of A_k (`jitter`) wants mean intervals known far better than 500 frames give: at k = 40, a third of the
 recording, a pixel's interval and its second differences are made of the same spikes.  So simulated pixels go through
-the same statistics, at the same rates, and s^2 and the octaves' variance are moved until both agree:
+the same statistics, at rates drawn from what the recording leaves open, and s^2 and the octaves' variance are moved
+until both agree:
 
     threshold of a spike = 1 + s z + sigma sum over octaves j of AR(1) with correlation time 2^(j+1) frames
 
@@ -17,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.real import STEPS, WallStatistics, ideal_second_difference, wall_statistics
+from spikecam_env.calibration.real import (
+    STEPS,
+    WallStatistics,
+    ideal_second_difference,
+    plausible_rates,
+    wall_statistics,
+)
 
 Array = NDArray[np.float64]
 
@@ -33,7 +40,7 @@ _MOVES = np.array([1e-5, 1e-7])
 class WallNoise:
     """white: s^2.  octave: sigma^2, variance of one octave of slow noise, thresholds^2.  sd: standard errors.
 
-    chi2: of the 40 values of excess A_k about the fit, 38 degrees of freedom.  white_alone_chi2: without slow noise, 39.
+    chi2: of the 40 values of excess A_k about the fit, 38 of freedom; white_alone_chi2: without slow noise, 39.
     """
 
     white: float
@@ -51,10 +58,10 @@ def fit_wall_noise(wall: WallStatistics, *, progress: bool = False) -> WallNoise
     values = _START
     bar = tqdm(total=_ROUNDS * 3 * _SEEDS, desc="simulate wall", unit="run", disable=not progress)
     for _ in range(_ROUNDS):
-        at = _simulated_excess(wall.rate, values, bar)
+        at = _simulated_excess(wall, values, bar)
         slopes = np.stack(
             [
-                (_simulated_excess(wall.rate, values + move, bar) - at) / move.sum()
+                (_simulated_excess(wall, values + move, bar) - at) / move.sum()
                 for move in np.diag(np.minimum(_MOVES, np.maximum(values, 1e-8)))
             ],
             axis=1,
@@ -88,7 +95,8 @@ def excess_covariance(wall: WallStatistics) -> Array:
 def simulate_wall(rate: Array, white: float, octave: float, frames: int, rng: np.random.Generator) -> NDArray[np.uint8]:
     """(frames, 1, P) spikes of pixels at these rates under this noise, phases uniform."""
     interval = 1.0 / rate
-    cycles = int(frames * rate.max() * 1.05) + 8
+    # A number of cycles that no small change of rate moves, so that draws stay common.
+    cycles = 8 * int(frames * rate.max() * 1.05 / 8 + 2)
     charge = np.sqrt(white) * rng.standard_normal((cycles, rate.size))
     for j in range(OCTAVES if octave > 0 else 0):
         kept = np.exp(-interval / 2 ** (j + 1))
@@ -104,10 +112,12 @@ def simulate_wall(rate: Array, white: float, octave: float, frames: int, rng: np
     return spikes
 
 
-def _simulated_excess(rate: Array, values: Array, bar: tqdm) -> Array:
+def _simulated_excess(wall: WallStatistics, values: Array, bar: tqdm) -> Array:
     runs = []
     for seed in range(_SEEDS):
-        spikes = simulate_wall(rate, values[0], values[1], 500, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        rate = plausible_rates(wall.times, _START[0], rng)
+        spikes = simulate_wall(rate, values[0], values[1], wall.times.frames, rng)
         runs.append(wall_statistics(spikes).excess)
         bar.update()
     return np.mean(runs, axis=0)

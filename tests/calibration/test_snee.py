@@ -46,7 +46,9 @@ def test_two_voltages_give_charge_and_bias_voltage(physical) -> None:
     unit = truth(PHYSICAL)
     spread = physical.swing_V.std() / unit.swing_V.std() - 1
     electrons = physical.charge.electrons / unit.electrons.mean() - 1
-    print(f"V_S spread {spread:+.2%}, N {electrons:+.2%} (sd {physical.charge.electrons_sd / unit.electrons.mean():.2%})")
+    print(
+        f"V_S spread {spread:+.2%}, N {electrons:+.2%} (sd {physical.charge.electrons_sd / unit.electrons.mean():.2%})"
+    )
     assert physical.charge.prior is None
     assert abs(spread) < 0.1
     assert abs(electrons) < max(0.02, 3 * physical.charge.electrons_sd / unit.electrons.mean())
@@ -88,7 +90,7 @@ def test_the_model_it_writes_loads_and_fires_alike(physical, tmp_path: Path) -> 
     model_path, maps_path, report_path = save_calibration(physical, tmp_path / "out")
     model = SensorModel.from_toml(model_path)
     unit, known = SpikeSensor(model, (128, 128), 1).unit, truth(PHYSICAL)
-    print(f"gain spread {unit.gain.std():.4f} ({known.gain.std():.4f}), dark {unit.dark.mean():.5f} ({known.dark.mean():.5f})")
+    print(f"gain spread {unit.gain.std():.4f}, known {known.gain.std():.4f}; dark {unit.dark.mean():.5f}")
     assert unit.gain.std() == pytest.approx(known.gain.std(), rel=0.15)
     assert unit.dark.mean() == pytest.approx(known.dark.mean(), rel=0.1)
     assert unit.electrons.mean() == pytest.approx(known.electrons.mean(), rel=0.05)
