@@ -8,16 +8,18 @@ the clean twin's picture.  PSNR and SSIM count from the scene's brightest light.
 "well lit, moving" is what the method is for (the paper's sets are high-speed scenes in good light); still and dim
 scenes are listed apart.  In a still scene fixed pattern and texture look alike: only knowledge of pictures helps.
 
-Rows: noisy; a row for each mode; clean (the noise-free twin); oracle (the true light through `denoiser.accumulate`).
+Rows: noisy; two for each mode, its spikes and its rate planes; clean (the noise-free twin); oracle (the true light
+through `denoiser.accumulate`).
 The oracle is what a perfect network would score: against the light it is the clean stream's equal; against the clean
-twin's picture it is a bound, for two streams of one light differ by their quantisation (`metrics.count_variance`).
+twin's picture it is a bound on any stream of spikes, for two streams of one light differ by their quantisation
+(`metrics.count_variance`); rates are not quantised and may come half that (3 dB) nearer.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,7 +37,7 @@ from scenes.textures import Texture, random_texture
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import middleTFI, middleTFP
 
-Spikes = NDArray[np.uint8]
+Stream = NDArray[np.uint8] | NDArray[np.float32]
 PHOTOGRAPHS = ("astronaut", "camera", "chelsea", "coffee", "coins", "page", "rocket")
 HELD_OUT_KINDS = ("checker", "glyphs")
 SPEEDS = {"static": 0.0, "slow": 0.3, "fast": 2.0}  # pixels/frame; layers draw theirs from 0 to this
@@ -47,11 +49,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "all dim": (("static", "slow", "fast"), ("dim",)),
     **{f"{speed}, {light}": ((speed,), (light,)) for speed in SPEEDS for light in LIGHTS},
 }
-PICTURES: dict[str, Callable[[Spikes, int], NDArray[np.float32]]] = {
-    "TFP 21": lambda spikes, t: middleTFP(spikes, t, 21),
-    "TFP 41": lambda spikes, t: middleTFP(spikes, t, 41),
-    "TFI": middleTFI,
-}
+PICTURES = ("TFP 21", "TFP 41", "TFI")
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ class HeldOut:
 
     speed: str
     light: str
-    streams: dict[str, Spikes]
+    streams: dict[str, Stream]
     truth: dict[int, NDArray[np.float32]]
 
 
@@ -83,10 +81,11 @@ def evaluate_quick(
     denoisers = {m: _denoiser(m, (weights or {}).get(m)) for m in modes}
     scores: list[dict[str, Any]] = []
     for scene in held_out(scenes_a_class, shape, frames, seed):
-        denoised = {mode: _whole(online, scene.streams["noisy"]) for mode, online in denoisers.items()}
-        streams = {"noisy": scene.streams["noisy"], **denoised}
-        streams |= {row: scene.streams[row] for row in ("clean", "oracle")}
-        scores += _score(scene, streams)
+        noisy, clean, oracle = (scene.streams[row] for row in ("noisy", "clean", "oracle"))
+        denoised: dict[str, Stream] = {}
+        for mode, online in denoisers.items():
+            denoised[mode], denoised[f"{mode} rate"] = _whole(online, noisy)
+        scores += _score(scene, {"noisy": noisy, **denoised, "clean": clean, "oracle": oracle})
     result: dict[str, Any] = {
         group: summary([s for s in scores if s["speed"] in speeds and s["light"] in lights])
         for group, (speeds, lights) in GROUPS.items()
@@ -129,22 +128,27 @@ def held_out_textures(seed: int, size: int = 256) -> list[Texture]:
     return textures + [random_texture(rng, size, (kind,)) for kind in HELD_OUT_KINDS for _ in range(2)]
 
 
-def summary(scores: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, float]]]:
+Summary = dict[str, dict[str, dict[str, float | None]]]
+"""row -> picture -> measure; None where a measure has no value (a picture against itself, a gap that is none)."""
+
+
+def summary(scores: list[dict[str, Any]]) -> Summary:
     """Mean of the scores by row and picture, and the share of the gap that the means close."""
     rows = dict.fromkeys(s["row"] for s in scores)
-    table: dict[str, dict[str, dict[str, float]]] = {}
+    table: Summary = {}
     for row in rows:
         table[row] = {}
         for picture in PICTURES:
             taken = [s for s in scores if (s["row"], s["picture"]) == (row, picture)]
             table[row][picture] = {
-                name: round(float(np.mean([s[name] for s in taken if np.isfinite(s[name])] or [np.nan])), 4)
+                name: _plain(np.mean([s[name] for s in taken]))
                 for name in ("light_db", "light_ssim", "clean_db", "clean_ssim")
             }
     for row in rows:
         for picture in PICTURES:
-            noisy, mine, clean = (table[r][picture]["light_db"] for r in ("noisy", row, "clean"))
-            table[row][picture]["gap_closed"] = round(gap_closed(noisy, mine, clean), 4)
+            levels = [table[r][picture]["light_db"] for r in ("noisy", row, "clean")]
+            known = [level for level in levels if level is not None]
+            table[row][picture]["gap_closed"] = _plain(gap_closed(*known)) if len(known) == 3 else None
     return table
 
 
@@ -155,13 +159,24 @@ def report(result: dict[str, Any]) -> str:
     return f"Mean interval [frames]: {levels}\n\n" + "\n\n".join(tables) + "\n"
 
 
+def picture_of(stream: Stream, kind: str, t: int) -> NDArray[np.float32]:
+    """TFP 21, TFP 41 or TFI at frame t, of spikes, or of rates: their mean over the window, and the plane at t."""
+    window = {"TFP 21": 21, "TFP 41": 41, "TFI": 1}[kind]
+    if stream.dtype != np.uint8:
+        return stream[t - window // 2 : t + window // 2 + 1].mean(axis=0)
+    return middleTFI(stream, t) if kind == "TFI" else middleTFP(stream, t, window)
+
+
 def _denoiser(mode: str, path: str | os.PathLike[str] | None) -> OnlineDnSS:
-    return OnlineDnSS.pretrained(mode) if path is None else OnlineDnSS.from_file(path)
+    if path is None:
+        return OnlineDnSS.pretrained(mode, output="both")
+    return OnlineDnSS.from_file(path, output="both")
 
 
-def _whole(online: OnlineDnSS, spikes: Spikes) -> Spikes:
+def _whole(online: OnlineDnSS, spikes: Stream) -> tuple[Stream, Stream]:
     online.reset()
-    return np.concatenate([np.asarray(online.push(spikes)), np.asarray(online.flush())])
+    (first, first_rates), (rest, rest_rates) = online.push(spikes), online.flush()
+    return np.concatenate([first, rest]), np.concatenate([first_rates, rest_rates])
 
 
 def _expose(scene: Collage, speed: str, light: str, frames: int, seed: int) -> HeldOut:
@@ -176,18 +191,18 @@ def _expose(scene: Collage, speed: str, light: str, frames: int, seed: int) -> H
     return HeldOut(speed, light, streams, {int(t): light_in_frame(keys, int(t)) for t in times})
 
 
-def _perfectly_denoised(keys: Keyframes, shape: tuple[int, int], frames: int) -> Spikes:
+def _perfectly_denoised(keys: Keyframes, shape: tuple[int, int], frames: int) -> Stream:
     rates = np.stack([light_in_frame(keys, t) for t in range(frames)])
     return accumulate.step(rates, accumulate.start(shape))[0]
 
 
-def _score(scene: HeldOut, streams: dict[str, Spikes]) -> Iterator[dict[str, Any]]:
+def _score(scene: HeldOut, streams: dict[str, Stream]) -> Iterator[dict[str, Any]]:
     peak = float(max(truth.max() for truth in scene.truth.values()))
-    for picture, take in PICTURES.items():
+    for picture in PICTURES:
         for t, truth in scene.truth.items():
-            clean = take(streams["clean"], t)
-            for row, spikes in streams.items():
-                seen = take(spikes, t)
+            clean = picture_of(streams["clean"], picture, t)
+            for row, stream in streams.items():
+                seen = picture_of(stream, picture, t)
                 yield {
                     "row": row,
                     "picture": picture,
@@ -213,18 +228,26 @@ def _linear_square(photograph: NDArray, size: int) -> Texture:
     return ((square - square.min()) / (square.max() - square.min())).astype(np.float32)
 
 
-def _table(title: str, table: dict[str, dict[str, dict[str, float]]]) -> str:
-    head = f"{title}\n{'':10}" + "".join(f"| {picture:^43}" for picture in PICTURES)
-    names = f"{'':10}" + "| light dB  SSIM   gap | clean twin dB  SSIM " * len(PICTURES)
-    lines = [head, names]
-    for row, pictures in table.items():
-        cells = [
-            f"| {s['light_db']:7.2f} {s['light_ssim']:6.3f} {100 * s['gap_closed']:5.0f} % "
-            f"| {s['clean_db']:9.2f} {s['clean_ssim']:8.3f}  "
-            for s in pictures.values()
-        ]
-        lines.append(f"{row:10}" + "".join(cells))
-    return "\n".join(lines)
+def _plain(value: Any) -> float | None:
+    """For JSON, which knows neither infinity nor NaN."""
+    return round(float(value), 4) if np.isfinite(value) else None
+
+
+def _table(title: str, table: Summary) -> str:
+    head = f"{title}\n{'':12}" + "".join(f"| {picture:^43}" for picture in PICTURES)
+    names = f"{'':12}" + "| light dB  SSIM   gap | clean twin dB  SSIM " * len(PICTURES)
+    rows = (f"{row:12}" + "".join(map(_cell, pictures.values())) for row, pictures in table.items())
+    return "\n".join([head, names, *rows])
+
+
+def _cell(s: dict[str, float | None]) -> str:
+    gap = None if s["gap_closed"] is None else 100 * s["gap_closed"]
+    light = f"| {_shown(s['light_db'], 7, 2)} {_shown(s['light_ssim'], 6, 3)} {_shown(gap, 5, 0)} % "
+    return light + f"| {_shown(s['clean_db'], 9, 2)} {_shown(s['clean_ssim'], 8, 3)}  "
+
+
+def _shown(value: float | None, width: int, digits: int) -> str:
+    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
 
 
 def _write(folder: Path, result: dict[str, Any]) -> None:

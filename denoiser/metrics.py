@@ -21,8 +21,8 @@ def ssim(picture: Picture, truth: Picture, peak: float) -> float:
 
 
 def gap_closed(noisy_db: float, denoised_db: float, clean_db: float) -> float:
-    """Share of the way from noisy to clean, in dB, that the denoised stream has gone; NaN where there is no way."""
-    return (denoised_db - noisy_db) / (clean_db - noisy_db) if clean_db > noisy_db else float("nan")
+    """Share of the way from noisy to clean, in dB, that the denoised stream has gone; NaN for a way under half a dB."""
+    return (denoised_db - noisy_db) / (clean_db - noisy_db) if clean_db - noisy_db >= 0.5 else float("nan")
 
 
 def count_variance(rate: NDArray[np.floating], window: int) -> NDArray[np.floating]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import tyro
 
@@ -43,12 +43,11 @@ class Denoise:
 
     def run(self) -> None:
         import numpy as np
-        from tqdm import tqdm
 
-        from denoiser import OnlineDnSS
         from denoiser.niqe import niqe
         from spikecam_env.cli.files import out_folder, write_json
         from spikecam_env.cli.film import Panel, compose, display, write_film, write_picture
+        from spikecam_env.cli.restore import picture_frames, restore
         from spikecam_env.cli.table import table
         from spikecam_env.errors import InputError
         from spikecam_env.streams import SpikeWriter, middleTFP, read_recording
@@ -59,49 +58,47 @@ class Denoise:
         options = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         recording = read_recording(self.file, **options, **({"flip": True} if self.flip else {}))
         noisy = recording.spikes
-        online = OnlineDnSS.pretrained(self.mode)
+        frames = picture_frames(len(noisy), self.window)
         folder = out_folder(self.out)
-        parts = []
-        with tqdm(total=len(noisy), desc=f"denoise ({self.mode})", unit="frame", leave=False) as bar:
-            for start in range(0, len(noisy), 16):
-                block = noisy[start : start + 16]
-                parts.append(online.push(block))
-                bar.update(len(block))
-        parts.append(online.flush())
-        clean = np.concatenate(parts)
+        clean, rates = restore(noisy, self.mode, self.window, frames)
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
         attributes |= {"denoiser": self.mode, "source": self.file.name}
         with SpikeWriter(folder / "denoised.h5", clean.shape[1:], recording.frame_rate_hz, **attributes) as writer:
             writer.append(clean)
 
-        middle = len(noisy) // 2
-        before, after = middleTFP(noisy, middle, self.window), middleTFP(clean, middle, self.window)
-        white = float(np.percentile(before, 99.5)) or 1.0
-        try:
-            scores: list[float | None] = [niqe(display(picture, white) / 255) for picture in (before, after)]
-        except InputError as error:
-            scores = [None, None]
-            print(f"no NIQE: {error}")
-        lines = ["" if score is None else f"NIQE {score:.2f}" for score in scores]
+        white = float(np.percentile(noisy.mean(axis=0), 99.5)) or 1.0
+        streams = {
+            "noisy spikes": {t: middleTFP(noisy, t, self.window) for t in frames},
+            "denoised spikes": {t: middleTFP(clean, t, self.window) for t in frames},
+            "denoised rate": rates,
+        }
+        judged = frames[:: -(-len(frames) // 12)]
+        rows: list[dict[str, Any]] = []
+        for name, pictures in streams.items():
+            rate = float(np.mean([p.mean() for p in pictures.values()]))
+            row: dict[str, Any] = {"picture": name, "spikes/frame": rate}
+            try:
+                scores = [niqe(display(pictures[t], white) / 255) for t in judged]
+                row |= {"NIQE": float(np.mean(scores)), "+-": float(np.std(scores)), "pictures": len(scores)}
+            except InputError as error:
+                why = str(error)
+                row |= {"NIQE": None, "+-": None, "pictures": 0}
+            rows.append(row)
 
-        def panels(frame: int, lines: list[str]) -> list[Panel]:
-            return [
-                Panel(middleTFP(noisy, frame, self.window), f"noisy, TFP {self.window}", lines[0]),
-                Panel(middleTFP(clean, frame, self.window), f"denoised ({self.mode}), TFP {self.window}", lines[1]),
+        def side_by_side(frame: int) -> np.ndarray:
+            shown = [
+                Panel(pictures[frame], row["picture"], "" if row["NIQE"] is None else f"NIQE {row['NIQE']:.2f}")
+                for row, pictures in zip(rows, streams.values(), strict=True)
             ]
+            return compose(shown, white, f"{self.mode}, {self.window} frames about frame {frame}")
 
-        write_picture(folder / "pictures.png", compose(panels(middle, lines), white, f"frame {middle}"))
+        write_picture(folder / "pictures.png", side_by_side(frames[len(frames) // 2]))
         if self.film:
-            at = range(self.window // 2, len(noisy) - self.window // 2, 8)
-            write_film(
-                folder / "film.mp4",
-                (compose(panels(t, ["", ""]), white, f"frame {t}") for t in tqdm(at, desc="film", leave=False)),
-            )
-        rows = [
-            {"stream": name, "spikes/frame": float(s.mean()), f"NIQE (TFP {self.window})": score}
-            for name, s, score in (("noisy", noisy, scores[0]), (f"denoised, {self.mode}", clean, scores[1]))
-        ]
-        write_json(folder / "summary.json", {"file": str(self.file), "latency": online.latency, "streams": rows})
+            write_film(folder / "film.mp4", (side_by_side(t) for t in frames))
+        summary = {"file": str(self.file), "mode": self.mode, "window": self.window, "rows": rows}
+        write_json(folder / "summary.json", summary)
         print(table(rows))
+        if rows[0]["NIQE"] is None:
+            print(f"no NIQE: {why}")
         print(f"wrote {', '.join(sorted(p.name for p in folder.iterdir()))} in {folder}")

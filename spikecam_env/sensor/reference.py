@@ -30,14 +30,14 @@ Array = NDArray[np.float64]
 class ReferenceState:
     """charge, threshold: (P,) float64 [grains]; rng: the pixels' own temporal noise; frame: number of the next.
 
-    memory: what each effect remembers.
+    memory: what each effect remembers, by its name.
     """
 
     charge: Array
     threshold: Array
     rng: np.random.Generator
     frame: int
-    memory: list[Any]
+    memory: dict[str, Any]
 
 
 def start(first: Exposure, effects: Sequence[Effect], phase: Array, seed: int) -> ReferenceState:
@@ -47,7 +47,7 @@ def start(first: Exposure, effects: Sequence[Effect], phase: Array, seed: int) -
     """
     rng = generator(seed, "temporal")
     threshold = draw_threshold(first.unit.kappa, rng)
-    memory = [effect.begin(first, generator(seed, f"{effect.name}: temporal")) for effect in effects]
+    memory = {e.name: e.begin(first, generator(seed, f"{e.name}: temporal")) for e in effects}
     return ReferenceState(np.floor(phase * GRAINS), threshold, rng, first.number, memory)
 
 
@@ -70,19 +70,23 @@ def step(now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: 
     mean, dark = expected_charge(now, effects, state, mean)
     state.charge += collect(now.unit, mean, dark, state.rng)
     fired = fire(now, effects, state, mean, comparator_offset(now, effects, state))
-    for i, effect in having("spiked", effects):
-        charge, state.memory[i] = effect.spiked(
-            (state.charge / GRAINS).reshape(now.shape), fired, (mean / GRAINS).reshape(now.shape), now, state.memory[i]
-        )
+    for effect in having("spiked", effects):
+        charge, rate = thresholds(state.charge, now), thresholds(mean, now)
+        charge, state.memory[effect.name] = effect.spiked(charge, fired, rate, now, state.memory[effect.name])
         state.charge = charge.reshape(-1) * GRAINS
-    for i, effect in having("read_out", effects):
-        fired, state.memory[i] = effect.read_out(fired, now, state.memory[i])
+    for effect in having("read_out", effects):
+        fired, state.memory[effect.name] = effect.read_out(fired, now, state.memory[effect.name])
     return fired.reshape(-1)
 
 
-def having(hook: str, effects: Sequence[Effect]) -> Iterator[tuple[int, Effect]]:
-    """The effects with a hook of their own of that name, and their numbers."""
-    return ((i, effect) for i, effect in enumerate(effects) if effect.overrides(hook))
+def thresholds(grains: Array, now: Exposure) -> Array:
+    """Charge (P,) [grains] as effects see it: (H, W) [thresholds]."""
+    return (grains / GRAINS).reshape(now.shape)
+
+
+def having(hook: str, effects: Sequence[Effect]) -> Iterator[Effect]:
+    """The effects with a hook of their own of that name."""
+    return (effect for effect in effects if effect.overrides(hook))
 
 
 def expected_charge(
@@ -98,9 +102,10 @@ def expected_charge(
     dark = np.minimum(np.floor(now.unit.dark * GRAINS), mean)
     if not acting:
         return mean, dark
-    light_part, dark_part = ((part / GRAINS).reshape(now.shape) for part in (mean - dark, dark))
-    for i, effect in acting:
-        light_part, dark_part, state.memory[i] = effect.collect(light_part, dark_part, now, state.memory[i])
+    light_part, dark_part = thresholds(mean - dark, now), thresholds(dark, now)
+    for effect in acting:
+        memory = state.memory[effect.name]
+        light_part, dark_part, state.memory[effect.name] = effect.collect(light_part, dark_part, now, memory)
     dark = np.maximum(dark_part, 0.0).reshape(-1) * GRAINS
     return np.maximum(light_part, 0.0).reshape(-1) * GRAINS + dark, dark
 
@@ -117,8 +122,9 @@ def collect(unit: Unit, mean: Array, dark: Array, rng: np.random.Generator) -> A
 def comparator_offset(now: Exposure, effects: Sequence[Effect], state: ReferenceState) -> Array | None:
     """What this frame adds to the thresholds that the comparators compare with (P,) [grains]; None for nothing."""
     threshold = state.threshold
-    for i, effect in having("compare", effects):
-        changed, state.memory[i] = effect.compare((threshold / GRAINS).reshape(now.shape), now, state.memory[i])
+    for effect in having("compare", effects):
+        memory = state.memory[effect.name]
+        changed, state.memory[effect.name] = effect.compare(thresholds(threshold, now), now, memory)
         threshold = changed.reshape(-1) * GRAINS
     return None if threshold is state.threshold else threshold - state.threshold
 
@@ -134,7 +140,7 @@ def fire(
         fired[crossed] = True
         shift = 0.0 if offset is None else offset[crossed]
         residual = (state.charge[crossed] - (state.threshold[crossed] + shift)) / GRAINS
-        for _, effect in acting:
+        for effect in acting:
             residual = effect.after_reset(residual, mean[crossed] / GRAINS, now)
         state.charge[crossed] = residual * GRAINS
         state.threshold[crossed] = draw_threshold(now.unit.kappa[crossed], state.rng)

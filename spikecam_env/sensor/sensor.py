@@ -22,10 +22,14 @@ ENGINES = ("auto", "fast", "reference")
 
 @dataclass(frozen=True)
 class SensorState:
-    """A sensor mid-stream: which unit it is, the next frame, and its pixels.  Picklable; tied to its engine."""
+    """A sensor mid-stream: which unit it is, the next frame, and its pixels.  Picklable.
+
+    Tied to its engine, its shape and the effects that act from frame to frame.
+    """
 
     engine: str
     shape: tuple[int, int]
+    effects: tuple[str, ...]
     seed: int
     frame: int
     phase: NDArray[np.float64]
@@ -87,14 +91,18 @@ class SpikeSensor:
 
     def state(self) -> SensorState:
         """A copy of everything that the next step depends on, besides the model."""
-        return SensorState(self.engine, self.shape, self.seed, self.frame, self.phase, copy.deepcopy(self._pixels))
+        pixels = copy.deepcopy(self._pixels)
+        return SensorState(self.engine, self.shape, self._names_of_effects(), self.seed, self.frame, self.phase, pixels)
 
     def restore(self, state: SensorState) -> None:
-        """Go on from a saved state; raises InputError for the state of another engine or shape."""
+        """Go on from a saved state; raises InputError for the state of another engine, shape or model."""
         if (state.engine, state.shape) != (self.engine, self.shape):
             raise InputError(
                 f"this state is of a {state.engine} sensor of {state.shape}; this one is {self.engine}, {self.shape}"
             )
+        if state.effects != self._names_of_effects():
+            theirs, ours = (", ".join(names) or "none" for names in (state.effects, self._names_of_effects()))
+            raise InputError(f"this state is of a model with other frame effects ({theirs}); this one has {ours}")
         if state.seed != self.seed:
             self._start(state.seed, phase=state.phase)
         self.phase = state.phase
@@ -126,6 +134,9 @@ class SpikeSensor:
             fast.run(self._pixels, segment, out)
         else:
             out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
+
+    def _names_of_effects(self) -> tuple[str, ...]:
+        return tuple(e.name for e in self._frame_effects)
 
     def _first_exposure(self) -> Exposure:
         return Exposure(0, self.model.frame_rate_hz, self.shape, self.unit)

@@ -28,10 +28,10 @@ def result(tmp_path_factory):
 
 
 def test_rows_run_from_noisy_to_clean_and_the_oracle(result):
-    assert list(result["all well lit"]) == ["noisy", "best", "clean", "oracle"]
+    assert list(result["all well lit"]) == ["noisy", "best", "best rate", "clean", "oracle"]
     for picture in PICTURES:
-        assert result["all well lit"]["noisy"][picture]["gap_closed"] == 0
-        assert result["all well lit"]["clean"][picture]["gap_closed"] == 1
+        noisy, clean = (result["all well lit"][row][picture]["gap_closed"] for row in ("noisy", "clean"))
+        assert (noisy, clean) in ((0, 1), (None, None))
 
 
 def test_the_oracle_is_as_good_as_the_clean_stream_against_the_light(result):

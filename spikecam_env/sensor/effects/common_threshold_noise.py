@@ -5,7 +5,7 @@
 
 Stage: threshold.  Seen in: spikes a frame over the whole array: variance 2 sigma^2/V_d^2, lag-1 correlation -1/2.
 Twins: row_temporal_noise (rows), clock_jitter (in proportion to light), supply_ripple (a line).
-Source: EMVA 1288 (temporal noise common to a frame); white by assumption.
+Source: a reference that all comparators share; white by assumption.  A real wall recording shows none.
 """
 
 from __future__ import annotations

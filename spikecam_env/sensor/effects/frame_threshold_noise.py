@@ -1,6 +1,7 @@
 """Frame threshold noise: the comparator's reference is drawn anew in every frame, not at each reset.
 
     fires when charge >= 1 + sigma n_t / V_d,  n_t ~ N(0, 1) a pixel and frame
+    mean interval T (1 - (sigma/V_d)^2 T) while sigma T << V_d
 
 Stage: threshold.  Seen in: dim flats: many draws before a crossing make the lowest win, so intervals shorten with T.
 Source: SCSim's public script (6.36 mV), kept for comparison with it.

@@ -5,7 +5,7 @@
 
 Stage: reset.  Seen in: flats over a wide range of levels; steps of light (the first interval after one is off).
 Twins: photodiode_lag (follows the light, in static light nothing), dead_time (the same at all levels).
-Source: image lag of a soft reset (Pain et al. 2000); exponential filling of slow states assumed.
+Source: image lag of a soft reset (Pain et al. 1999, sub-threshold reset); exponential filling of slow states assumed.
 """
 
 from __future__ import annotations

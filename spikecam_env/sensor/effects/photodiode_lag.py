@@ -5,7 +5,7 @@
 
 Stage: photodiode.  Seen in: steps and moving light (tails of length tau); static light is unchanged.
 Twins: incomplete_reset (depends on the last interval, not on the last light), optical_blur.
-Source: first-order image lag, as in EMVA 1288 and Janesick, Photon Transfer; light before frame 0 is taken as steady.
+Source: first-order image lag (Janesick, Photon Transfer); light before frame 0 is taken as steady.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
 
 Stage: photodiode.  Seen in: dark recordings: counts of these pixels have two levels, windows shorter than the dwell.
 Twins: spurious_spikes (no levels), threshold_flicker_noise (all pixels, also in the light).
-Source: dark-current RTN in irradiated CMOS pixels (Hopkins and Hopkinson 1993); one trap a pixel,
+Source: dark-current RTN in irradiated CCD pixels (Hopkins and Hopkinson 1993); one trap a pixel,
 even dwell times assumed.
 """
 

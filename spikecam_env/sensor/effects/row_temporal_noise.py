@@ -4,7 +4,7 @@
 
 Stage: threshold.  Seen in: spikes a frame of a row: pixels of one row move together, rows do not.
 Twins: common_threshold_noise (all rows together), row_fixed_pattern (constant in time), ir_drop (follows activity).
-Source: EMVA 1288 release 4 (temporal row noise); a real wall recording shows none above 0.1 %.
+Source: shared reference lines of CMOS imagers; white by assumption.  A real wall recording shows none.
 """
 
 from __future__ import annotations

@@ -26,7 +26,9 @@ class ShotNoise(Effect):
         doc="electrons to a nominal threshold; C V / q by default, infinite for no shot noise",
     )
     dark_is_noisy: bool = parameter(
-        True, unit="", doc="dark charge is Poisson too (physics); False is the paper's literal (11)"
+        True,
+        unit="",
+        doc="dark charge is Poisson too (physics); False is the paper's literal (11), on the reference engine",
     )
 
     stage = Stage.INTEGRATION

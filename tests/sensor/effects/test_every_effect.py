@@ -110,6 +110,14 @@ def test_hooks_change_nothing_in_place_and_keep_shapes(name: str) -> None:
         assert residual.shape == (spikes.sum(),) and read.shape == SHAPE and read.dtype == np.bool_
 
 
+def test_state_of_a_model_with_other_effects_is_refused() -> None:
+    state = camera("crosstalk", SHAPE, engine="reference").state()
+    with pytest.raises(InputError, match=r"other frame effects \(crosstalk\); this one has dead_time"):
+        camera("dead_time", SHAPE, engine="reference").restore(state)
+    with pytest.raises(InputError, match="this one has none"):
+        SpikeSensor("ideal", SHAPE, engine="reference").restore(state)
+
+
 def test_all_effects_at_once_are_one_stream_however_cut() -> None:
     model = with_effects("scsim", *(strong(name) for name in EVERY))
     light = moving_light()

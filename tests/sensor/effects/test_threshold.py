@@ -64,6 +64,17 @@ def assert_pooled_variance(model: SensorModel, kappa: float) -> None:
     )
 
 
+@pytest.mark.parametrize("interval", [3.0, 6.0])
+def test_frame_threshold_noise_shortens_bright_intervals_by_sigma_squared_t(interval: float) -> None:
+    """A crossing within sigma of the end of a frame picks the lower draw: share sigma^2 T lost while sigma T << 1."""
+    sigma, count = 0.02, 200
+    model = with_effects("ideal", CATALOGUE["frame_threshold_noise"](sigma_mV=millivolts(sigma)))
+    intervals = np.random.default_rng(0).permutation(np.linspace(interval, interval + 1, 2000, endpoint=False))
+    t = spike_frames(model, intervals, count, "reference")
+    lost = 1 - (t[:, -1] - t[:, 0]) / ((count - 1) * intervals)
+    check_mean("share lost - sigma^2 T", lost - sigma**2 * intervals, 0.0)
+
+
 def test_frame_threshold_noise_shortens_dim_intervals() -> None:
     """Of many draws before a crossing the lowest wins, so the mean interval falls below T, the more the dimmer."""
     model = with_effects("ideal", CATALOGUE["frame_threshold_noise"](sigma_mV=30.0))
