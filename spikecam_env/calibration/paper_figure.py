@@ -2,8 +2,8 @@
 
     python -m spikecam_env.calibration.paper_figure ../shared/data/real --out validation.png
 
-Five patches of bare wall stand for the paper's five grey levels.  Cameras: an ideal one (as SPCS), SCSim, `measured`, for
-0.1 s each under flat light that gives them the patch's mean rate; the real one for the 500 frames that there are.
+Five patches of bare wall stand for the paper's five grey levels.  Cameras: an ideal one (as SPCS), SCSim, `measured`,
+for 0.1 s each under flat light that gives them the patch's mean rate; the real one for the 500 frames that there are.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from spikecam_env.calibration.real import read_wall
-from spikecam_env.sensor import SpikeSensor
+from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams.whole import whole_file
 
 CAMERAS = {"SPCS-like (ideal)": "ideal", "SCSim": "scsim", "measured": "measured"}
@@ -32,7 +32,7 @@ PRESSED = 10
 
 @dataclass(frozen=True)
 class Stream:
-    """One camera at one level.  mean, spread: of its pixels' rates [spikes/frame]; share: of intervals 0 .. 12 frames."""
+    """One camera at one level.  mean, spread: of its pixels' rates [spikes/frame].  share: of intervals 0 .. 12."""
 
     camera: str
     level: float
@@ -65,7 +65,8 @@ def grey_patches(wall: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
     means = np.array([rate[y : y + rows, x : x + columns].mean() for y, x in corners])
     uneven = np.array([smooth[y : y + rows, x : x + columns].std() for y, x in corners]) / means
     chosen = []
-    for level in np.linspace(*np.quantile(means, [0.03, 0.97]), LEVELS):
+    dim, bright = np.quantile(means, [0.03, 0.97])
+    for level in np.linspace(dim, bright, LEVELS):
         cost = np.abs(means / level - 1) + uneven
         y, x = corners[int(np.argmin(cost))]
         chosen.append(wall[:, y : y + rows, x : x + columns])
@@ -74,9 +75,15 @@ def grey_patches(wall: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
 
 def _flat(preset: str, level: float, frames: int) -> NDArray[np.uint8]:
     """Spikes of a patch-sized camera under flat light whose mean rate is `level`."""
-    sensor = SpikeSensor(preset, PATCH, seed=1, engine="auto")
+    sensor = SpikeSensor(_without_shading(preset), PATCH, seed=1, engine="auto")
     light = (level - sensor.unit.dark.mean()) / sensor.unit.gain.mean()
     return sensor.step(np.full(PATCH, light, np.float32), frames)
+
+
+def _without_shading(preset: str) -> SensorModel:
+    """The wall's rates have the real camera's shading in them; a patch is too small to have its own."""
+    model = SensorModel.preset(preset)
+    return model.without("vignetting") if any(e.name == "vignetting" for e in model.effects) else model
 
 
 def _summary(camera: str, level: float, spikes: NDArray[np.uint8]) -> Stream:
@@ -93,7 +100,7 @@ def spike_patterns(wall: NDArray[np.uint8]) -> dict[str, NDArray[np.int64]]:
     patterns = {"real wall": wall[first : first + PRESSED].sum(axis=0, dtype=np.int64)}
     light = ndimage.gaussian_filter(wall.mean(axis=0), 3).astype(np.float32)
     for label, preset in CAMERAS.items():
-        sensor = SpikeSensor(preset, light.shape, seed=1, engine="auto")
+        sensor = SpikeSensor(_without_shading(preset), light.shape, seed=1, engine="auto")
         scaled = np.maximum(light - sensor.unit.dark.mean(), 0) / sensor.unit.gain.mean()
         sensor.step(scaled.astype(np.float32), 64)
         patterns[label] = sensor.step(scaled.astype(np.float32), PRESSED).sum(axis=0, dtype=np.int64)
@@ -103,7 +110,7 @@ def spike_patterns(wall: NDArray[np.uint8]) -> dict[str, NDArray[np.int64]]:
 def draw(streams: list[Stream], patterns: dict[str, NDArray[np.int64]]) -> Figure:
     """Spikes per sampling, interval histograms, spike patterns."""
     figure = Figure(figsize=(15, 10.5), layout="constrained")
-    top, middle, bottom = figure.subfigures(3, 1, height_ratios=[1.0, 1.0, 1.25])
+    top, middle, bottom = np.ravel(np.array(figure.subfigures(3, 1, height_ratios=[1.0, 1.0, 1.25])))
     cameras = list(patterns)
     levels = sorted({s.level for s in streams})
     mean, spread = top.subplots(1, 2)
@@ -121,7 +128,7 @@ def draw(streams: list[Stream], patterns: dict[str, NDArray[np.int64]]) -> Figur
         for i, camera in enumerate(cameras):
             stream = next(s for s in streams if s.camera == camera and s.level == level)
             axis.bar(np.arange(13) + 0.2 * (i - 1.5), stream.share, 0.2)
-        axis.set(title=f"(b) intervals at {level:.3f} spikes/frame", xlabel="frames", xlim=(2, 10))
+        axis.set(title=f"(b) at {level:.3f} spikes/frame", xlabel="interval [frames]", xlim=(2, 10))
     highest = max(int(p.max()) for p in patterns.values())
     for axis, camera in zip(bottom.subplots(2, 2).flat, cameras, strict=True):
         axis.imshow(patterns[camera], cmap="gray", vmin=0, vmax=highest, interpolation="nearest")
