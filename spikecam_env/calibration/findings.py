@@ -103,7 +103,14 @@ def _two_v_d(c: Calibration) -> list[Finding]:
     spread = float(np.sqrt(max(bias.var() - np.mean(sd**2), 0.0)))
     root = np.sqrt(good.sum())
     rows = [
-        Finding("V_S, mean", "identified", float(bias.mean()), Z90 * spread / root, "V", "ratio of slopes at two V_d"),
+        Finding(
+            "V_S, mean",
+            "identified",
+            float(bias.mean()),
+            Z90 * float(bias.std()) / root,
+            "V",
+            "ratio of slopes at two V_d",
+        ),
         Finding(
             "V_S, spread",
             "identified",

@@ -87,6 +87,7 @@ def fitted_model(
     electrons: float,
     reset_noise_mV: float,
     swing_V: Array | None,
+    swing_sd_V: Array | None = None,
 ) -> SensorModel:
     """A model with the spreads of these maps; gain relative to its mean, dark [thresholds/frame] as current.
 
@@ -100,16 +101,37 @@ def fitted_model(
         effects.append(_effect("shot_noise", quanta=float(electrons)))
     if reset_noise_mV > 0:
         effects.append(_effect("reset_noise", sigma_mV=float(reset_noise_mV)))
-    effects.append(_effect("conversion_gain_spread", sigma=spread((gain * per_volt)[good], (gain_sd * per_volt)[good])))
+    alpha, falloff = flattened(gain * per_volt, good)
+    if falloff > 0:
+        effects.append(_effect("vignetting", falloff=falloff))
+    effects.append(_effect("conversion_gain_spread", sigma=spread(alpha[good], (gain_sd * per_volt)[good])))
     if swing_V is not None:
-        effects.append(_effect("bias_voltage_spread", sigma_V=float(swing_V[good].std())))
+        within = 0.0 if swing_sd_V is None else float(np.mean(swing_sd_V[good] ** 2))
+        sigma_V = float(np.sqrt(max(swing_V[good].var() - within, 0.0)))
+        effects.append(_effect("bias_voltage_spread", sigma_V=sigma_V))
     pA = circuit.capacitance_fF * circuit.swing_V * frame_rate_hz * 1e-3
-    known = flags & (FLAGS["unidentified"] | FLAGS["dead"] | FLAGS["misfit"]) == 0
+    known = np.isfinite(per_volt) & (flags & (FLAGS["unidentified"] | FLAGS["dead"] | FLAGS["misfit"]) == 0)
     effects += dark_effects(np.maximum(dark * per_volt, 0.0)[known] * pA, (flags & FLAGS["hot"] > 0)[known])
     dead = np.mean(flags & FLAGS["dead"] > 0)
     if dead > 0:
         effects.append(_effect("dead_pixels", fraction=float(dead)))
     return SensorModel(name, circuit, frame_rate_hz, tuple(effects))
+
+
+def flattened(gain: Array, good: NDArray[np.bool_]) -> tuple[Array, float]:
+    """The map (H, W) without a bowl about its middle, 1 - v r^2 / r_corner^2, and v; 0 if not five standard errors."""
+    rows, columns = gain.shape
+    y, x = np.mgrid[:rows, :columns]
+    square = (y - (rows - 1) / 2) ** 2 + (x - (columns - 1) / 2) ** 2
+    square = square / max(square.max(), 1.0)
+    if good.sum() < 10 or square[good].std() == 0:
+        return gain, 0.0
+    slope, middle = np.polyfit(square[good], gain[good], 1)
+    error = np.std(gain[good] - slope * square[good] - middle) / (square[good].std() * np.sqrt(good.sum()))
+    falloff = float(-slope / middle)
+    if not 5 * error / middle < falloff < 1:
+        return gain, 0.0
+    return gain / (1 - falloff * square), falloff
 
 
 def dark_effects(current_pA: Array, hot: NDArray[np.bool_]) -> list[Effect]:

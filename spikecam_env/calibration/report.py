@@ -49,8 +49,8 @@ def report(calibration: Calibration, findings: Sequence[Finding]) -> str:
          "Right: what each label is off by, were the line exact: medians over pixels, bars from 10 to 90 % of them."),
         ("Residuals", _residuals, (10, 3.6), "Left: residuals of all pixels and levels in standard deviations of the "
          "law, with a normal curve. Right: reduced chi-square of each pixel."),
-        ("Temporal noise", _noise, (10, 4), "A_k less what reading in whole frames adds, pooled over pixels and "
-         "levels, and the fitted law. A straight line is noise drawn anew for each spike."),
+        ("Temporal noise", _noise, (10, 4), "A_k less what reading in whole frames adds, over 2 k T², pooled over "
+         "pixels and levels. Level: noise drawn anew for each spike. Rising: slow noise."),
         ("Maps", _maps, (10, 4), "alpha/phi and I_dark/phi of every pixel, and which pixels are odd."),
         ("Distributions", _histograms, (10, 3.6), "Regular pixels; the dark level on a logarithmic axis with normal "
          "and log-normal of the same moments."),
@@ -90,10 +90,14 @@ def _levels_table(setting: Setting) -> str:
     lines = [
         f'<tr><td>{html.escape(v.name)}</td><td>{v.use}</td><td class="n">{v.frames}</td>'
         f'<td class="n">{v.radiance:.4g}</td><td class="n">{v.rate:.5f}</td>'
-        f'<td class="n">{v.saturated:.1%}</td><td class="n">{v.residual:+.2e}</td></tr>'
+        f'<td class="n">{v.saturated:.1%}</td><td class="n">{_signed(v.residual)}</td></tr>'
         for v in setting.levels
     ]
     return f"<table>{head}{''.join(lines)}</table>"
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.1e}" if np.isfinite(value) else "-"
 
 
 def _figure(

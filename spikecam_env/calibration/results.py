@@ -55,6 +55,7 @@ def calibrated_model(calibration: Calibration) -> SensorModel:
         electrons=electrons,
         reset_noise_mV=reset_noise_mV,
         swing_V=c.swing_V,
+        swing_sd_V=c.swing_sd_V,
     )
 
 

@@ -19,7 +19,7 @@ from tqdm import tqdm
 from spikecam_env.calibration.campaign import Campaign, CampaignRecording, read_campaign
 from spikecam_env.calibration.charge import Charge, charge_at_one_v_d, charge_at_two_v_d
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
-from spikecam_env.calibration.population import pixel_flags
+from spikecam_env.calibration.population import FLAGS, pixel_flags
 from spikecam_env.calibration.response import Lines, Rates, fit_lines, rates_from_counts, rates_from_times, together
 from spikecam_env.calibration.spike_times import STEPS, SpikeTimes, spike_times
 from spikecam_env.errors import InputError
@@ -148,14 +148,16 @@ def calibrate(
 
 
 def swing_from_two_v_d(one: Setting, other: Setting) -> tuple[Array, Array]:
-    """(H, W) swing V_d + V_S at the first setting and its standard deviation [V].
+    """(H, W) swing V_d + V_S at the first setting and its standard deviation [V]; NaN for pixels without a slope.
 
     The same light and charge over another threshold: gain_1 / gain_2 = (V_2 + V_S) / (V_1 + V_S) = q, so
     V_1 + V_S = (V_1 - V_2) / (1 - q).
     """
     difference = float(one.v_d or 0.0) - float(other.v_d or 0.0)
-    q = one.gain / other.gain
-    sd_q = np.abs(q) * np.hypot(one.gain_sd / one.gain, other.gain_sd / other.gain)
+    live = (one.flags | other.flags) & (FLAGS["unidentified"] | FLAGS["dead"]) == 0
+    a, b = np.where(live, one.gain, np.nan), np.where(live, other.gain, np.nan)
+    q = a / b
+    sd_q = np.abs(q) * np.hypot(one.gain_sd / a, other.gain_sd / b)
     return difference / (1 - q), np.abs(difference) / (1 - q) ** 2 * sd_q
 
 

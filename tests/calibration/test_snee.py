@@ -86,6 +86,17 @@ def test_dead_hot_and_saturated_do_not_spoil_the_rest(tmp_path) -> None:
     assert {"dead_pixels", "hot_pixels"} <= fitted
 
 
+def test_a_bowl_of_light_is_vignetting_and_not_pixel_spread(tmp_path) -> None:
+    model = PHYSICAL.without("bias_voltage_spread").with_effect(CATALOGUE["vignetting"](falloff=0.3))
+    model = model.with_effect(CATALOGUE["conversion_gain_spread"](sigma=0.03))
+    calibration = calibrate(flats(tmp_path, model, frames=2000))
+    parameters = {e.name: e.parameters() for e in calibrated_model(calibration).effects}
+    print(parameters["vignetting"], parameters["conversion_gain_spread"])
+    # 576 pixels of 3 % fix the falloff to 0.03 / (0.22 sqrt(576)) and their spread to 3 %.
+    assert abs(parameters["vignetting"]["falloff"] - 0.3) < 4 * 0.006
+    assert parameters["conversion_gain_spread"]["sigma"] == pytest.approx(0.03, rel=0.12)
+
+
 def test_the_model_it_writes_loads_and_fires_alike(physical, tmp_path: Path) -> None:
     model_path, maps_path, report_path = save_calibration(physical, tmp_path / "out")
     model = SensorModel.from_toml(model_path)
