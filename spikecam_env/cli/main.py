@@ -9,6 +9,7 @@ from typing import Annotated, Any, Union
 import tyro
 
 from spikecam_env.cli.bench import Bench
+from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
 from spikecam_env.cli.evaluate import Evaluate
@@ -31,6 +32,7 @@ COMMANDS: dict[str, Any] = {
     "denoise": Denoise,
     "train": Train,
     "evaluate": Evaluate,
+    "calibrate": Calibrate,
     "bench": Bench,
 }
 

@@ -24,7 +24,7 @@ else:
     import tomli as tomllib
 
 FORMAT = "spikecam-model/1"
-PRESETS = ("ideal", "physical", "scsim")
+PRESETS = ("ideal", "measured", "physical", "scsim")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class SensorModel:
 
     @classmethod
     def preset(cls, name: str = "scsim", *, script: bool = False) -> SensorModel:
-        """A shipped model: `ideal`, `scsim`, `physical`; `script=True` gives SCSim's public script to the letter."""
+        """A shipped model: one of PRESETS; `script=True` gives SCSim's public script to the letter."""
         if name not in PRESETS:
             raise unknown_name("preset", name, PRESETS)
         if script and name != "scsim":

@@ -48,6 +48,7 @@ class SpikeSensor:
     engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification, every effect), "cuda"
         (a GPU, bits of fast; for many cameras at once see SpikeSensorBatch), or "auto" (fast where it carries every
         effect of the model, else reference).
+    take: another recording by the same unit: other starting phase, other temporal noise.
     Raises InputError for an unknown engine, a shape that is not two positive whole numbers, a negative seed, for
     engine="fast" or "cuda" with an effect that it does not carry, and for engine="cuda" without a CUDA device.
 
@@ -62,10 +63,12 @@ class SpikeSensor:
         shape: tuple[int, int] = (250, 400),
         seed: int = 0,
         engine: str = "fast",
+        take: int = 0,
     ) -> None:
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
         self.shape = checked_shape(shape)
         self.engine = _chosen_engine(engine, self.model)
+        self.take = checked_seed(take, "take")
         self._optics = tuple(e for e in self.model.effects if e.overrides("image"))
         self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
         self._start(checked_seed(seed), phase=None)
@@ -112,7 +115,7 @@ class SpikeSensor:
 
     def clean_twin(self) -> SpikeSensor:
         """A noise-free camera at frame 0 with this one's initial phase: on the same scene it gives the clean stream."""
-        twin = SpikeSensor(self.model.noise_free(), self.shape, self.seed, engine=self.engine)
+        twin = SpikeSensor(self.model.noise_free(), self.shape, self.seed, engine=self.engine, take=self.take)
         twin._start(self.seed, phase=self.phase)
         return twin
 
@@ -122,15 +125,16 @@ class SpikeSensor:
         self.seed = seed
         self.frame = 0
         self.unit = self.model.draw_unit(self.shape, seed)
-        self.phase = generator(seed, "phase").random(self.shape) if phase is None else phase
+        noise_seed = seed if self.take == 0 else int(generator(seed, f"take {self.take}").integers(1 << 62))
+        self.phase = generator(noise_seed, "phase").random(self.shape) if phase is None else phase
         flat = self.phase.reshape(-1)
         if self.engine == "fast":
-            self._pixels = fast.start(self.unit, flat, seed)
+            self._pixels = fast.start(self.unit, flat, noise_seed)
         elif self.engine == "cuda":
             cuda = _cuda()
-            self._pixels = cuda.start([self.unit], [flat], [seed], cuda.checked_device("cuda"))
+            self._pixels = cuda.start([self.unit], [flat], [noise_seed], cuda.checked_device("cuda"))
         else:
-            self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, seed)
+            self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed)
 
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
         if self.engine == "fast":
@@ -179,13 +183,13 @@ def checked_frames(frames: Any) -> int:
     return number
 
 
-def checked_seed(seed: Any) -> int:
+def checked_seed(seed: Any, name: str = "seed") -> int:
     try:
         number = operator.index(seed)
     except TypeError:
         number = -1
     if number < 0:
-        raise InputError(f"seed = {seed!r}; it must be a whole number, 0 or more")
+        raise InputError(f"{name} = {seed!r}; it must be a whole number, 0 or more")
     return number
 
 

@@ -76,7 +76,10 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
     [
         (("record", "--out", "x.avi"), "unknown file type '.avi'; use .h5, .dat or .npz"),
         (("record", "--out", "nowhere/x.h5"), "there is no folder nowhere"),
-        (("record", "--out", "x.h5", "--model", "scs"), "unknown preset 'scs'; choose one of ideal, physical, scsim"),
+        (
+            ("record", "--out", "x.h5", "--model", "scs"),
+            "unknown preset 'scs'; choose one of ideal, measured, physical, scsim",
+        ),
         (("record", "--out", "x.h5", "--model", "no.toml"), "cannot read model file no.toml"),
         (("record", "--out", "x.h5", "--frames", "0"), "--frames 0"),
         (("record", "--out", "x.h5", "--height", "0"), "shape = (0, 400)"),

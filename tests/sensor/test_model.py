@@ -57,7 +57,7 @@ def _effect(model: SensorModel, name: str):
 
 
 def test_what_is_wrong_is_named_with_what_is_allowed(tmp_path) -> None:
-    with pytest.raises(InputError, match=r"unknown preset 'scs'; choose one of ideal, physical, scsim"):
+    with pytest.raises(InputError, match=r"unknown preset 'scs'; choose one of ideal, measured, physical, scsim"):
         SensorModel.preset("scs")
     with pytest.raises(InputError, match="shot_nois"):
         SensorModel.preset("scsim").without("shot_nois")

@@ -1,0 +1,217 @@
+"""Fit the preset `measured` to real recordings and write it with its provenance.
+
+    python -m spikecam_env.calibration.fit_measured ../shared/data/real
+
+From the flat maps: smooth shading, pixel-to-pixel response, log-normal dark level, hot pixels.  From the wall: white
+and slow temporal noise, told apart by A_k.  Prior: the published circuit, and with it N = C V_d / q and sqrt(kT/C).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+from scipy import ndimage, optimize, special
+
+from spikecam_env.calibration.real import (
+    FLAT_LUX,
+    MAPS_FRAME_RATE_HZ,
+    QUANTILES,
+    read_flat_maps,
+    read_wall,
+    wall_statistics,
+)
+from spikecam_env.calibration.wall_noise import OCTAVES, WallNoise, fit_wall_noise
+from spikecam_env.sensor import Circuit, SensorModel
+from spikecam_env.streams.whole import whole_file
+
+Array = NDArray[np.float64]
+
+PRESET = Path(str(resources.files("spikecam_env.sensor"))) / "presets" / "measured.toml"
+
+_SMOOTH = 12.0
+"""Standard deviation of the window that separates shading from pixels [pixels]."""
+
+_HOT_RATES = (0.03, 0.05, 0.1)
+"""Dark rates above which the hot population is counted [spikes/frame]; the crowd's log-normal ends at the first."""
+
+
+@dataclass(frozen=True)
+class MeasuredConstants:
+    """The preset's constants.  shading: spread of the smooth part; falloff: of a centred bowl of that spread.
+
+    shading_explained: share of the smooth part's variance that the best centred bowl has.
+    response_at_flat: median rate at 335 lux [spikes/frame].  dark_median [spikes/frame], dark_sigma: of the logarithm.
+    """
+
+    falloff: float
+    shading: float
+    shading_explained: float
+    pixel_spread: float
+    response_at_flat: float
+    dark_median: float
+    dark_sigma: float
+    hot_fraction: float
+    hot_mean: float
+    noise: WallNoise
+    reset_noise_mV: float
+
+
+def fit_measured(folder: str | Path, circuit: Circuit | None = None, *, progress: bool = False) -> MeasuredConstants:
+    """Fit all constants to the files in `folder`."""
+    circuit = circuit or Circuit()
+    light, dark = read_flat_maps(folder)
+    smooth, pixel_spread = split_shading(light)
+    falloff, explained = centred_bowl(smooth)
+    dark_median, dark_sigma = log_normal_through_quantiles(dark)
+    hot_fraction, hot_mean = hot_population(dark, dark_median, dark_sigma)
+    noise = fit_wall_noise(wall_statistics(read_wall(folder)), progress=progress)
+    beyond_shot = max(noise.white - 1 / circuit.threshold_electrons, 0.0)
+    return MeasuredConstants(
+        falloff,
+        float(smooth.std() / smooth.mean()),
+        explained,
+        pixel_spread,
+        float(np.median(light)),
+        dark_median,
+        dark_sigma,
+        hot_fraction,
+        hot_mean,
+        noise,
+        1e3 * float(np.sqrt(beyond_shot)) * circuit.swing_V,
+    )
+
+
+def split_shading(light: Array) -> tuple[Array, float]:
+    """The smooth part (H, W) of a response map, and the pixels' relative spread around it (robust: dust, edges)."""
+    smooth = ndimage.gaussian_filter(ndimage.median_filter(light, 5), _SMOOTH, mode="nearest")
+    rest = light / smooth - 1.0
+    low, high = np.quantile(rest, [0.1587, 0.8413])
+    return smooth, float((high - low) / 2)
+
+
+def centred_bowl(smooth: Array) -> tuple[float, float]:
+    """Falloff v of 1 - v r^2 about the middle with the map's relative spread, and the variance the best v explains."""
+    rows, columns = smooth.shape
+    y, x = np.mgrid[:rows, :columns]
+    square = (y - (rows - 1) / 2) ** 2 + (x - (columns - 1) / 2) ** 2
+    square = square / square.max()
+    slope, middle = np.polyfit(square.ravel(), smooth.ravel(), 1)
+    explained = 1 - np.var(smooth - slope * square - middle) / np.var(smooth)
+    spread = smooth.std() / smooth.mean()
+    return float(spread / (square.std() + spread * square.mean())), float(explained)
+
+
+def log_normal_through_quantiles(values: Array) -> tuple[float, float]:
+    """Median and sigma of the log-normal nearest to QUANTILES, by the largest error of their logarithms."""
+    logs = np.log(np.quantile(values, QUANTILES))
+    z = special.ndtri(QUANTILES)
+
+    def worst(parameters: Array) -> float:
+        return float(np.abs(parameters[0] + parameters[1] * z - logs).max())
+
+    start = np.array([logs[2], (logs[3] - logs[1]) / (z[3] - z[1])])
+    best = optimize.minimize(worst, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
+    return float(np.exp(best.x[0])), float(best.x[1])
+
+
+def hot_population(dark: Array, median: float, sigma: float) -> tuple[float, float]:
+    """Share of pixels in an exponential population on top of the log-normal crowd, and its mean [as dark]."""
+    counts = np.array([(dark > level).mean() for level in _HOT_RATES])
+    crowd = special.ndtr(-np.log(np.array(_HOT_RATES) / median) / sigma)
+    extra = np.maximum(counts - crowd, 1e-9)
+    # log of the survivors of an exponential is a line in the level
+    slope, start = np.polyfit(np.array(_HOT_RATES) - median, np.log(extra), 1, w=np.sqrt(counts))
+    return float(np.exp(start)), float(-1 / slope)
+
+
+def preset_text(c: MeasuredConstants, circuit: Circuit | None = None) -> str:
+    """The preset as TOML, every constant with where it is from."""
+    circuit = circuit or Circuit()
+    pA = circuit.capacitance_fF * circuit.swing_V * MAPS_FRAME_RATE_HZ * 1e-3
+    n = c.noise
+    octave_mV = 1e3 * float(np.sqrt(n.octave)) * circuit.swing_V
+    return f"""\
+# Fitted to real recordings by: python -m spikecam_env.calibration.fit_measured FOLDER
+# wall.npz: 500 frames of a wall; flat_335lux_maps.npz: response and dark level of 100 000 pixels, another unit perhaps.
+# How well it does: python -m spikecam_env.calibration.check_measured FOLDER, and docs/calibration.md.
+#
+# Prior, not fitted: the circuit (published SCSim constants), hence N = C V_d / q; 20 kHz for the maps, which do not say
+# their frame rate (at it the dark level is the published 0.44 pA).  335 lux on the maps is radiance {c.response_at_flat:.4f}.
+format = "spikecam-model/1"
+name = "measured"
+frame_rate_hz = 40000.0
+
+[circuit]
+reset_V = {circuit.reset_V}
+reference_V = {circuit.reference_V}
+bias_V = {circuit.bias_V}
+capacitance_fF = {circuit.capacitance_fF}
+temperature_K = {circuit.temperature_K}
+
+# Flat maps: smooth shading, spread {100 * c.shading:.2f} %.  Their bowl is off-centre, to the upper right: the best centred bowl has
+# {100 * c.shading_explained:.0f} % of its variance.  This falloff has the same spread.
+[[effect]]
+name = "vignetting"
+falloff = {c.falloff:.4f}
+
+# Flat maps: pixel-to-pixel response about the shading (half of the 16 .. 84 % range); any mix of alpha, C_S and V_S.
+[[effect]]
+name = "conversion_gain_spread"
+sigma = {c.pixel_spread:.4f}
+
+# Flat maps: log-normal nearest to the 1, 10, 50, 90, 99 % quantiles, median {c.dark_median:.5f} spikes/frame at 20 kHz.
+[[effect]]
+name = "dark_current"
+mean_pA = {c.dark_median * pA:.4f}
+
+[[effect]]
+name = "dark_current_tail"
+sigma = {c.dark_sigma:.4f}
+
+# Flat maps: exponential population beyond the log-normal, from counts above 0.03, 0.05 and 0.1 spikes/frame.
+[[effect]]
+name = "hot_pixels"
+fraction = {c.hot_fraction:.2e}
+mean_pA = {c.hot_mean * pA:.2f}
+
+# Wall, A_k at k = 1 .. 40 less an ideal camera's, by simulation (chi2 {n.chi2:.0f} for 38; {n.white_alone_chi2:.0f} for 39 without slow noise):
+# white s^2 = 1/N + kappa^2 = {n.white:.2e} +- {n.white_sd:.0e}, {100 * np.sqrt(n.white):.3f} % of the threshold a spike.
+# N is prior; the reset noise is what remains, of which sqrt(kT/C) is {circuit.thermal_noise_mV:.3f} mV.  The wall fixes only the sum.
+[[effect]]
+name = "shot_noise"
+quanta = {circuit.threshold_electrons:.1f}
+
+[[effect]]
+name = "reset_noise"
+sigma_mV = {c.reset_noise_mV:.3f}
+
+# Wall: slow noise, variance of an octave {n.octave:.2e} +- {n.octave_sd:.0e} thresholds^2; 1/f is the form assumed, and what is
+# slower than the recording (500 frames) is extrapolated.
+[[effect]]
+name = "threshold_flicker_noise"
+sigma_mV = {octave_mV:.3f}
+octaves = {OCTAVES}
+"""  # noqa: E501
+
+
+def main(
+    folder: tyro.conf.Positional[Path],
+    out: Path = PRESET,
+) -> None:
+    """Fit the preset `measured` to the real recordings in `folder` and write it."""
+    constants = fit_measured(folder, progress=True)
+    text = preset_text(constants)
+    with whole_file(out) as beside:
+        beside.write_text(text, encoding="utf-8")
+    SensorModel.from_toml(out)
+    print(text)
+    print(f"335 lux: median response {constants.response_at_flat:.4f} spikes/frame (of {FLAT_LUX:g} lux); wrote {out}")
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

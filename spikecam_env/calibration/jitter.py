@@ -1,0 +1,149 @@
+"""Temporal noise from spike times: the law of A_k, and its fit over many pixels and levels.
+
+A_k = E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] for spikes at frames t_n = floor(c_n), crossings c_n of mean interval T:
+
+    A_k = 2 k s^2 T^2 + k^2 b T^2 + 1/2 - 8 r_k + 2 r_2k
+    r_k = sum over m >= 1 of cos(2 pi m k T) exp(-2 pi^2 m^2 k s^2 T^2) / (2 pi^2 m^2)
+
+s^2 = 1/N + kappa^2: white noise, drawn anew for each spike.  b: slow noise (1/f).  1/2 - 8 r_k + 2 r_2k: reading spikes
+in whole frames; r_k is the covariance of the fractions lost at spikes k apart, B_2(frac kT) / 2 without noise, and
+dies once k spikes jitter by a frame.  Slopes in k of a pixel whose kT is near a whole number are wrong without r_k.
+
+Derivation: docs/calibration.md.  Without r_k: DESIGN section 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+_HARMONICS = 12
+_ITERATIONS = 30
+_LEAST = 1e-10
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """white: s^2 = 1/N + kappa^2, pooled; slow: b, of k^2 (see the module).  sd: standard errors, over pixels.
+
+    slow_fitted: whether b was kept; it is dropped (0) where it is not four standard errors above nothing.
+    weight: (P,) share of each pixel in s^2, which is the mean of their own with these weights.
+    steps, by_step, by_step_sd: (K,) what each k alone gives for s^2 + k b / 2; flat without slow noise.
+    """
+
+    white: float
+    white_sd: float
+    slow: float
+    slow_sd: float
+    slow_fitted: bool
+    weight: Array
+    steps: NDArray[np.int64]
+    by_step: Array
+    by_step_sd: Array
+
+
+def second_difference(k: ArrayLike, interval: ArrayLike, white: float, slow: float = 0.0) -> Array:
+    """A_k of steady pixels; k and interval T [frames] broadcast against each other."""
+    steps, t = np.asarray(k), np.asarray(interval, dtype=np.float64)
+    return (2 * steps * white + steps**2 * slow) * t**2 + _quantisation(steps, t, white)[0]
+
+
+def _quantisation(k: NDArray[np.int64], interval: Array, white: float) -> tuple[Array, Array]:
+    """1/2 - 8 r_k + 2 r_2k, what reading in whole frames adds to A_k, and its derivative in s^2."""
+    steps, t = np.broadcast_arrays(k, interval)
+    out = np.empty((2, steps.size))
+    _sum_harmonics(steps.ravel().astype(np.float64), t.ravel(), white, out)
+    return out[0].reshape(steps.shape), out[1].reshape(steps.shape)
+
+
+@njit(cache=True, error_model="numpy")
+def _sum_harmonics(k, interval, white, out):  # type: ignore[no-untyped-def]
+    for i in range(k.size):
+        turn = 2 * np.pi * (k[i] * interval[i] % 1.0)
+        rate = 2 * np.pi**2 * k[i] * interval[i] ** 2
+        value, slope = 0.5, 0.0
+        for m in range(1, _HARMONICS + 1):
+            decay = m * m * rate * white
+            if decay > 30.0:
+                break
+            near = 8 * np.cos(m * turn) * np.exp(-decay) / (2 * np.pi**2 * m * m)
+            far = 2 * np.cos(2 * m * turn) * np.exp(-2 * decay) / (2 * np.pi**2 * m * m)
+            value += far - near
+            slope += m * m * rate * (near - 2 * far)
+        out[0, i] = value
+        out[1, i] = slope
+
+
+def fit_jitter(steps: NDArray[np.int64], square: Array, terms: Array, rate: Array) -> Jitter | None:
+    """Fit s^2 and b to sums of squares (R, P, K) with terms (R, P, K), given rates (R, P) [spikes/frame].
+
+    R recordings, P pixels; entries without terms or rate carry no weight.  Weighted moments, iterated; errors from
+    the scatter over pixels.  Returns None where fewer than 100 terms are there.
+    """
+    usable = np.isfinite(rate) & (rate > 0)
+    terms = np.where(usable[..., None], terms, 0.0)
+    if terms.sum() < 100:
+        return None
+    interval = np.where(usable, 1.0 / np.where(usable, rate, 1.0), 1.0)[..., None]
+    both = _fit(steps, square, terms, interval, slow=True)
+    keep = bool(both.slow > 4 * both.slow_sd)
+    fit = both if keep else _fit(steps, square, terms, interval, slow=False)
+    used = terms.sum(axis=(0, 1)) > 0
+    by_step, by_step_sd = _by_step(steps, square, terms, interval, fit)
+    return Jitter(
+        fit.white, fit.white_sd, fit.slow, both.slow_sd, keep, fit.weight, steps[used], by_step[used], by_step_sd[used]
+    )
+
+
+def _by_step(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array, fit: _Fit) -> tuple[Array, Array]:
+    """What each k alone gives for s^2 + k b / 2, and its standard error, (K,)."""
+    fraction = _quantisation(steps, interval, fit.white)[0]
+    shape = 2 * steps * interval**2
+    weight = shape / np.maximum((fit.white + steps * fit.slow / 2) * shape + fraction, 0.05) ** 2
+    above = (weight * np.where(terms > 0, square - terms * fraction, 0.0)).sum(axis=0)
+    per = (weight * shape * terms).sum(axis=0)
+    total = np.maximum(per.sum(axis=0), 1e-300)
+    value = above.sum(axis=0) / total
+    return value, np.sqrt(((above - value * per) ** 2).sum(axis=0)) / total
+
+
+class _Fit(NamedTuple):
+    white: float
+    white_sd: float
+    slow: float
+    slow_sd: float
+    weight: Array
+
+
+def _fit(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array, *, slow: bool) -> _Fit:
+    """Gauss-Newton on weighted means."""
+    t2 = interval**2
+    white, b = 3e-5, 0.0
+    for _ in range(_ITERATIONS):
+        fraction, slope = _quantisation(steps, interval, white)
+        expected = (2 * steps * white + steps**2 * b) * t2 + fraction
+        # The fraction's own slope is left out of the weights: it is large where kT happens to be near a whole number.
+        shapes = [2 * steps * t2] + ([steps**2 * t2] if slow else [])
+        slopes = [shapes[0] + slope, *shapes[1:]]
+        # A mean of n overlapping squares varies like one of n / k free ones, 2 A^2 each.
+        weight = 1.0 / (steps * np.maximum(expected, 0.05) ** 2)
+        gap = np.where(terms > 0, square - terms * expected, 0.0)
+        # Pixels are independent, so scores are summed over recordings and steps first.
+        scores = np.stack([(weight * x * gap).sum(axis=(0, 2)) for x in shapes])
+        curvature = np.array([[(weight * x * y * terms).sum() for y in slopes] for x in shapes])
+        inverse = np.linalg.inv(curvature)
+        change = inverse @ scores.sum(axis=1)
+        before = white
+        white = float(np.clip(white + change[0], max(white / 4, _LEAST), 4 * white))
+        b += change[1] if slow else 0.0
+        if abs(white - before) < 1e-6 * before:
+            break
+    sd = np.sqrt(np.diag(inverse @ (scores @ scores.T) @ inverse.T))
+    share = (weight * shapes[0] * shapes[0] * terms).sum(axis=(0, 2))
+    return _Fit(white, float(sd[0]), b, float(sd[1]) if slow else 0.0, share / share.sum())

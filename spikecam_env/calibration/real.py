@@ -1,0 +1,166 @@
+"""The real recordings that the preset `measured` is fitted to, and what is measured on them.
+
+wall.npz: 500 frames of a wall in good light.  Only a rectangle of bare wall is used: nothing moves there; leaves and
+edges, which tremble by more than the noise, are outside.  flat_335lux_maps.npz: per pixel, mean interval at 335 lux and
+dark level.  Neither says its frame rate; the dark level agrees with the published 0.44 pA at 20 kHz, taken here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from spikecam_env.calibration.response import rates_from_times
+from spikecam_env.calibration.spike_times import SpikeTimes, spike_times
+from spikecam_env.errors import InputError
+from spikecam_env.streams import pack_frames
+
+Array = NDArray[np.float64]
+
+WALL = (slice(110, 200), slice(15, 355))
+"""Rows and columns of bare wall."""
+
+STEPS = tuple(range(1, 41))
+"""k of A_k that acceptance asks for."""
+
+MAPS_FRAME_RATE_HZ = 20_000.0
+FLAT_LUX = 335.0
+HOT_LUX = 40.0
+"""Dark level, as light, above which a pixel counts as hot in the maps' notes."""
+
+QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99)
+
+
+def read_wall(folder: str | Path) -> NDArray[np.uint8]:
+    """(T, rows, columns) uint8 spikes of the bare wall."""
+    spikes = _array(Path(folder) / "wall.npz", "arr_0")
+    return np.ascontiguousarray(np.moveaxis(spikes, 2, 0)[:, WALL[0], WALL[1]])
+
+
+def read_flat_maps(folder: str | Path) -> tuple[Array, Array]:
+    """(H, W) rates at 335 lux without the dark's part, and in the dark [spikes/frame].
+
+    Nd is the dark level in lux: D_light is the interval at 335 + Nd lux in all.
+    """
+    path = Path(folder) / "flat_335lux_maps.npz"
+    interval, dark_lux = (_array(path, name).astype(np.float64) for name in ("D_light", "Nd"))
+    per_lux = 1.0 / (interval * (FLAT_LUX + dark_lux))
+    return FLAT_LUX * per_lux, dark_lux * per_lux
+
+
+def _array(path: Path, name: str) -> NDArray[np.generic]:
+    try:
+        with np.load(path) as arrays:
+            return arrays[name]
+    except (OSError, KeyError) as error:
+        raise InputError(f"cannot read {name} from {path}: {error}; give the folder of the real recordings") from error
+
+
+@dataclass(frozen=True)
+class WallStatistics:
+    """What static pixels show.  times: spikes of each pixel at STEPS; rate: (P,) [spikes/frame].
+
+    excess, excess_sd: (40,) A_k less that of an ideal camera at the same rates, and its standard error over pixels.
+    minimum_range: (P,) smallest range over slopes a of N(t) - a t; below 1 for an ideal camera.
+    variance_excess: mean over pixels of interval variance less f(1-f); variance_excess_sd: its standard error.
+    """
+
+    times: SpikeTimes
+    rate: Array
+    excess: Array
+    excess_sd: Array
+    minimum_range: Array
+    variance_excess: float
+    variance_excess_sd: float
+
+
+def wall_statistics(spikes: NDArray[np.uint8]) -> WallStatistics:
+    """All of them, from (T, rows, columns) spikes of steady light."""
+    pixels = spikes.shape[1] * spikes.shape[2]
+    packed = pack_frames(spikes)
+    times = spike_times(packed, pixels, STEPS)
+    rate = rates_from_times([times]).rate[0]
+    above = times.square - times.terms * ideal_second_difference(np.array(STEPS), 1.0 / rate[:, None])
+    terms = times.terms.sum(axis=0)
+    excess = above.sum(axis=0) / terms
+    scatter = np.sqrt(((above - excess * times.terms) ** 2).sum(axis=0)) / terms
+    floor = _variance_above_floor(spikes.reshape(len(spikes), pixels))
+    return WallStatistics(
+        times,
+        rate,
+        excess,
+        scatter,
+        _minimum_ranges(np.ascontiguousarray(spikes.reshape(len(spikes), pixels).T)),
+        float(floor.mean()),
+        float(floor.std() / np.sqrt(floor.size)),
+    )
+
+
+def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -> Array:
+    """(P,) rates drawn from what each pixel's first and last spike leave open, under jitter s^2 = white.
+
+    Measured rates crowd at simple fractions: a pixel of interval 5.004 shows one of 5 for a hundred spikes.  A camera
+    simulated at exactly such rates has second differences that no real one has; drawn rates lie as the true ones do.
+    """
+    n = np.maximum(times.count - 1, 1)
+    interval = np.maximum(times.last - times.first, 1) / n
+    after = times.frames - 1 - times.last
+    begin = times.first + rng.random(n.size) * np.clip(interval - times.first, 0.0, 1.0)
+    end = times.frames - after - rng.random(n.size) * np.clip(interval - after, 0.0, 1.0)
+    walk = np.sqrt(n * white) * interval * rng.standard_normal(n.size)
+    return n / (end - begin + walk)
+
+
+def ideal_second_difference(k: NDArray[np.int64], interval: Array) -> Array:
+    """A_k of a noise-free pixel of interval T, phase uniform: 2 min(x, 1 - x), x the fractional part of kT."""
+    x = np.mod(k * interval, 1.0)
+    return 2.0 * np.minimum(x, 1.0 - x)
+
+
+def _variance_above_floor(spikes: NDArray[np.uint8]) -> Array:
+    """(P,) interval variance less f(1-f), f the fractional part of the pixel's mean interval."""
+    count = spikes.sum(axis=0, dtype=np.int64)
+    frames, pixel = np.nonzero(spikes.T)[::-1]
+    same = np.diff(pixel) == 0
+    interval, owner = np.diff(frames)[same].astype(np.float64), pixel[1:][same]
+    n = np.maximum(count - 1, 1)
+    mean = np.bincount(owner, interval, count.size) / n
+    variance = np.bincount(owner, interval**2, count.size) / n - mean**2
+    fraction = mean % 1.0
+    return (variance - fraction * (1 - fraction))[count > 2]
+
+
+@njit(cache=True)
+def _minimum_ranges(spikes):  # type: ignore[no-untyped-def]
+    """(P,) of (P, T): min over a of max(N - a t) - min(N - a t), t at the ends of frames, by golden section."""
+    out = np.empty(spikes.shape[0])
+    frames = spikes.shape[1]
+    counted = np.empty(frames + 1)
+    golden = (np.sqrt(5.0) - 1) / 2
+    for p in range(spikes.shape[0]):
+        counted[0] = 0
+        for t in range(frames):
+            counted[t + 1] = counted[t] + spikes[p, t]
+        middle = counted[frames] / frames
+        low, high = middle - 2.0 / frames, middle + 2.0 / frames
+        while high - low > 1e-7:
+            a, b = high - golden * (high - low), low + golden * (high - low)
+            if _range(counted, a) < _range(counted, b):
+                high = b
+            else:
+                low = a
+        out[p] = _range(counted, (low + high) / 2)
+    return out
+
+
+@njit(inline="always")
+def _range(counted, slope):  # type: ignore[no-untyped-def]
+    low, high = np.inf, -np.inf
+    for t in range(counted.size):
+        value = counted[t] - slope * t
+        low, high = min(low, value), max(high, value)
+    return high - low

@@ -1,0 +1,93 @@
+"""A calibration as files: model.toml, maps.h5 and report.html, each whole or absent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from spikecam_env.calibration.findings import findings
+from spikecam_env.calibration.population import FLAGS, fitted_model
+from spikecam_env.calibration.report import report
+from spikecam_env.calibration.snee import Calibration
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import SensorModel
+from spikecam_env.streams.whole import whole_file
+from spikecam_env.version import __version__
+
+MAPS_FORMAT = "spikecam-maps/1"
+
+
+def save_calibration(calibration: Calibration, folder: str | Path) -> list[Path]:
+    """Write all three files; returns their paths."""
+    target = Path(folder)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot use {target} as a folder for results: {error.strerror}") from error
+    paths = [target / name for name in ("model.toml", "maps.h5", "report.html")]
+    calibrated_model(calibration).to_toml(paths[0])
+    save_maps(calibration, paths[1])
+    with whole_file(paths[2]) as beside:
+        beside.write_text(report(calibration, findings(calibration)), encoding="utf-8")
+    return paths
+
+
+def calibrated_model(calibration: Calibration) -> SensorModel:
+    """A model of cameras like this one: its spreads, noise and odd pixels, on the prior circuit.
+
+    Its radiance is that of the labels times `radiance_scale` of the maps (mean alpha/phi), so that 1.0 keeps meaning
+    one spike a frame of the nominal pixel.
+    """
+    c = calibration
+    electrons, reset_noise_mV = c.circuit.threshold_electrons, c.circuit.thermal_noise_mV
+    if c.charge is not None:
+        electrons, reset_noise_mV = c.charge.electrons, c.charge.reset_noise_mV
+    return fitted_model(
+        f"calibrated from {c.campaign}",
+        c.circuit,
+        c.frame_rate_hz,
+        gain=c.main.gain,
+        gain_sd=c.main.gain_sd,
+        dark=c.main.dark,
+        flags=c.flags,
+        electrons=electrons,
+        reset_noise_mV=reset_noise_mV,
+        swing_V=c.swing_V,
+        swing_sd_V=c.swing_sd_V,
+    )
+
+
+def save_maps(calibration: Calibration, path: str | Path) -> None:
+    """Per-pixel maps (H, W) as HDF5: flags, swing_V, and a group a setting with gain, dark, their errors and fit."""
+    c = calibration
+    with whole_file(path) as beside, h5py.File(beside, "w") as file:
+        file.attrs.update(
+            format=MAPS_FORMAT,
+            version=__version__,
+            campaign=c.campaign,
+            frame_rate_hz=c.frame_rate_hz,
+            radiance_scale=float(c.main.gain[c.flags == 0].mean()),
+        )
+        flags = file.create_dataset("flags", data=c.flags, compression="gzip")
+        flags.attrs.update({f"bit_{name}": bit for name, bit in FLAGS.items()})
+        for i, setting in enumerate(c.settings):
+            group = file.create_group(f"setting_{i}")
+            group.attrs["v_d"] = np.nan if setting.v_d is None else setting.v_d
+            for name, unit in _MAPS.items():
+                group.create_dataset(name, data=getattr(setting, name), compression="gzip").attrs["unit"] = unit
+        if c.swing_V is not None:
+            for name in ("swing_V", "swing_sd_V"):
+                file.create_dataset(name, data=getattr(c, name), compression="gzip").attrs["unit"] = "V"
+
+
+_MAPS = {
+    "gain": "thresholds/frame at radiance 1 (alpha/phi)",
+    "gain_sd": "thresholds/frame at radiance 1",
+    "dark": "thresholds/frame (I_dark/phi)",
+    "dark_sd": "thresholds/frame",
+    "covariance": "(thresholds/frame)^2, of gain and dark",
+    "chi2": "reduced",
+    "used": "recordings",
+}

@@ -1,0 +1,308 @@
+"""SNEE: what a campaign of flats says about a camera, and what it cannot say.
+
+Rates at one V_d fix two numbers a pixel, alpha/phi and I_dark/phi; their temporal noise fixes one more for the camera,
+1/N + kappa^2.  With a second V_d the same charge is divided by another threshold, so V_S, N and kappa come apart.
+alpha, C_S and I_dark in ampere stay prior: rates know charge only in thresholds.  Source: paper (13)-(17).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from spikecam_env.calibration.campaign import Campaign, CampaignRecording, read_campaign
+from spikecam_env.calibration.charge import Charge, charge_at_one_v_d, charge_at_two_v_d
+from spikecam_env.calibration.jitter import Jitter, fit_jitter
+from spikecam_env.calibration.population import FLAGS, pixel_flags
+from spikecam_env.calibration.response import Lines, Rates, fit_lines, rates_from_counts, rates_from_times, together
+from spikecam_env.calibration.spike_times import STEPS, SpikeTimes, spike_times
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import Circuit
+
+Array = NDArray[np.float64]
+
+Z90 = 1.6448536
+"""Half-width of a 90 % interval [standard deviations]."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """One recording's part.  radiance, rate: medians over pixels.  saturated: share of pixels left out for it.
+
+    residual: median over pixels of measured over fitted rate, less one: the label's error, if the line is right.
+    """
+
+    name: str
+    use: str
+    frames: int
+    radiance: float
+    rate: float
+    saturated: float
+    residual: float
+
+
+@dataclass(frozen=True)
+class Setting:
+    """All of one V_d.  Maps are (H, W): gain = alpha/phi [thresholds/frame at radiance 1], dark = I_dark/phi
+    [thresholds/frame], their standard deviations, reduced chi-square, and recordings used.
+
+    light, rate, residual: (R, H*W) radiance, measured rate, and its distance from the line in standard deviations.
+    excess: pooled reduced chi-square; where above one, standard deviations were widened by its root.
+    """
+
+    v_d: float | None
+    levels: tuple[Level, ...]
+    gain: Array
+    gain_sd: Array
+    dark: Array
+    dark_sd: Array
+    covariance: Array
+    chi2: Array
+    used: NDArray[np.int64]
+    excess: float
+    flags: NDArray[np.uint8]
+    jitter: Jitter | None
+    light: Array
+    rate: Array
+    residual: Array
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a campaign fixed.  settings: by V_d, the main one first.  flags: (H, W) uint8, bits of `population.FLAGS`.
+
+    charge: N and kappa, with what they rest on.  swing_V: (H, W) V_d + V_S [V], with a second V_d, else None.
+    warnings: what the data could not say, or contradict.
+    """
+
+    campaign: str
+    shape: tuple[int, int]
+    frame_rate_hz: float
+    settings: tuple[Setting, ...]
+    flags: NDArray[np.uint8]
+    charge: Charge | None
+    swing_V: Array | None
+    swing_sd_V: Array | None
+    circuit: Circuit
+    warnings: tuple[str, ...]
+
+    @property
+    def main(self) -> Setting:
+        """The setting with most recordings."""
+        return self.settings[0]
+
+
+def calibrate(
+    campaign: Campaign | str | Path,
+    *,
+    circuit: Circuit | None = None,
+    reset_noise_mV: float | None = None,
+    progress: bool = False,
+) -> Calibration:
+    """Estimate a camera from static recordings of known light.
+
+    circuit: prior for what rates cannot say (capacitance, reference voltage); default the published one.
+    reset_noise_mV: prior for the reset noise, used where there is one V_d; default thermal, sqrt(kT/C).
+    Raises InputError where nothing can be identified: one level only, all dark, labels that contradict the rates.
+    """
+    campaign = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
+    prior = circuit or Circuit()
+    warnings: list[str] = []
+    settings = [
+        _fit_setting(v_d, recordings, campaign, warnings, progress)
+        for v_d, recordings in _by_v_d(campaign, warnings).items()
+    ]
+    settings.sort(key=lambda s: -sum(level.use == "fit" for level in s.levels))
+    settings = settings[:2]
+    main = settings[0]
+    flags = main.flags
+    if main.v_d is not None:
+        prior = replace(prior, reset_V=prior.reference_V + main.v_d)
+    noise_mV = prior.thermal_noise_mV if reset_noise_mV is None else reset_noise_mV
+    swing = swing_sd = charge = None
+    if len(settings) == 2 and main.v_d is not None and settings[1].v_d is not None:
+        swing, swing_sd = swing_from_two_v_d(main, settings[1])
+        known = np.where(flags == 0, swing, np.nan).reshape(-1)
+        prior = replace(prior, bias_V=float(np.nanmean(known)) - main.v_d)
+        charge = charge_at_two_v_d(main.jitter, settings[1].jitter, known, known - main.v_d + settings[1].v_d)
+    if charge is None:
+        charge = charge_at_one_v_d(main.jitter, prior.swing_V, noise_mV)
+    return Calibration(
+        campaign.folder.name,
+        campaign.shape,
+        campaign.frame_rate_hz,
+        tuple(settings),
+        flags,
+        charge,
+        swing,
+        swing_sd,
+        prior,
+        tuple(warnings),
+    )
+
+
+def swing_from_two_v_d(one: Setting, other: Setting) -> tuple[Array, Array]:
+    """(H, W) swing V_d + V_S at the first setting and its standard deviation [V]; NaN for pixels without a slope.
+
+    The same light and charge over another threshold: gain_1 / gain_2 = (V_2 + V_S) / (V_1 + V_S) = q, so
+    V_1 + V_S = (V_1 - V_2) / (1 - q).
+    """
+    difference = float(one.v_d or 0.0) - float(other.v_d or 0.0)
+    live = (one.flags | other.flags) & (FLAGS["unidentified"] | FLAGS["dead"]) == 0
+    a, b = np.where(live, one.gain, np.nan), np.where(live, other.gain, np.nan)
+    q = a / b
+    sd_q = np.abs(q) * np.hypot(one.gain_sd / a, other.gain_sd / b)
+    return difference / (1 - q), np.abs(difference) / (1 - q) ** 2 * sd_q
+
+
+def _by_v_d(campaign: Campaign, warnings: list[str]) -> dict[float | None, list[tuple[CampaignRecording, Array]]]:
+    """Static recordings of known light, by V_d."""
+    groups: dict[float | None, list[tuple[CampaignRecording, Array]]] = {}
+    for recording in campaign.recordings:
+        light = recording.static_radiance()
+        if light is None:
+            warnings.append(f"{recording.name}: not used, its light is unknown or moves")
+        else:
+            groups.setdefault(recording.v_d, []).append((recording, light))
+    if not groups:
+        raise InputError(f"{campaign.folder} has no static recording of known light; SNEE needs flats at known levels")
+    if len(groups) > 2:
+        warnings.append(f"{len(groups)} values of v_d; the two with most recordings are used")
+    return groups
+
+
+def _fit_setting(
+    v_d: float | None,
+    recordings: list[tuple[CampaignRecording, Array]],
+    campaign: Campaign,
+    warnings: list[str],
+    progress: bool,
+) -> Setting:
+    pixels = campaign.shape[0] * campaign.shape[1]
+    use = np.array([r.use == "fit" for r, _ in recordings])
+    light = np.stack([x.reshape(-1) for _, x in recordings])
+    _check_levels(light[use], v_d)
+    times: list[SpikeTimes | None] = [
+        spike_times(r.packed(), pixels) if r.spikes else None
+        for r, _ in tqdm(recordings, desc="read recordings", unit="recording", disable=not progress)
+    ]
+    rates = together(
+        [
+            rates_from_times([t]) if t is not None else rates_from_counts(r.rate().reshape(-1), r.frames)
+            for (r, _), t in zip(recordings, times, strict=True)
+        ]
+    )
+    _check_order(recordings, light, rates, use)
+    spikes = [t for t in times if t is not None]
+    jitter = _pooled_jitter(spikes, np.ones(pixels, dtype=bool))
+    if jitter is None:
+        warnings.append("no spike times: temporal noise is not identified; intervals assume s^2 of shot noise alone")
+    white = jitter.white if jitter else 1.0 / Circuit().threshold_electrons
+    lines = fit_lines(light, rates, white, use)
+    excess = _pooled_excess(lines)
+    if lines.freedom.max() == 0:
+        warnings.append("two levels only: that rate is linear in light is assumed, not tested")
+    if excess > 1.5:
+        warnings.append(
+            f"residuals are {np.sqrt(excess):.1f} times what jitter explains: labels, linearity or steadiness of the "
+            "light are off by that much; intervals are widened"
+        )
+    widen = np.sqrt(max(excess, 1.0)) if excess > 1.2 else 1.0
+    reduced = lines.chi2 / np.maximum(lines.freedom, 1)
+    flags = pixel_flags(lines.gain, lines.dark, reduced, lines.freedom, excess)
+    if jitter is not None and np.any(flags):
+        jitter = _pooled_jitter(spikes, flags == 0) or jitter
+    if jitter is not None and jitter.slow_fitted:
+        warnings.append(f"A_k rises with k^2 too: slow noise, b = {jitter.slow:.2g} +- {jitter.slow_sd:.1g}")
+    shaped: dict[str, Any] = {
+        "gain": lines.gain,
+        "gain_sd": widen * np.sqrt(lines.var_gain),
+        "dark": lines.dark,
+        "dark_sd": widen * np.sqrt(lines.var_dark),
+        "covariance": widen**2 * lines.covariance,
+        "chi2": reduced,
+        "flags": flags,
+        "used": lines.used,
+    }
+    maps = {name: values.reshape(campaign.shape) for name, values in shaped.items()}
+    levels = _levels(recordings, light, rates, lines, flags == 0)
+    return Setting(
+        v_d, levels, **maps, excess=excess, jitter=jitter, light=light, rate=rates.rate, residual=lines.residual
+    )
+
+
+def _check_levels(light: Array, v_d: float | None) -> None:
+    at = "" if v_d is None else f" at v_d = {v_d:g} V"
+    if light.size == 0 or light.max() <= 0:
+        raise InputError(f"all fit recordings{at} are dark: the response to light cannot be identified; add a lit flat")
+    if np.all(light == light[0]):
+        raise InputError(
+            f"one level only{at}: its rate fixes gain * {np.median(light):g} + dark together, neither alone; "
+            "add a recording at another level or in the dark"
+        )
+
+
+def _check_order(
+    recordings: list[tuple[CampaignRecording, Array]], light: Array, rates: Rates, use: NDArray[np.bool_]
+) -> None:
+    """More light, more spikes: raises InputError where medians over pixels say otherwise by more than 1 %."""
+    label, rate = np.median(light, axis=1), np.nanmedian(rates.rate, axis=1)
+    lit = rate[use & (label > 0)]
+    if lit.size and lit.max() <= 2 / rates.frames.max():
+        raise InputError("no pixel responds to light in any recording: was the cap on, or are these the right files?")
+    order = np.argsort(label, kind="stable")
+    for a, b in pairwise(order):
+        if label[b] > label[a] and rate[b] < 0.99 * rate[a] - 2 / min(rates.frames[a], rates.frames[b]):
+            raise InputError(
+                f"recordings {recordings[a][0].name!r} and {recordings[b][0].name!r} contradict their labels: radiance "
+                f"{label[a]:g} gave {rate[a]:.4g} spikes a frame, {label[b]:g} gave {rate[b]:.4g}; are labels swapped?"
+            )
+
+
+def _pooled_jitter(times: list[SpikeTimes], pixels: NDArray[np.bool_]) -> Jitter | None:
+    if not times:
+        return None
+    saturated = np.stack([t.count / t.frames > 0.97 for t in times])
+    rate = np.where(saturated | ~pixels, np.nan, np.stack([t.rate for t in times]))
+    square, terms = np.stack([t.square for t in times]), np.stack([t.terms for t in times]).astype(np.float64)
+    return fit_jitter(np.array(STEPS), square, terms, rate)
+
+
+def _pooled_excess(lines: Lines) -> float:
+    """Reduced chi-square of the middle four fifths of pixels, so that odd pixels do not count."""
+    good = lines.freedom > 0
+    if not np.any(good):
+        return 1.0
+    reduced = lines.chi2[good] / lines.freedom[good]
+    low, high = np.quantile(reduced, [0.1, 0.9])
+    return float(reduced[(reduced >= low) & (reduced <= high)].mean())
+
+
+def _levels(
+    recordings: list[tuple[CampaignRecording, Array]],
+    light: Array,
+    rates: Rates,
+    lines: Lines,
+    regular: NDArray[np.bool_],
+) -> tuple[Level, ...]:
+    fitted = lines.gain * light + lines.dark
+    with np.errstate(invalid="ignore", divide="ignore"):
+        off = np.where(rates.saturated | ~regular, np.nan, rates.rate / fitted - 1.0)
+    return tuple(
+        Level(
+            r.name,
+            r.use,
+            r.frames,
+            float(np.median(light[i])),
+            float(np.nanmedian(rates.rate[i])),
+            float(rates.saturated[i].mean()),
+            float(np.nanmedian(off[i])) if np.any(np.isfinite(off[i])) else np.nan,
+        )
+        for i, (r, _) in enumerate(recordings)
+    )
