@@ -11,6 +11,7 @@ import torch
 from denoiser.online import OnlineDnSS
 from denoiser.recipe import RECIPES
 from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.streams import isi_planes
 
 SHAPE = (9, 14)
 MODES = ("paper", "best")
@@ -162,3 +163,16 @@ def test_the_state_of_another_mode_is_refused():
     online.push(stream(3))
     with pytest.raises(InputError, match="state"):
         denoiser("best").restore(online.state())
+
+
+def test_parallel_kernels_do_not_change_torch_s_threads():
+    """numba's OpenMP layer sets the number of threads that torch sees."""
+    before = torch.get_num_threads()
+    try:
+        torch.set_num_threads(1)
+        online = denoiser("best")
+        isi_planes(stream(20))
+        online.push(stream(40))
+        assert torch.get_num_threads() == 1
+    finally:
+        torch.set_num_threads(before)
