@@ -26,12 +26,3 @@ def number_type(precision: str) -> torch.dtype:
         fast = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)()
         return torch.bfloat16 if fast else torch.float32
     return torch.bfloat16 if precision == "bfloat16" else torch.float32
-
-
-def keep_threads(count: int) -> None:
-    """Torch's number of threads, as it was: a numba kernel run in parallel with OpenMP sets torch's to its own.
-
-    Where other work fills the processor, threads more than asked for spin on it: 60 times slower was seen.
-    """
-    if torch.get_num_threads() != count:
-        torch.set_num_threads(count)

@@ -62,7 +62,6 @@ class OnlineDnSS:
         self._recipe, self._stride = recipe, stride
         self._network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._type = infer.number_type(precision)
-        self._threads = torch.get_num_threads()
         self.reset()
 
     @classmethod
@@ -155,7 +154,6 @@ class OnlineDnSS:
     def _rate(self, window: Window) -> NDArray[np.float32]:
         """(count, H, W) rates of one pass."""
         if window.start % self._stride == 0 or self._held is None:
-            infer.keep_threads(self._threads)
             self._held = infer.rates(self._network, window, self._type)
         return self._held
 

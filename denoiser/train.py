@@ -164,7 +164,6 @@ def _loop(
         if run.step % config.refresh_every == 0:
             knows_gain = run.step > config.refresh_every
             scores = validate(recipe, run.network, config.seed + VALIDATION_SEED, knows_gain)
-            infer.keep_threads(config.threads)
             run.curve.append({"step": run.step, "seconds": run.seconds, "loss": float(np.mean(losses)), **scores})
             losses.clear()
             bar.set_postfix(loss=run.curve[-1]["loss"], light_db=scores["network_vs_light_db"])
@@ -224,13 +223,11 @@ def validate(recipe: Recipe, network: nn.Module, seed: int, knows_gain: bool = T
     clip from its start, as online.
     """
     network.eval()
-    threads = torch.get_num_threads()
     guide = network if knows_gain and recipe.layout.gain_memory else None
     sums: dict[str, float] = {}
     for number in range(VALIDATION_CLIPS):
         for sample in draw_clip(recipe, seed, number, guide)[:3]:
             window = Window(0, len(sample.light), sample.spikes, sample.planes.astype(np.float32))
-            infer.keep_threads(threads)
             guesses = {
                 "network": infer.rates(network, window, torch.bfloat16),
                 "interval": window.planes[: window.count],

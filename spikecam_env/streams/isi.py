@@ -60,11 +60,12 @@ def isi_planes(
     return planes.reshape(stop - start, *frames.shape[1:])
 
 
-@numba.njit(cache=True, parallel=True)
+# Not parallel: numba's OpenMP layer changes torch's number of threads, and the networks then ran 60 times slower.
+@numba.njit(cache=True, nogil=True)
 def _isi(spikes, start, stop, ahead, normalised, planes):  # pragma: no cover - compiled
     count, pixels = spikes.shape
     strip = 2048
-    for s in numba.prange((pixels + strip - 1) // strip):
+    for s in range((pixels + strip - 1) // strip):
         a, b = s * strip, min((s + 1) * strip, pixels)
         last = np.full(b - a, -1, np.int32)
         for t in range(_first_that_matters(spikes, start, a, b), stop):

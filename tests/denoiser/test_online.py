@@ -165,8 +165,8 @@ def test_the_state_of_another_mode_is_refused():
         denoiser("best").restore(online.state())
 
 
-def test_parallel_kernels_do_not_change_torch_s_threads():
-    """numba's OpenMP layer sets the number of threads that torch sees."""
+def test_no_kernel_changes_torch_s_threads():
+    """numba's parallel layer would: it and torch share OpenMP's number of threads."""
     before = torch.get_num_threads()
     try:
         torch.set_num_threads(1)

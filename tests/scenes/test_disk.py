@@ -178,11 +178,11 @@ def sample(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return cv2.remap(image, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR)
 
 
-@numba.njit(cache=True, parallel=True)
+@numba.njit(cache=True)
 def supersample(texture, background, x0, y0, radius, angle, samples, picture):
     n = texture.shape[0]
     cosine, sine = np.cos(angle), np.sin(angle)
-    for r in numba.prange(picture.shape[0]):
+    for r in range(picture.shape[0]):
         for c in range(picture.shape[1]):
             total = 0.0
             for j in range(samples):
