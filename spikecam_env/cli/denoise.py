@@ -43,6 +43,7 @@ class Denoise:
 
     def run(self) -> None:
         import numpy as np
+        from tqdm import tqdm
 
         from denoiser.niqe import niqe
         from spikecam_env.cli.files import out_folder, write_json
@@ -75,7 +76,7 @@ class Denoise:
         }
         judged = frames[:: -(-len(frames) // 12)]
         rows: list[dict[str, Any]] = []
-        for name, pictures in streams.items():
+        for name, pictures in tqdm(streams.items(), desc="judge", unit="stream", leave=False):
             rate = float(np.mean([p.mean() for p in pictures.values()]))
             row: dict[str, Any] = {"picture": name, "spikes/frame": rate}
             try:
@@ -95,7 +96,7 @@ class Denoise:
 
         write_picture(folder / "pictures.png", side_by_side(frames[len(frames) // 2]))
         if self.film:
-            write_film(folder / "film.mp4", (side_by_side(t) for t in frames))
+            write_film(folder / "film.mp4", (side_by_side(t) for t in frames), total=len(frames))
         summary = {"file": str(self.file), "mode": self.mode, "window": self.window, "rows": rows}
         write_json(folder / "summary.json", summary)
         print(table(rows))

@@ -13,6 +13,7 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
+from tqdm import tqdm
 
 BACKGROUND, INK, FAINT = (16, 18, 22), (235, 238, 242), (150, 158, 170)
 MARGIN, CAPTION = 10, 50
@@ -52,12 +53,17 @@ def compose(panels: Sequence[Panel], white: float, corner: str = "") -> NDArray[
     return np.asarray(even)
 
 
-def write_film(path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], fps: float = 30.0) -> None:
-    """Write (rows, columns, 3) uint8 frames as an H.264 MP4; the file appears when it is complete."""
+def write_film(
+    path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], fps: float = 30.0, total: int | None = None
+) -> None:
+    """Write (rows, columns, 3) uint8 frames as an H.264 MP4; the file appears when it is complete.
+
+    total: how many frames there are, for the progress bar, where `frames` cannot say.
+    """
     beside = Path(path).with_suffix(".part.mp4")
     try:
         with imageio.get_writer(beside, fps=fps, codec="libx264", quality=8, macro_block_size=2) as writer:
-            for frame in frames:
+            for frame in tqdm(frames, desc="film", unit="frame", total=total, leave=False):
                 writer.append_data(frame)  # type: ignore[attr-defined]
         os.replace(beside, path)
     finally:
