@@ -11,10 +11,10 @@ how vector environments start.  Their number is NUMBA_NUM_THREADS, by default th
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -105,7 +105,7 @@ def run(
 
     out: (count, P) uint8, C-contiguous.  threads: default NUMBA_NUM_THREADS.
     """
-    return unpack(run_packed(state, segment, threads=threads), segment.radiance0.size, out)
+    return unpack(run_packed(state, segment, threads=threads), segment.radiance0.size, out, threads=threads)
 
 
 def run_packed(state: FastState, segment: Segment, *, threads: int | None = None) -> NDArray[np.uint8]:
@@ -127,26 +127,40 @@ def run_packed(state: FastState, segment: Segment, *, threads: int | None = None
         state.fired,
         packed,
     )
-    threads = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
     bands = -(-state.remaining.size // (loop.TILE * loop.BAND))
-    threads = max(1, min(threads, bands, pixels * segment.count // _WORTH_A_THREAD))
-    others = [_pool(os.getpid(), threads - 1).submit(loop.advance, i, threads, *work) for i in range(1, threads)]
-    loop.advance(0, threads, *work)
-    for other in others:
-        other.result()
+    threads = _worth(threads, bands, pixels * segment.count)
+    _together([partial(loop.advance, i, threads, *work) for i in range(threads)])
     return packed
 
 
-def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+def unpack(
+    packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None, *, threads: int | None = None
+) -> NDArray[np.uint8]:
     """Bits (count, ceil(pixels/8)) to spikes (count, pixels) uint8, in `out` where that is given."""
     whole = packed.shape[1] * 8
     if out is None:
         out = np.empty((len(packed), pixels), dtype=np.uint8)
     spikes = out if pixels == whole else np.empty((len(packed), whole), dtype=np.uint8)
-    loop.unpack(packed.reshape(-1), spikes.reshape(-1).view(np.uint64))
+    threads = _worth(threads, len(packed), spikes.size)
+    parts = zip(np.array_split(packed, threads), np.array_split(spikes, threads), strict=True)
+    _together([partial(loop.unpack, bits.reshape(-1), frames.reshape(-1).view(np.uint64)) for bits, frames in parts])
     if spikes is not out:
         out[:] = spikes[:, :pixels]
     return out
+
+
+def _worth(threads: int | None, most: int, pixel_steps: int) -> int:
+    """How many threads to share work among: as many as asked for (default NUMBA_NUM_THREADS) and as pay."""
+    asked = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
+    return max(1, min(asked, most, pixel_steps // _WORTH_A_THREAD))
+
+
+def _together(parts: list[Callable[[], None]]) -> None:
+    """Run parts at once, the first on this thread."""
+    others = [_pool(os.getpid()).submit(part) for part in parts[1:]]
+    parts[0]()
+    for other in others:
+        other.result()
 
 
 def _shape_of_law(unit: Unit) -> tuple[np.float32, ...]:
@@ -171,6 +185,6 @@ def _compilable(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @lru_cache(maxsize=1)
-def _pool(process: int, threads: int) -> ThreadPoolExecutor:
-    """Threads do not survive a fork, hence one pool a process."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="spikecam-fast")
+def _pool(process: int) -> ThreadPoolExecutor:
+    """Threads do not survive a fork, hence one pool a process; it starts them as they are needed."""
+    return ThreadPoolExecutor(max_workers=64, thread_name_prefix="spikecam-fast")
