@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from typing import Annotated, Any, Union
 
@@ -41,6 +42,8 @@ def main(args: list[str] | None = None) -> None:
     """Run a subcommand; unusable input ends in one line on standard error and exit code 2."""
     # Torch's threads spin while they wait: beside other work on the same cores the denoiser ran 7 times slower.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    # Asked to stop, clean up as after an interrupt: no half-written file, no simulation left running.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     sys.exit(run(args))
 
 
