@@ -22,23 +22,14 @@ class Bench:
     """Where to write the figures as JSON."""
 
     def run(self) -> None:
+        from denoiser.bench import bench_online
+        from spikecam_env.cli.files import write_json
         from spikecam_env.cli.table import table
+        from spikecam_env.sensor.bench import bench_sensor, machine
 
-        if self.what == "sensor":
-            from spikecam_env.sensor.bench import bench_sensor, machine
-
-            print(machine())
-            rows = bench_sensor()
-        else:
-            from denoiser.bench import bench_online
-
-            from spikecam_env.sensor.bench import machine
-
-            print(machine())
-            rows = bench_online()
+        print(machine())
+        rows = bench_sensor() if self.what == "sensor" else bench_online()
         print(table(rows))
         if self.out is not None:
-            from spikecam_env.cli.files import write_json
-
             write_json(self.out, {"machine": machine(), "rows": rows})
             print(f"wrote {self.out}")
