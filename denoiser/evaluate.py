@@ -36,6 +36,7 @@ from scenes.collage import Collage
 from scenes.textures import Texture, random_texture
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import middleTFI, middleTFP
+from spikecam_env.whole import write_text_whole
 
 Stream = NDArray[np.uint8] | NDArray[np.float32]
 PHOTOGRAPHS = ("astronaut", "camera", "chelsea", "coffee", "coins", "page", "rocket")
@@ -253,9 +254,7 @@ def _shown(value: float | None, width: int, digits: int) -> str:
 def _write(folder: Path, result: dict[str, Any]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in (("evaluate.json", json.dumps(result, indent=1)), ("evaluate.txt", report(result))):
-        beside = folder / f"{name}.part"
-        beside.write_text(text, encoding="utf-8")
-        os.replace(beside, folder / name)
+        write_text_whole(folder / name, text)
 
 
 def main() -> None:

@@ -38,6 +38,7 @@ from denoiser.recipe import Recipe, recipe_of
 from denoiser.weights import read_plain, save_weights, write_whole
 from denoiser.window import Window
 from spikecam_env.errors import InputError
+from spikecam_env.whole import whole_file, write_text_whole
 
 POOL_CLIPS = 160
 FIRST_CLIPS = 24
@@ -262,9 +263,7 @@ def _save(config: TrainConfig, recipe: Recipe, run: _Run) -> Path:
     weights = config.out / f"{config.mode}.pt"
     save_weights(weights, config.mode, recipe, run.network, _training_record(config, run))
     run.save(config.out / "last.pt")
-    beside = config.out / "curve.json.part"
-    beside.write_text(json.dumps(run.curve, indent=1))
-    os.replace(beside, config.out / "curve.json")
+    write_text_whole(config.out / "curve.json", json.dumps(run.curve, indent=1))
     if run.curve:
         _plot(run.curve, config.out / "curve.png")
     return weights
@@ -304,9 +303,8 @@ def _plot(curve: list[dict[str, float]], path: Path) -> None:
         axes.plot([p["step"] for p in curve], [p[f"{name}_vs_light_db"] for p in curve], label=name)
     axes.set(xlabel="step", ylabel="PSNR against the true light [dB]")
     axes.legend()
-    beside = path.with_suffix(".part.png")
-    figure.savefig(beside, dpi=120)
-    os.replace(beside, path)
+    with whole_file(path) as beside:
+        figure.savefig(beside, dpi=120)
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ from torch import nn
 
 from denoiser.recipe import RECIPES, Recipe
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.whole import whole_file
 
 FORMAT = "spikecam-denoiser/1"
 
@@ -68,6 +69,5 @@ def read_plain(path: str | os.PathLike[str]) -> Any:
 
 def write_whole(path: str | os.PathLike[str], data: Any) -> None:
     """`torch.save` beside, then rename."""
-    beside = Path(f"{path}.part")
-    torch.save(data, beside)
-    os.replace(beside, path)
+    with whole_file(Path(path)) as beside:
+        torch.save(data, beside)

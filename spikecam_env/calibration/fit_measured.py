@@ -27,7 +27,7 @@ from spikecam_env.calibration.real import (
 )
 from spikecam_env.calibration.wall_noise import OCTAVES, WallNoise, fit_wall_noise
 from spikecam_env.sensor import Circuit, SensorModel
-from spikecam_env.streams.whole import whole_file
+from spikecam_env.whole import whole_file
 
 Array = NDArray[np.float64]
 

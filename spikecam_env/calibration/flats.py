@@ -15,7 +15,7 @@ from spikecam_env.calibration.campaign import FORMAT, Campaign, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
-from spikecam_env.streams.whole import whole_file
+from spikecam_env.whole import whole_file
 
 _CHUNK = 2_000_000
 """Pixel-frames simulated between two writes [spikes of uint8]."""

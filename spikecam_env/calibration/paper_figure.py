@@ -19,7 +19,7 @@ from scipy import ndimage
 
 from spikecam_env.calibration.real import read_wall
 from spikecam_env.sensor import SensorModel, SpikeSensor
-from spikecam_env.streams.whole import whole_file
+from spikecam_env.whole import whole_file
 
 CAMERAS = {"SPCS-like (ideal)": "ideal", "SCSim": "scsim", "measured": "measured"}
 PATCH = (18, 34)

@@ -13,8 +13,8 @@ from spikecam_env.calibration.report import report
 from spikecam_env.calibration.snee import Calibration
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
-from spikecam_env.streams.whole import whole_file
 from spikecam_env.version import __version__
+from spikecam_env.whole import whole_file
 
 MAPS_FORMAT = "spikecam-maps/1"
 

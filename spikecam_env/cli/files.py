@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
 from spikecam_env.errors import InputError
+from spikecam_env.whole import write_text_whole
 
 
 def out_folder(path: Path) -> Path:
@@ -21,9 +21,7 @@ def out_folder(path: Path) -> Path:
 
 def write_json(path: Path, data: Any) -> None:
     """Write data as indented JSON."""
-    beside = path.with_name(path.name + ".part")
     try:
-        beside.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        write_text_whole(path, json.dumps(data, indent=1) + "\n")
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}") from error
-    os.replace(beside, path)

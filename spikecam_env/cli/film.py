@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from tqdm import tqdm
 
+from spikecam_env.whole import whole_file
+
 BACKGROUND, INK, FAINT = (16, 18, 22), (235, 238, 242), (150, 158, 170)
 MARGIN, CAPTION = 10, 50
 
@@ -60,21 +62,18 @@ def write_film(
 
     total: how many frames there are, for the progress bar, where `frames` cannot say.
     """
-    beside = Path(path).with_suffix(".part.mp4")
-    try:
-        with imageio.get_writer(beside, fps=fps, codec="libx264", quality=8, macro_block_size=2) as writer:
-            for frame in tqdm(frames, desc="film", unit="frame", total=total, leave=False):
-                writer.append_data(frame)  # type: ignore[attr-defined]
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
+    with (
+        whole_file(Path(path)) as beside,
+        imageio.get_writer(beside, fps=fps, codec="libx264", quality=8, macro_block_size=2) as writer,
+    ):
+        for frame in tqdm(frames, desc="film", unit="frame", total=total, leave=False):
+            writer.append_data(frame)  # type: ignore[attr-defined]
 
 
 def write_picture(path: str | os.PathLike[str], picture: NDArray[np.uint8]) -> None:
     """Write a grey or RGB uint8 picture as PNG; the file appears whole."""
-    beside = Path(path).with_suffix(".part.png")
-    Image.fromarray(picture).save(beside)
-    os.replace(beside, path)
+    with whole_file(Path(path)) as beside:
+        Image.fromarray(picture).save(beside)
 
 
 @lru_cache(maxsize=8)

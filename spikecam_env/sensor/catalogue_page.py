@@ -6,15 +6,14 @@ python -m spikecam_env.sensor.catalogue_page docs/effects.md
 from __future__ import annotations
 
 import inspect
-import os
 import re
 import sys
 from dataclasses import Field, dataclass, fields
-from pathlib import Path
 from typing import Any
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
+from spikecam_env.whole import write_text_whole
 
 SECTIONS = ("Stage", "Seen in", "Twins", "Source")
 
@@ -56,9 +55,7 @@ def main() -> None:
     """Write the page to the file named on the command line; it appears whole."""
     if len(sys.argv) != 2:
         raise SystemExit("usage: python -m spikecam_env.sensor.catalogue_page docs/effects.md")
-    beside = Path(f"{sys.argv[1]}.part")
-    beside.write_text(page(), encoding="utf-8")
-    os.replace(beside, sys.argv[1])
+    write_text_whole(sys.argv[1], page())
 
 
 def _contents(stages: dict[Stage, list[type[Effect]]]) -> str:

@@ -17,6 +17,7 @@ from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.effects.base import build
 from spikecam_env.sensor.unit import Circuit, PixelArray, Unit, firing_law
+from spikecam_env.whole import write_text_whole
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -117,9 +118,7 @@ class SensorModel:
             "circuit": asdict(self.circuit),
             "effect": effects,
         }
-        beside = Path(f"{path}.part")
-        beside.write_text(tomli_w.dumps(data), encoding="utf-8")
-        os.replace(beside, path)
+        write_text_whole(Path(path), tomli_w.dumps(data))
 
     def with_effect(self, effect: Effect) -> SensorModel:
         """This model with an effect added, or replaced where it has one of that name."""

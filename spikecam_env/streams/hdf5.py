@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.streams.files import check_range, existing_file
 from spikecam_env.streams.packing import as_spikes, check_shape, pack_frames, packed_bytes, unpack_frames
-from spikecam_env.streams.whole import beside_path, check_range, existing_file
 from spikecam_env.version import __version__
+from spikecam_env.whole import beside_path
 
 FORMAT = "spikecam-recording/1"
 CHUNK_BYTES = 1 << 20

@@ -68,7 +68,7 @@ def test_failed_save_leaves_the_old_file(tmp_path: Path, spikes: np.ndarray, mon
     def fail(*_: object) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr("spikecam_env.streams.whole.os.replace", fail)
+    monkeypatch.setattr("spikecam_env.whole.os.replace", fail)
     with pytest.raises(OSError, match="disk full"):
         save_vidar_dat(path, 1 - spikes)
     assert [p.name for p in tmp_path.iterdir()] == ["a.dat"]

@@ -1,0 +1,41 @@
+"""Files that appear whole: written beside their place, then renamed; nothing is left if writing fails."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from spikecam_env.errors import InputError
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """A path to write to; on leaving without an exception it replaces `path`.
+
+    Errors: InputError if the folder of `path` does not exist.
+    """
+    target = Path(path)
+    beside = beside_path(target)
+    try:
+        yield beside
+        os.replace(beside, target)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def beside_path(target: Path) -> Path:
+    """Where `target` is written before it is renamed; its ending stays, since libraries go by it.
+
+    Errors: InputError if its folder does not exist.
+    """
+    if not target.parent.is_dir():
+        raise InputError(f"cannot write {target}: there is no folder {target.parent}; make it first")
+    return target.with_name(f".{target.stem}.{os.getpid()}.partial{target.suffix}")
+
+
+def write_text_whole(path: str | Path, text: str) -> None:
+    """Write UTF-8 text; the file appears whole."""
+    with whole_file(path) as beside:
+        beside.write_text(text, encoding="utf-8")
