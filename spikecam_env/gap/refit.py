@@ -1,0 +1,105 @@
+"""The base refit: this unit's own response, dark level and jitter, within the effects that its model has.
+
+A unit's parameters differ from nominal and its fixed pattern is a new draw; neither is a gap.  What the model has no
+effect for stays nominal, so that it shows.  The same refit is made of measured and of simulated recordings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.calibration.jitter import fit_jitter
+from spikecam_env.calibration.response import fit_lines, rates_from_times, together
+from spikecam_env.gap.observe import STEPS, Observation
+from spikecam_env.gap.world import Shown
+from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor.unit import PixelArray, Unit, firing_law
+
+Array = NDArray[np.float64]
+
+RESPONSE = ("conversion_gain_spread", "bias_voltage_spread", "capacitor_spread", "vignetting", "row_fixed_pattern",
+            "column_fixed_pattern", "dead_pixels")  # fmt: skip
+DARK = ("dark_current", "dark_current_spread", "dark_current_tail", "hot_pixels")
+DARK_PATTERN = (*DARK[1:], *RESPONSE)
+NOISE = ("shot_noise", "reset_noise", "excess_threshold_noise")
+
+
+@dataclass(frozen=True)
+class BaseFit:
+    """A unit as its recordings show it.  gain, dark: (P,) thresholds a frame at radiance 1 and in the dark.
+
+    white: s^2 = 1/N + kappa^2 a spike.  gain_sd, dark_sd: (P,) standard errors.  residual: (R, P) relative distance of
+    the static recordings' rates from the line gain L + dark, in the order given; NaN where unknown.
+    live: (P,) pixels that respond.
+    """
+
+    gain: Array
+    dark: Array
+    gain_sd: Array
+    dark_sd: Array
+    white: float
+    residual: Array
+    live: NDArray[np.bool_]
+
+
+def measured_base(observations: list[Observation], conditions: list[Shown]) -> BaseFit:
+    """Free refit: every pixel its own line, from static recordings of known light marked "fit"."""
+    static = [(o, c) for o, c in zip(observations, conditions, strict=True) if c.kind in ("dark", "flat", "picture")]
+    rates = together([rates_from_times([o.times]) for o, _ in static])
+    light = np.stack([c.picture if c.light else np.zeros(o.times.count.size) for o, c in static])
+    light = np.stack([np.broadcast_to(c.picture, o.times.count.shape) for o, c in static])
+    use = np.array([c.use == "fit" for _, c in static])
+    white = jitter_of([o for o, _ in static])
+    lines = fit_lines(light, rates, white, use)
+    gain, dark = np.nan_to_num(lines.gain), np.nan_to_num(lines.dark)
+    expected = gain * light + dark
+    known = ~rates.saturated & (expected > 0) & (expected < 0.95) & np.isnan(rates.limit)
+    residual = np.where(known, rates.rate / np.where(known, expected, 1.0) - 1.0, np.nan)
+    live = gain > 0.1 * np.median(gain)
+    return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, live)
+
+
+def jitter_of(observations: list[Observation]) -> float:
+    """s^2 pooled over static recordings; 3e-5 where nothing can be seen."""
+    rate = np.stack([np.where(o.times.count / o.frames > 0.9, np.nan, o.times.rate) for o in observations])
+    square = np.stack([o.times.square for o in observations])
+    terms = np.stack([o.times.terms for o in observations]).astype(np.float64)
+    jitter = fit_jitter(np.array(STEPS), square, terms, rate)
+    return jitter.white if jitter else 3e-5
+
+
+def within(model: SensorModel, base: BaseFit) -> BaseFit:
+    """What of a free refit the model has effects for; the rest is nominal, or the same for all pixels."""
+    names = {e.name for e in model.effects}
+    gain, dark, white = base.gain, base.dark, base.white
+    if not names & set(RESPONSE):
+        gain = np.full_like(gain, np.median(gain))
+    if not names & set(DARK):
+        dark = np.zeros_like(dark)
+    elif not names & set(DARK_PATTERN):
+        dark = np.full_like(dark, np.median(dark))
+    if not names & set(NOISE):
+        white = 0.0
+    return replace(base, gain=np.maximum(gain, 0.0), dark=np.maximum(dark, 0.0), white=white)
+
+
+def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
+    """The unit to simulate: N as the model says and the rest of s^2 as reset noise; all shot noise where it has less."""
+    nominal = PixelArray.nominal(model.circuit, model.frame_rate_hz, shape)
+    names = {e.name: e for e in model.effects}
+    for name in NOISE:
+        if name in names:
+            nominal = names[name].imprint(nominal, np.random.default_rng(0))
+    law = firing_law(nominal)
+    shot = law.shot and base.white > 0
+    inverse = 1.0 / law.electrons[0] if shot else 0.0
+    if "reset_noise" not in names and "excess_threshold_noise" not in names:
+        inverse = base.white if shot else 0.0
+    inverse = min(inverse, base.white)
+    kappa = np.sqrt(max(base.white - inverse, 0.0))
+    electrons = np.full_like(law.electrons, 1.0 / inverse) if inverse > 0 else law.electrons
+    return replace(law, gain=base.gain, dark=base.dark, electrons=electrons, kappa=np.full_like(law.kappa, kappa),
+                   shot=inverse > 0)  # fmt: skip

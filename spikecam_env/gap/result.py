@@ -1,0 +1,179 @@
+"""What a diagnosis says: format `spikecam-diagnosis/1` (docs/gap.md), and what its report shows beside it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.observe import Observation
+from spikecam_env.gap.refit import BaseFit
+from spikecam_env.gap.world import Shown
+from spikecam_env.sensor import SensorModel
+from spikecam_env.whole import write_text_whole
+
+FORMAT = "spikecam-diagnosis/1"
+VERDICTS = ("none", "named", "class", "unknown", "parameter", "data")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter's value and its standard deviation, in the parameter's unit."""
+
+    value: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect found.  confidence: 0 to 1.  alternatives: (name, confidence), best first."""
+
+    name: str
+    family: str
+    confidence: float
+    parameters: dict[str, Estimate]
+    alternatives: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """One number of the bank, measured and simulated.
+
+    group: what it looks at (rates, noise, spectrum ...).  before, after: mean over twins under the model as given and
+    as patched; sd: of one campaign, under the model as given.  z: (measured - before) / sd, as a normal deviate.
+    z_after: the same of what is left.  holdout: whether its recordings were kept out of the fit.
+    """
+
+    name: str
+    group: str
+    recordings: tuple[str, ...]
+    measured: float
+    before: float
+    after: float
+    sd: float
+    z: float
+    z_after: float
+    p_adjusted: float
+    holdout: bool
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate that was tried.  misfit: root mean square of what it leaves, in noise; parameters at the best fit."""
+
+    name: str
+    family: str
+    misfit_before: float
+    misfit: float
+    parameters: dict[str, Estimate]
+    accepted: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Upper bound (95 %) of an effect that was not found."""
+
+    name: str
+    parameter: str
+    unit: str
+    below: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Mean square distance of held-out statistics, in noise; floor: of two halves of the measurement."""
+
+    before: float
+    after: float
+    floor: float
+    removed: float
+    by_recording: dict[str, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the report draws: conditions and observations of the measurement, and of one twin before and after."""
+
+    conditions: tuple[Shown, ...]
+    measured: tuple[Observation, ...]
+    before: tuple[Observation, ...]
+    after: tuple[Observation, ...] | None
+    measured_base: BaseFit
+    before_base: BaseFit
+    after_base: BaseFit | None
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer.  patched: the model with what was found, or with an empirical patch; loads back as a model.
+
+    class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
+    """
+
+    verdict: str
+    sentence: str
+    effects: tuple[NamedEffect, ...]
+    unknown: dict[str, Any] | None
+    class_: dict[str, Any] | None
+    parameters: dict[str, dict[str, float]]
+    data: tuple[str, ...]
+    gap: Gap | None
+    statistics: tuple[Statistic, ...]
+    ranking: tuple[Ranked, ...]
+    not_testable: tuple[tuple[str, str], ...]
+    bounds: tuple[Bound, ...]
+    patched: SensorModel
+    model_name: str
+    campaign: str
+    seed: int
+    stages: dict[str, float]
+    evidence: Evidence | None = field(default=None, repr=False)
+
+    def to_json(self) -> dict[str, Any]:
+        """The documented format."""
+        found = [s for s in self.statistics if s.p_adjusted < 0.05]
+        return {
+            "format": FORMAT,
+            "verdict": self.verdict,
+            "sentence": self.sentence,
+            "effects": [
+                {**asdict(e), "alternatives": [{"name": n, "confidence": c} for n, c in e.alternatives]}
+                for e in self.effects
+            ],
+            "unknown": self.unknown,
+            "class": self.class_,
+            "parameters": self.parameters,
+            "data": list(self.data),
+            "gap": asdict(self.gap) if self.gap else None,
+            "discrepancies": [
+                {"statistic": s.name, "group": s.group, "recordings": list(s.recordings), "z": s.z,
+                 "p_adjusted": s.p_adjusted} for s in sorted(found, key=lambda s: -abs(s.z))
+            ],  # fmt: skip
+            "not_testable": [{"name": n, "needs": w} for n, w in self.not_testable],
+            "bounds": [asdict(b) for b in self.bounds],
+            "ranking": [asdict(r) for r in self.ranking],
+            "model": self.model_name,
+            "campaign": self.campaign,
+            "seed": self.seed,
+            "stages_s": self.stages,
+            "elapsed_s": sum(self.stages.values()),
+        }
+
+    def write(self, folder: Path) -> None:
+        """diagnosis.json and model.toml, whole."""
+        folder.mkdir(parents=True, exist_ok=True)
+        self.patched.to_toml(folder / "model.toml")
+        write_text_whole(folder / "diagnosis.json", json.dumps(self.to_json(), indent=1, default=_plain))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (np.floating, np.integer)):
+        return value.item()
+    if isinstance(value, NDArray | np.ndarray):
+        return value.tolist()
+    raise TypeError(type(value))

@@ -1,0 +1,39 @@
+"""The twin: the fitted unit simulated under a model, through the same conditions, and observed the same way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.observe import Observation, observe
+from spikecam_env.gap.refit import BaseFit, unit_of
+from spikecam_env.gap.world import Shown
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
+from spikecam_env.streams import pack_frames
+
+_BLOCK = 1024
+
+
+def simulate(
+    model: SensorModel, base: BaseFit, conditions: Sequence[Shown], shape: tuple[int, int], seed: int
+) -> list[Observation]:
+    """One simulated campaign of the unit `base` under `model`; another seed is other temporal noise and phases."""
+    unit = unit_of(model, base, shape)
+    return [
+        observe(expose(model, unit, c, base, shape, seed, take), shape, film=c.moves)
+        for take, c in enumerate(conditions)
+    ]
+
+
+def expose(model, unit, condition, base, shape, seed, take) -> NDArray[np.uint8]:  # type: ignore[no-untyped-def]
+    """(F, P/8) bits of one recording."""
+    sensor = SpikeSensor(model, shape, seed, engine="auto", take=take, unit=unit)
+    light = condition.light
+    assert light is not None
+    picture: Keyframes | NDArray[np.float32] = light.radiance[0] if not condition.moves else light
+    parts = []
+    for first in range(0, condition.frames, _BLOCK):
+        parts.append(pack_frames(sensor.step(picture, min(_BLOCK, condition.frames - first))))
+    return np.concatenate(parts)
