@@ -42,15 +42,11 @@ def read_wall(folder: str | Path) -> NDArray[np.uint8]:
 
 
 def read_flat_maps(folder: str | Path) -> tuple[Array, Array]:
-    """`flat_map_rates` of the file in the folder of the real recordings."""
-    return flat_map_rates(Path(folder) / "flat_335lux_maps.npz")
-
-
-def flat_map_rates(path: Path) -> tuple[Array, Array]:
     """(H, W) rates at 335 lux without the dark's part, and in the dark [spikes/frame].
 
     Nd is the dark level in lux: D_light is the interval at 335 + Nd lux in all.
     """
+    path = Path(folder) / "flat_335lux_maps.npz"
     interval, dark_lux = (_array(path, name).astype(np.float64) for name in ("D_light", "Nd"))
     per_lux = 1.0 / (interval * (FLAT_LUX + dark_lux))
     return FLAT_LUX * per_lux, dark_lux * per_lux

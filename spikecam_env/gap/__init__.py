@@ -3,7 +3,7 @@
 from spikecam_env.calibration import Campaign, CampaignRecording, read_campaign
 from spikecam_env.gap.campaign import second_voltage, standard_design, write_campaign
 from spikecam_env.gap.imports import import_campaign
-from spikecam_env.gap.labels import Label, labels_from_table
+from spikecam_env.gap.labels import Label, label_from_text, labels_from_table
 from spikecam_env.gap.recordings import KINDS, Bars, Dark, Disk, Flat, MaskedRows, Planned, Step
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "Planned",
     "Step",
     "import_campaign",
+    "label_from_text",
     "labels_from_table",
     "read_campaign",
     "second_voltage",

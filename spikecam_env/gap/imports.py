@@ -5,10 +5,9 @@ in any other unit proportional to light go through `radiance_per_unit`, the radi
 
 Rates are an npz with `rate` (H, W) [spikes/frame] and `frames` it was counted over.
 
-Flat maps are an npz with D_light, interval in frames at 335 lux, and Nd, dark level in lux [SpikeNeRF]; they become two
-recordings of rates, 1/D_light and, in the dark, Nd / (D_light (335 + Nd)).  How many spikes a frame 335 lux should give
-is not known, so the lit one is labelled by the camera: radiance is the median over pixels of its rate less the dark's.
-By this label the median pixel has gain 1; only how pixels differ, and the dark, can disagree with a model.
+Flat maps (`flat_maps`) become two recordings of rates, lit and dark.  How many spikes a frame 335 lux should give is not
+known, so the lit one is labelled by the camera itself, `relative`: radiance is the median over pixels of its rate less the
+dark's.  By this label the median pixel has gain 1; only how pixels differ, and the dark, can disagree with a model.
 """
 
 from __future__ import annotations
@@ -26,17 +25,14 @@ from spikecam_env.calibration import Campaign, read_campaign
 from spikecam_env.calibration.campaign import USES
 from spikecam_env.calibration.campaign_files import finish_campaign, save_light, save_rates, save_spikes
 from spikecam_env.calibration.flats import even_light
-from spikecam_env.calibration.real import flat_map_rates
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.gap import flat_maps
 from spikecam_env.gap.labels import READING, RELATIVE, UNKNOWN, Label
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import read_recording
 from spikecam_env.streams.files import existing_file
 from spikecam_env.streams.recording import reading_options
 from spikecam_env.whole import whole_folder
-
-MAPS_FRAMES = 4000
-"""Frames that the flat maps were counted over: 4000 / (D_light + 1) is whole, to 7e-5, for all 100 000 pixels."""
 
 _BLOCK = 256
 
@@ -139,7 +135,7 @@ def _pieces(
         raise unknown_name(f"use of {label.file}", label.use, USES)
     name = label.name or path.stem
     names = _npz_names(path)
-    if {"D_light", "Nd"} <= names:
+    if names >= flat_maps.KEYS:
         return _flat_maps(path, label, name, part)
     if label.radiance == RELATIVE:
         raise InputError(
@@ -163,16 +159,15 @@ def _pieces(
 
 
 def _flat_maps(path: Path, label: Label, name: str, part: _Part) -> list[_Piece]:
-    from_light, dark = (part.of(rate, label.file) for rate in flat_map_rates(path))
     if label.radiance != RELATIVE:
         raise InputError(f"{label.file} holds flat maps, whose light is known to the camera alone; label it `relative`")
-    radiance = float(np.median(from_light))
-    note = (
-        f"{label.note} radiance is relative: the median over pixels of this unit's own rate at 335 lux, less the dark; "
-        "rates read from mean intervals"
-    ).strip()
-    lit = _Piece(label, f"{name}-light", label.use, even_light(radiance), MAPS_FRAMES, from_light + dark, note=note)
-    return [lit, _Piece(label, f"{name}-dark", label.use, even_light(0.0), MAPS_FRAMES, dark, note=note)]
+    lit, dark = (part.of(rate, label.file) for rate in flat_maps.read_flat_maps(path))
+    radiance = float(np.median(lit - dark))
+    note = f"{label.note} radiance is relative: 335 lux is the median over pixels of this unit's rate less the dark's"
+    return [
+        _Piece(label, f"{name}-light", label.use, even_light(radiance), flat_maps.FRAMES, lit, note=note.strip()),
+        _Piece(label, f"{name}-dark", label.use, even_light(0.0), flat_maps.FRAMES, dark, note=label.note),
+    ]
 
 
 def _light(folder: Path, label: Label, part: _Part, unit: float) -> Keyframes | None:

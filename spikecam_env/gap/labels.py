@@ -68,6 +68,14 @@ def labels_from_table(path: str | Path) -> tuple[Label, ...]:
     return labels
 
 
+def label_from_text(text: str) -> Label:
+    """A label written as FILE=RADIANCE, e.g. `wall.npz=unknown`."""
+    file, equals, radiance = text.rpartition("=")
+    if not equals or not file:
+        raise InputError(f"label {text!r} is not of the form FILE=RADIANCE, e.g. wall.npz=unknown or flat.dat=0.2")
+    return Label(file, parse_radiance(radiance, f"label {text!r}"))
+
+
 def parse_radiance(text: str, where: str) -> float | str:
     """A radiance as written: a number, `unknown`, `relative`, or the name of an npz."""
     if text in (UNKNOWN, RELATIVE) or text.endswith(".npz"):
