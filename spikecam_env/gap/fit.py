@@ -64,8 +64,9 @@ def predict(
 def with_pattern(case: Case, model: SensorModel, null: Null, mean: Array) -> Array:
     """`mean` with its pattern statistics replaced by those of units of the model."""
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
-    pattern = np.nanmean([values_of(b, null.keys) for b in drawn], axis=0)
-    return np.where(np.isnan(pattern), mean, pattern)
+    values = np.array([values_of(b, null.keys) for b in drawn])
+    known = np.isfinite(values).all(axis=0)
+    return np.where(known, np.where(known, values, 0.0).mean(axis=0), mean)
 
 
 def fit(
@@ -83,11 +84,13 @@ def fit(
     return _fit_twins(case, model, null, measured, name, dict(start), rounds)
 
 
-def _with(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
+def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
+    """The model with a candidate added."""
     return model.with_effect(build(CATALOGUE, name, dict(parameters)))
 
 
-def _bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
+def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
+    """Parameters within what their effect allows, whole where they must be."""
     out = {}
     for key, f in CATALOGUE[name].__dataclass_fields__.items():
         if key not in parameters:
@@ -126,11 +129,11 @@ def _fit_twins(
     strength = what.fitted[0]
     power = 2.0 if what.square else 1.0
     base = within(model, case.base)
-    parameters = _bounded(name, parameters)
+    parameters = bounded(name, parameters)
     only: list[int] | None = None
     best: Fit | None = None
     for turn in range(rounds):
-        tried = _with(model, name, parameters)
+        tried = with_effect(model, name, parameters)
         predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
         effect = predicted - null.mean
         scale, sd = scale_of(null, measured, effect, 1)
@@ -153,11 +156,11 @@ def _fit_twins(
             step = _gauss_newton(
                 case, model, null, measured, name, parameters, what.fitted, predicted, base, only
             )
-            parameters = _bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
+            parameters = bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
         elif abs(factor - 1.0) < 0.02:
             break
         else:
-            parameters = _bounded(name, {**parameters, strength: parameters[strength] * factor})
+            parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
     assert best is not None
     return best
 
@@ -197,7 +200,7 @@ def _gauss_newton(
     """Factors to multiply the fitted parameters by: one damped step in their logarithms, differences of 30 %."""
     columns = []
     for key in fitted:
-        nudged = _with(model, name, _bounded(name, {**parameters, key: parameters[key] * 1.3}))
+        nudged = with_effect(model, name, bounded(name, {**parameters, key: parameters[key] * 1.3}))
         there, _ = predict(case, nudged, within(nudged, base), null, 1, 100, only)
         columns.append((there - predicted) / np.log(1.3))
     jacobian = np.stack(columns, axis=1)
@@ -227,14 +230,14 @@ def _fit_pattern(
 ) -> Fit:
     """Coarse to fine search over the strength (and one more parameter), drawing units."""
     what = candidate(name)
-    parameters = _bounded(name, start)
+    parameters = bounded(name, start)
     best: Fit | None = None
     for factors in ((0.03, 0.1, 0.3, 1.0, 3.0), (0.55, 0.75, 1.35, 1.8), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05)):
         for key in what.fitted:
             centre = best.parameters if best else parameters
             for factor in factors:
-                tried = _bounded(name, {**centre, key: centre[key] * factor})
-                there = _with(model, name, tried)
+                tried = bounded(name, {**centre, key: centre[key] * factor})
+                there = with_effect(model, name, tried)
                 predicted = with_pattern(case, there, null, null.mean)
                 rho = residual(null, measured, predicted, UNITS)
                 now = Fit(name, tried, {}, predicted, UNITS, within(there, case.base), rho, misfit(rho), there)
