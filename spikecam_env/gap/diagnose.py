@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.errors import InputError
+from spikecam_env.gap.audit import Contradiction, audit
 from spikecam_env.gap.candidates import candidate, chosen, testable
 from spikecam_env.gap.case import Case, case_of, twins
 from spikecam_env.gap.compare import HEAVY, Null, adjusted, deviates, misfit, residual, values_of
@@ -86,18 +87,22 @@ def diagnose(
     names = chosen(assumed, candidates, exclude)
     with timed("read"):
         case = read_case(measured, seed, jobs)
+    with timed("audit"):
+        contradictions = audit(case)
+        case = trimmed(case, contradictions)
     names, untestable = testable(names, case.conditions)
     with timed("twins"):
         null = model_null(case, assumed, twin_count)
     values = values_of(case.bank, null.keys)
-    fitted = np.array([_use(case, k.recording) == "fit" for k in null.keys])
     z = deviates(null, values)
     p = adjusted(z)
     rounds: list[Round] = []
     if p.min() < ALARM:
         with timed("candidates"):
             rounds = search(case, assumed, null, values, names, templates or load())
-    return concluded(measured, case, assumed, null, values, z, p, rounds, untestable, stages, seed, fitted)
+    return concluded(
+        measured, case, assumed, null, values, z, p, rounds, untestable, stages, seed, contradictions
+    )
 
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
@@ -115,6 +120,18 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
     return case_of(campaign.shape, conditions, [o for o in seen if o is not None], seed, jobs)
 
 
+def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
+    """The case without recordings that contradict the others, where enough is left to refit the unit by."""
+    bad = {r for c in contradictions for r in c.recordings}
+    keep = [i for i, c in enumerate(case.conditions) if c.name not in bad]
+    enough = sum(case.conditions[i].kind in ("dark", "flat", "picture") and case.conditions[i].use == "fit" for i in keep)
+    if not bad or enough < 2:
+        return case
+    return case_of(
+        case.shape, [case.conditions[i] for i in keep], [case.observations[i] for i in keep], case.seed, case.jobs
+    )
+
+
 def search(
     case: Case, model: SensorModel, null: Null, values: Array, names: Sequence[str], templates: Templates
 ) -> list[Round]:
@@ -129,7 +146,7 @@ def search(
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left)
         tried = screened[:TRIED]
-        fits = [fit(case, now, here, values, s.name, s.start) for s in tried]
+        fits = [fit(case, now, here, values, s.name, s.start, s.expected) for s in tried]
         fits.sort(key=lambda f: f.misfit)
         finalists = [f for f in fits if f.misfit < fits[0].misfit + 60][:2] if fits else []
         sure = [confirmed(case, now, here, values, f) for f in finalists]
@@ -148,7 +165,7 @@ def alarmed(rho: Array) -> bool:
     return bool(np.abs(rho).max() > GATE)
 
 
-def concluded(measured, case, model, null, values, z, p, rounds, untestable, stages, seed, fitted) -> Diagnosis:  # type: ignore[no-untyped-def]
+def concluded(measured, case, model, null, values, z, p, rounds, untestable, stages, seed, contradictions) -> Diagnosis:  # type: ignore[no-untyped-def]
     """From the search to a verdict."""
     found = [r.fits[0] for r, after in zip(rounds, rounds[1:], strict=False) if after.model is not r.model]
     last = rounds[-1] if rounds else None
@@ -171,6 +188,8 @@ def concluded(measured, case, model, null, values, z, p, rounds, untestable, sta
         verdict = "named"
     elif parameters:
         verdict = "parameter"
+    if contradictions:
+        verdict = "data"
     if verdict == "unknown":
         effects = ()
     after = last.predicted if last else null.mean
@@ -181,7 +200,7 @@ def concluded(measured, case, model, null, values, z, p, rounds, untestable, sta
         unknown=unknown,
         class_=class_,
         parameters=parameters,
-        data=(),
+        data=tuple(c.text for c in contradictions),
         gap=gap_of(case, null, values, after),
         statistics=table(case, null, values, z, p, after, rho),
         ranking=tuple(ranked(r) for r in _each(rounds, null, values)),

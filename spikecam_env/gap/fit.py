@@ -76,12 +76,16 @@ def fit(
     measured: Array,
     name: str,
     start: Mapping[str, float],
-    rounds: int = 6,
+    expected: Array | None = None,
 ) -> Fit:
-    """Best fit of one candidate added to `model`, whose own predictions are `null`."""
+    """Best fit of one candidate added to `model`, whose own predictions are `null`.
+
+    start: parameters near the best.  expected: (S,) change of the statistics to expect there, to leave out recordings
+    that it does not concern.
+    """
     if is_pattern(name):
         return _fit_pattern(case, model, null, measured, name, start)
-    return _fit_twins(case, model, null, measured, name, dict(start), rounds)
+    return _fit_twins(case, model, null, measured, name, dict(start), expected)
 
 
 def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
@@ -123,46 +127,53 @@ def _fit_twins(
     measured: Array,
     name: str,
     parameters: dict[str, float],
-    rounds: int,
+    expected: Array | None,
 ) -> Fit:
+    """Twins at the start, scaled until the strength is right to a third; then, with shapes, Gauss-Newton; the last
+    step is a scaling of what was simulated, without another twin."""
     what = candidate(name)
     strength = what.fitted[0]
     power = 2.0 if what.square else 1.0
     base = within(model, case.base)
     parameters = bounded(name, parameters)
-    only: list[int] | None = None
-    best: Fit | None = None
-    for turn in range(rounds):
+    only = None if expected is None else concerned(case, null, expected)
+    for turn in range(4):
         tried = with_effect(model, name, parameters)
         predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
-        effect = predicted - null.mean
-        scale, sd = scale_of(null, measured, effect, 1)
-        relative = sd / max(abs(scale), 1e-9) / power
-        rho = residual(null, measured, predicted, 1)
-        now = Fit(name, dict(parameters), {strength: abs(parameters[strength]) * relative}, predicted, 1, base, rho,
-                  misfit(rho), tried)  # fmt: skip
-        if best is not None and now.misfit > best.misfit - 1.0 and turn > 1:
-            break
-        best = now if best is None or now.misfit < best.misfit else best
-        if turn == rounds - 1:
-            break
         base = settled(tried, within(tried, base), case.base, refits)
-        factor = float(np.sign(scale) * abs(scale) ** (1 / power)) if scale else 0.0
-        if factor <= 0 and not _may_be_negative(name):
-            factor = 0.3
-        factor = float(np.sign(factor) * np.clip(abs(factor), 1e-3, 1e3))
-        only = concerned(case, null, effect * factor)
-        if len(what.fitted) > 1 and 0.3 < abs(factor) < 3:
-            step = _gauss_newton(
-                case, model, null, measured, name, parameters, what.fitted, predicted, base, only
-            )
+        scale, sd = scale_of(null, measured, predicted - null.mean, 1)
+        factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
+        if factor < 0 and not _may_be_negative(name):
+            factor = 0.1
+        near = 0.7 < factor < 1.4
+        if near and len(what.fitted) > 1 and turn < 2:
+            step = _gauss_newton(case, model, null, measured, name, parameters, what.fitted, predicted, base, only)
             parameters = bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
-        elif abs(factor - 1.0) < 0.02:
+            if max(abs(np.log(f)) for f in step.values()) > 0.1:
+                continue
+            predicted, _ = predict(case, with_effect(model, name, parameters), base, null, 1, 100, only)
+            scale, sd = scale_of(null, measured, predicted - null.mean, 1)
+            factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
+        if near or turn == 3:
             break
-        else:
-            parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
-    assert best is not None
-    return best
+        parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
+        only = concerned(case, null, (predicted - null.mean) * factor**power)
+    final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
+    moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
+    scaled = null.mean + moved * (predicted - null.mean)
+    rho = residual(null, measured, scaled, 1)
+    relative = sd / max(abs(scale), 1e-9) / power
+    return Fit(
+        name,
+        final,
+        {strength: abs(final[strength]) * relative},
+        scaled,
+        1,
+        base,
+        rho,
+        misfit(rho),
+        with_effect(model, name, final),
+    )
 
 
 def concerned(case: Case, null: Null, effect: Array) -> list[int] | None:

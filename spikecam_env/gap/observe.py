@@ -43,6 +43,7 @@ class Observation:
     above 1.5 T + 1 of the mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.  blocks: (BLOCKS, P) counts.
     frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (LAGS, 2) spikes of one pixel with its neighbour's,
     lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
+    late: (F,) sum over spikes of a frame of their interval less the pixel's mean [frames].
     """
 
     shape: tuple[int, int]
@@ -58,6 +59,7 @@ class Observation:
     column: NDArray[np.int32]
     coincidences: Array
     film: NDArray[np.uint8] | None
+    late: Array
 
     @property
     def frames(self) -> int:
@@ -77,7 +79,8 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
     moments = np.full((pixels, 4), np.nan)
     blocks = np.zeros((BLOCKS, pixels), np.int32)
     lengths = np.zeros(LENGTHS + 1, np.int64)
-    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths)
+    late = np.zeros(len(packed))
+    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths, late)
     spikes = unpack_frames(packed, shape)
     row = np.zeros((len(packed), shape[0]), np.int32)
     coincidences = np.zeros((LAGS, 2))
@@ -97,6 +100,7 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
         _columns(spikes),
         coincidences,
         _film(spikes) if film else None,
+        late,
     )
 
 
@@ -119,7 +123,7 @@ def _film(spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _pixels(words, ends, square, terms, moments, blocks, lengths):  # type: ignore[no-untyped-def]
+def _pixels(words, ends, square, terms, moments, blocks, lengths, late):  # type: ignore[no-untyped-def]
     frames = words.shape[0]
     bits = np.empty((64, (frames + 63) // 64), np.uint64)
     t = np.empty(frames + 1, np.int32)
@@ -161,6 +165,8 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths):  # type: igno
                 squares += np.int64(d[i]) * d[i]
                 short += d[i] < least
                 long += d[i] > most
+            for i in range(n - 1):
+                late[t[i + 1]] += d[i] - mean
             for i in range(n - 2):
                 products += np.int64(d[i]) * d[i + 1]
             # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2

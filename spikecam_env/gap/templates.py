@@ -63,12 +63,15 @@ class Templates:
 
 @dataclass(frozen=True)
 class Screened:
-    """A candidate as its template sees it.  start: parameters to fit from.  misfit: what it would leave."""
+    """A candidate as its template sees it.  start: parameters to fit from.  misfit: what it would leave.
+
+    expected: (S,) change of the statistics there.
+    """
 
     name: str
     start: dict[str, float]
     misfit: float
-    scale: float
+    expected: Array
 
 
 def load() -> Templates:
@@ -98,7 +101,7 @@ def screen(
             continue
         rho = (d - scale * shift) / np.sqrt(1.0 + (2 * TOLERANCE * scale * shift) ** 2)
         start = {**entry.parameters, strength: entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)}
-        now = Screened(entry.name, bounded(entry.name, start), misfit(rho), scale)
+        now = Screened(entry.name, bounded(entry.name, start), misfit(rho), scale * shift * null.noise)
         if entry.name not in best or now.misfit < best[entry.name].misfit:
             best[entry.name] = now
     return sorted(best.values(), key=lambda s: s.misfit)

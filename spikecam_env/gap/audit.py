@@ -1,0 +1,231 @@
+"""What the data contradict about themselves, before any model is asked: labels, order, orientation, missing frames.
+
+Each check looks for one mistake that would explain a recording and leaves the others in order; an effect bends them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.case import Case
+from spikecam_env.gap.observe import BIN
+from spikecam_env.gap.statistics.moving import light_film
+
+Array = NDArray[np.float64]
+
+LEAST_LABEL = 1e-3
+"""Relative error of a label that is worth a word."""
+
+MENDED = 0.2
+"""Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
+
+MOST_BINS = 25
+"""Largest shift of a moving recording against its light that is looked for [bins of the film]."""
+
+SEGMENTS = 8
+"""Parts of a moving recording whose timing is compared."""
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """kind: label, swapped, flipped, dropped or silent.  recordings: concerned; text: what was found, in words."""
+
+    kind: str
+    recordings: tuple[str, ...]
+    text: str
+
+
+def audit(case: Case) -> list[Contradiction]:
+    """All contradictions, the grossest kind first; later checks skip recordings that are already suspect."""
+    found: list[Contradiction] = []
+    for check in (silent, flipped, swapped, wrong_label, dropped):
+        suspect = {r for c in found for r in c.recordings}
+        found += [c for c in check(case, suspect) if not suspect & set(c.recordings)]
+    return found
+
+
+def silent(case: Case, suspect: set[str]) -> list[Contradiction]:
+    """Lit recordings without spikes, and any that never stop."""
+    found = []
+    for c, o in zip(case.conditions, case.observations, strict=True):
+        mean = float(o.times.count.mean()) / o.frames
+        if c.light is not None and c.level > 0 and mean == 0:
+            found.append(Contradiction("silent", (c.name,), f"{c.name}: labelled radiance {c.level:g}, but no spikes"))
+        if c.light is not None and c.level < 0.5 and mean > 0.999:
+            text = f"{c.name}: labelled radiance {c.level:g}, but every pixel fires in every frame"
+            found.append(Contradiction("silent", (c.name,), text))
+    return found
+
+
+def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
+    """Recordings that fit their light and the unit's pattern upside down or mirrored."""
+    found = []
+    turns = {"rows reversed": (slice(None, None, -1), slice(None)), "columns reversed": (slice(None), slice(None, None, -1)),
+             "turned by 180 degrees": (slice(None, None, -1), slice(None, None, -1))}  # fmt: skip
+    for i, (c, o) in enumerate(zip(case.conditions, case.observations, strict=True)):
+        if c.light is None or o.times.count.sum() < 1000:
+            continue
+        if o.film is not None:
+            seen = o.film.reshape(-1, *case.shape).astype(np.float64)
+            light = light_film(c.light, c.frames) * case.base.gain + BIN * case.base.dark
+            expected = light.reshape(-1, *case.shape).astype(np.float64)
+        else:
+            seen = o.rate.reshape(1, *case.shape)
+            others = [p.rate for j, p in enumerate(case.observations) if j != i and case.conditions[j].kind == "flat"]
+            if c.kind == "dark" or not others:
+                continue
+            expected = np.mean([r / r.mean() for r in others], axis=0).reshape(1, *case.shape)
+        right = _correlation(seen, expected)
+        for name, (rows, columns) in turns.items():
+            turned = _correlation(seen[:, rows, columns], expected)
+            if turned > 0.2 and turned > right + 0.5 * (1.0 - max(right, 0.0)):
+                text = f"{c.name}: {name}; so it agrees with the rest (correlation {turned:.2f}, as it is {right:.2f})"
+                found.append(Contradiction("flipped", (c.name,), text))
+                break
+    return found
+
+
+def _correlation(a: Array, b: Array) -> float:
+    a, b = a - a.mean(), b - b.mean()
+    return float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-30))
+
+
+def _levels(case: Case, suspect: set[str]) -> tuple[list[str], Array, Array]:
+    """Names, labels and mean rates of the uniform, steady recordings of known light below saturation."""
+    rows = [
+        (c.name, c.level, float(o.rate[case.base.live].mean()))
+        for c, o in zip(case.conditions, case.observations, strict=True)
+        if c.kind in ("dark", "flat") and c.name not in suspect
+    ]
+    rows = [r for r in rows if r[2] < 0.9]
+    return [r[0] for r in rows], np.array([r[1] for r in rows]), np.array([r[2] for r in rows])
+
+
+def _bend(light: Array, rate: Array) -> tuple[float, Array]:
+    """Worst relative distance from the best straight line, and all of them."""
+    weight = 1.0 / np.maximum(rate, 1e-6)
+    design = np.stack([light, np.ones_like(light)], axis=1)
+    line, *_ = np.linalg.lstsq(design * weight[:, None], rate * weight, rcond=None)
+    off = rate / np.maximum(design @ line, 1e-9) - 1.0
+    return float(np.abs(off).max()), off
+
+
+def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
+    """Two steady recordings whose labels, exchanged, make the rates a straight line."""
+    names, light, rate = _levels(case, suspect)
+    if len(names) < 5:
+        return []
+    before = _bend(light, rate)[0]
+    if before < 0.01:
+        return []
+    best: tuple[float, int, int] = (np.inf, 0, 0)
+    for i, j in combinations(range(len(names)), 2):
+        other = light.copy()
+        other[[i, j]] = other[[j, i]]
+        best = min(best, (_bend(other, rate)[0], i, j))
+    left, i, j = best
+    if left > MENDED * before:
+        return []
+    a, b = names[i], names[j]
+    return [Contradiction("swapped", (a, b), f"{a} and {b} seem to be swapped: exchanged, rates follow the light to "
+                          f"{100 * left:.2g} %, as labelled to {100 * before:.2g} %")]  # fmt: skip
+
+
+def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
+    """One recording off the straight line that all others lie on."""
+    names, light, rate = _levels(case, suspect)
+    if len(names) < 5:
+        return []
+    before = _bend(light, rate)[0]
+    best: tuple[float, int] = (np.inf, 0)
+    for i in range(len(names)):
+        keep = np.arange(len(names)) != i
+        best = min(best, (_bend(light[keep], rate[keep])[0], i))
+    left, i = best
+    keep = np.arange(len(names)) != i
+    slope, dark = np.polyfit(light[keep], rate[keep], 1, w=1.0 / np.maximum(rate[keep], 1e-6))
+    off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0) if light[i] > 0 else np.inf
+    if left > MENDED * before or abs(off) < max(LEAST_LABEL, 4 * left):
+        return []
+    if light[i] == 0:
+        text = f"{names[i]}: labelled dark, but {100 * (rate[i] / max(dark, 1e-9) - 1):.2g} % off what the flats extrapolate to"
+    else:
+        text = f"{names[i]}: its rate is that of {100 * off:+.2g} % other light than its label; all others agree to {100 * left:.1g} %"
+    return [Contradiction("label", (names[i],), text)]
+
+
+def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
+    """Frames missing (or doubled): from one frame on all pixels are ahead of (behind) their time."""
+    found = []
+    for c, o in zip(case.conditions, case.observations, strict=True):
+        if c.name in suspect or c.light is None:
+            continue
+        jump = _jump_moving(case, c, o) if c.moves and o.film is not None else _jump_steady(o) if not c.moves else None
+        if jump is not None:
+            at, frames = jump
+            what = "missing" if frames > 0 else "doubled"
+            text = f"{c.name}: about {abs(frames):.0f} frames {what} near frame {at}"
+            found.append(Contradiction("dropped", (c.name,), text))
+    return found
+
+
+def _jump_steady(o) -> tuple[int, float] | None:  # type: ignore[no-untyped-def]
+    """(frame, missing): intervals that span a gap are short by it; they end within an interval after it."""
+    spikes = max(float(o.frame.mean()), 1e-9)
+    interval = o.shape[0] * o.shape[1] / spikes
+    window = int(np.clip(round(interval), 4, o.frames // 8))
+    total = np.convolve(o.late, np.ones(window), "valid")
+    spread = 1.4826 * float(np.median(np.abs(total - np.median(total)))) + 1e-9
+    at = int(np.argmax(np.abs(total)))
+    mean = float(total[at] / max(o.frame[at : at + window].sum(), 1))
+    if abs(total[at]) < 12 * spread or abs(mean) < 0.3:
+        return None
+    return at, -mean
+
+
+def _jump_moving(case: Case, condition, o) -> tuple[int, float] | None:  # type: ignore[no-untyped-def]
+    """(frame, missing) from how late each segment of the film is against its light."""
+    light = light_film(condition.light, condition.frames).astype(np.float64)
+    expected = light * case.base.gain + BIN * case.base.dark
+    parts = np.array_split(np.arange(len(expected)), SEGMENTS)
+    coarse = [_shift(o.film, expected, part) for part in parts]
+    if len(set(coarse)) > 1 and coarse[0] == 0:
+        k = next(i for i, s in enumerate(coarse) if s != 0)
+        return k * condition.frames // SEGMENTS, float(coarse[k] * BIN)
+    change = -np.gradient(expected, axis=0) / BIN
+    left = o.film - expected
+    late, weight = [], []
+    for part in parts:
+        power = float((change[part] ** 2).sum())
+        late.append(float((left[part] * change[part]).sum()) / max(power, 1e-9))
+        weight.append(power)
+    times = np.array(late)
+    if min(weight) <= 0:
+        return None
+    steps = [times[k:].mean() - times[:k].mean() for k in range(1, SEGMENTS)]
+    k = int(np.argmax(np.abs(steps))) + 1
+    rest = max(float(np.std(times[:k] - times[:k].mean())), float(np.std(times[k:] - times[k:].mean())))
+    if abs(steps[k - 1]) < max(0.7, 6 * rest):
+        return None
+    return k * condition.frames // SEGMENTS, -steps[k - 1]
+
+
+def _shift(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64]) -> int:
+    """Bins by which the light has to be moved on to agree best with a part of the film; 0 unless clearly better."""
+    seen = film[part].astype(np.float64)
+    scores = {}
+    for shift in range(-MOST_BINS, MOST_BINS + 1):
+        if 0 <= part[0] + shift and part[-1] + shift < len(expected):
+            scores[shift] = float(((seen - expected[part + shift]) ** 2).sum())
+    best = min(scores, key=lambda s: scores[s])
+    return best if scores[best] < 0.8 * scores[0] else 0
+
+
+def without(case: Case, names: Sequence[str]) -> list[int]:
+    """Recordings that are not in `names`, by index."""
+    return [i for i, c in enumerate(case.conditions) if c.name not in names]
