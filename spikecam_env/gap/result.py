@@ -113,6 +113,7 @@ class Diagnosis:
     """The answer.  patched: the model with what was found, or with an empirical patch; loads back as a model.
 
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
+    candidates, exclude: as asked for; None: all of the catalogue.
     """
 
     verdict: str
@@ -132,6 +133,8 @@ class Diagnosis:
     campaign: str
     seed: int
     stages: dict[str, float]
+    candidates: tuple[str, ...] | None = None
+    exclude: tuple[str, ...] = ()
     evidence: Evidence | None = field(default=None, repr=False)
 
     def to_json(self) -> dict[str, Any]:
