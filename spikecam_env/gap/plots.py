@@ -1,0 +1,147 @@
+"""Plots of a diagnosis: one small figure a panel, so that a page can lay them out for any width.
+
+Measured black dots, model before orange dashes and squares, model after blue line and triangles, noise band grey:
+colours of Okabe and Ito, told apart by form as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from spikecam_env.gap.evidence import Panel
+from spikecam_env.gap.result import Gap, Statistic
+
+MEASURED, BEFORE, AFTER, BAND, FLOOR = "#000000", "#D55E00", "#0072B2", "#D9D9D9", "#8C8C8C"
+
+_WIDTH, _HEIGHT = 4.8, 3.3
+_FONTS = {"font.size": 10, "axes.titlesize": 10.5, "axes.spines.top": False, "axes.spines.right": False,
+          "font.family": "DejaVu Sans", "axes.titlelocation": "left"}  # fmt: skip
+_MANY = 40
+"""Points from which measured is drawn as a thin line."""
+
+
+def panel(p: Panel) -> Figure:
+    """Measured, before and after, with a band of two standard errors around before."""
+    with mpl.rc_context(_FONTS):
+        figure = Figure((_WIDTH, _height(len(p.labels))), layout="constrained")
+        axis = figure.subplots()
+        if p.labels:
+            _by_name(axis, p)
+        else:
+            _over_x(axis, p)
+        axis.set_title(p.title)
+        return figure
+
+
+def _height(names: int) -> float:
+    return max(_HEIGHT, 1.1 + 0.26 * names)
+
+
+def _over_x(axis: Axes, p: Panel) -> None:
+    low, high = p.before - 2 * p.sd, p.before + 2 * p.sd
+    if "y" in p.log:
+        share = 2 * p.sd / p.before
+        low, high = p.before * np.exp(-share), p.before * np.exp(share)
+    many = p.x.size > _MANY
+    axis.fill_between(p.x, low, high, color=BAND, lw=0, zorder=0)
+    axis.plot(p.x, p.before, color=BEFORE, ls=(0, (5, 2)), lw=1.4, marker=None if many else "s", ms=4, zorder=2)
+    if p.after is not None:
+        axis.plot(p.x, p.after, color=AFTER, lw=1.4, marker=None if many else "^", ms=4.5, zorder=3)
+    axis.plot(p.x, p.measured, color=MEASURED, lw=0.9, marker="." if many else "o", ms=3 if many else 4.5, zorder=4,
+              alpha=0.8 if many else 1.0)  # fmt: skip
+    if "x" in p.log and p.x.min() > 0:
+        axis.set_xscale("log")
+    if "y" in p.log:
+        axis.set_yscale("log")
+    axis.set(xlabel=p.xlabel, ylabel=p.ylabel)
+    if "x" in p.log and p.x.max() < 20 * p.x.min():
+        axis.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
+        shown = p.x if p.x.size <= 6 else p.x[:: p.x.size // 5]
+        axis.set_xticks(shown, [f"{v:.3g}" for v in shown])
+
+
+def _by_name(axis: Axes, p: Panel) -> None:
+    """Names down the left, values across."""
+    y = -p.x
+    axis.barh(y, 4 * p.sd, left=p.before - 2 * p.sd, height=0.8, color=BAND, zorder=0)
+    axis.plot(p.before, y, color=BEFORE, marker="s", ms=5, ls="", zorder=2)
+    if p.after is not None:
+        axis.plot(p.after, y, color=AFTER, marker="^", ms=6, ls="", zorder=3)
+    axis.plot(p.measured, y, color=MEASURED, marker="o", ms=4.5, ls="", zorder=4)
+    axis.set_yticks(y, p.labels)
+    axis.set(xlabel=p.ylabel)
+    axis.grid(axis="y", color="0.93", zorder=-1)
+
+
+def pixel_map(values: NDArray[np.float64], title: str, limits: tuple[float, float]) -> Figure:
+    """Every pixel (H, W) in colour, between limits."""
+    with mpl.rc_context(_FONTS):
+        figure = Figure((3.4, 3.0), layout="constrained")
+        axis = figure.subplots()
+        image = axis.imshow(values, vmin=limits[0], vmax=limits[1], interpolation="nearest", cmap="viridis")
+        figure.colorbar(image, ax=axis, shrink=0.85)
+        axis.set_title(title)
+        axis.set(xticks=[], yticks=[])
+        return figure
+
+
+def map_limits(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Colour limits: all but half a per cent of the pixels at either end."""
+    low, high = np.quantile(values[np.isfinite(values)], [0.005, 0.995])
+    return float(low), float(max(high, low + 1e-12))
+
+
+def strip(statistics: Sequence[Statistic]) -> Figure:
+    """z of every statistic by group, before and after; loudest group on top."""
+    groups = sorted({s.group for s in statistics}, key=lambda g: max(abs(s.z) for s in statistics if s.group == g))
+    with mpl.rc_context(_FONTS):
+        figure = Figure((_WIDTH + 0.8, 1.3 + 0.36 * len(groups)), layout="constrained")
+        axis = figure.subplots()
+        axis.axvspan(-3, 3, color=BAND, lw=0, zorder=0)
+        for y, group in enumerate(groups):
+            mine = [s for s in statistics if s.group == group]
+            for values, up, colour, mark in (
+                ([s.z for s in mine], 0.18, BEFORE, "s"), ([s.z_after for s in mine], -0.18, AFTER, "^"),
+            ):  # fmt: skip
+                axis.plot(values, np.full(len(values), y + up), ls="", marker=mark, ms=4.5, color=colour, alpha=0.6)
+        largest = max((abs(z) for s in statistics for z in (s.z, s.z_after) if np.isfinite(z)), default=1.0)
+        axis.set_xscale("symlog", linthresh=5)
+        axis.set_xlim(-1.3 * max(largest, 5), 1.3 * max(largest, 5))
+        ticks = [t for t in (3, 10, 30, 100, 300, 1000, 10_000, 100_000) if t <= 1.3 * max(largest, 5)]
+        axis.set_xticks([*(-t for t in ticks), 0, *ticks], [*(f"−{t}" for t in ticks), "0", *map(str, ticks)])
+        axis.minorticks_off()
+        axis.set_yticks(range(len(groups)), groups)
+        axis.set(xlabel="z: measured less model, in noise", ylim=(-0.6, len(groups) - 0.4))
+        axis.grid(axis="y", color="0.93", zorder=-1)
+        return figure
+
+
+def gap_bars(gap: Gap) -> Figure:
+    """Gap of every held-out recording before and after, and the floor."""
+    names = list(gap.by_recording)
+    rows = [*gap.by_recording.values(), {"before": gap.before, "after": gap.after, "floor": gap.floor}]
+    names.append("all held out")
+    y = -np.arange(len(rows), dtype=np.float64)
+    with mpl.rc_context(_FONTS):
+        figure = Figure((_WIDTH + 0.8, 1.1 + 0.5 * len(rows)), layout="constrained")
+        axis = figure.subplots()
+        values = [v for row in rows for v in row.values() if np.isfinite(v) and v > 0]
+        left = 0.5 * min(values, default=1.0)
+        for key, up, colour in (("before", 0.27, BEFORE), ("after", 0.0, AFTER), ("floor", -0.27, FLOOR)):
+            widths = np.array([row.get(key, np.nan) for row in rows], dtype=np.float64)
+            axis.barh(y + up, np.maximum(widths - left, 0), left=left, height=0.25, color=colour)
+            for at, value in zip(y + up, widths, strict=True):
+                if np.isfinite(value):
+                    axis.annotate(f"{value:.3g}", (max(value, left), at), (3, 0), textcoords="offset points",
+                                  va="center", fontsize=8)  # fmt: skip
+        axis.set_xscale("log")
+        axis.set_xlim(left, 1.6 * max(values, default=1.0))
+        axis.set_yticks(y, names)
+        axis.set(xlabel="mean square distance, in noise")
+        return figure
