@@ -26,6 +26,13 @@ pre { background: #f5f5f5; padding: .7em 1em; overflow-x: auto; font-size: .9em 
 tr.identified td:nth-child(2) { color: #14663a } tr.assumed td:nth-child(2) { color: #8a5a00 }
 tr.not td:nth-child(2) { color: #9a1c1c }
 .warn { background: #fff4d6; padding: .5em 1em }
+@media (max-width: 600px) {
+  .optional { display: none }
+  .stack thead { display: none } .stack, .stack tbody, .stack tr { display: block }
+  .stack tr { border-bottom: 1px solid #bbb; padding: .3em 0 } .stack td { display: flex; border: 0; gap: .8em }
+  .stack td::before { content: attr(data-label); flex: 0 0 7em; color: #666; text-align: left; white-space: normal }
+  .stack td.n { text-align: left; white-space: normal }
+}
 """
 
 
@@ -45,19 +52,35 @@ def element(tag: str, text: str, **attributes: str) -> str:
 
 
 def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: Sequence[int] = (), classes: Sequence[str] = ()
+    head: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    numbers: Sequence[int] = (),
+    classes: Sequence[str] = (),
+    stack: bool = False,
+    optional: Sequence[int] = (),
 ) -> str:
     """A table of plain text that scrolls by itself where the page is narrow.
 
-    numbers: columns aligned right.  classes: of each row, in order.
+    numbers: columns aligned right.  classes: of each row, in order.  stack: on narrow screens a row becomes a block of
+    lines instead, one a cell, each with its column's name.  optional: columns that narrow screens do without.
     """
 
+    def cell(text: str, column: int, tag: str) -> str:
+        named = ["n"] * (column in numbers) + ["optional"] * (column in optional)
+        attributes = {"class_": " ".join(named)} if named else {}
+        if stack and tag == "td":
+            attributes["data-label"] = head[column]
+        return element(tag, text, **attributes)
+
     def line(cells: Sequence[str], tag: str, class_: str = "") -> str:
-        inner = "".join(element(tag, c, **({"class_": "n"} if i in numbers else {})) for i, c in enumerate(cells))
+        inner = "".join(cell(text, i, tag) for i, text in enumerate(cells))
         return f'<tr class="{html.escape(class_)}">{inner}</tr>' if class_ else f"<tr>{inner}</tr>"
 
     body = "".join(line(row, "td", classes[i] if i < len(classes) else "") for i, row in enumerate(rows))
-    return f'<div class="wide"><table><thead>{line(head, "th")}</thead><tbody>{body}</tbody></table></div>'
+    opening = '<table class="stack">' if stack else "<table>"
+    top = f"<thead>{line(head, 'th')}</thead>" if any(head) else ""
+    return f'<div class="wide">{opening}{top}<tbody>{body}</tbody></table></div>'
 
 
 def picture(drawn: Figure, alt: str, *, form: str = "svg", dpi: int = 110) -> str:

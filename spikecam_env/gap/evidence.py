@@ -2,7 +2,9 @@
 
 An exhibit is one way to look at recordings (rates, noise, spectrum ...), with a few panels: a measured curve, one twin
 of the model before and one after, and `sd`, the standard error of measured less before.  It comes from the scatter of
-that difference over pixels, columns or segments, which the fixed pattern, the same on both sides, drops out of.
+that difference over pixels or columns, which the fixed pattern, the same on both sides, drops out of.  Shares of intervals
+and coincidences have no such scatter, and regular spikes are far less random than independent ones: their sd is that of
+independent spikes, scaled by what two twins of the same model differ by, where there are two.
 """
 
 from __future__ import annotations
@@ -94,6 +96,7 @@ class Take(NamedTuple):
     measured: Observation
     before: Observation
     after: Observation | None
+    again: Observation | None
 
 
 def exhibits(evidence: Evidence, frame_rate_hz: float) -> list[Exhibit]:
@@ -118,8 +121,9 @@ def belongs(statistic: Statistic, words: Sequence[str]) -> bool:
 
 def takes(evidence: Evidence, kinds: Sequence[str]) -> list[Take]:
     """Recordings of spikes in these kinds of light, in order."""
-    after = evidence.after or (None,) * len(evidence.conditions)
-    rows = zip(evidence.conditions, evidence.measured, evidence.before, after, strict=True)
+    nothing = (None,) * len(evidence.conditions)
+    after, again = evidence.after or nothing, evidence.again or nothing
+    rows = zip(evidence.conditions, evidence.measured, evidence.before, after, again, strict=True)
     return [Take(*row) for row in rows if row[0].kind in kinds and row[1] is not None and row[2] is not None]
 
 
@@ -152,6 +156,16 @@ def loudest(panels: Sequence[Panel], number: int) -> list[Panel]:
     """The panels where measured and before differ most, in the order given."""
     kept = sorted(panels, key=lambda p: -p.z)[:number]
     return [p for p in panels if p in kept]
+
+
+def scaled(sd: Array, difference: Array | None) -> Array:
+    """Standard errors times a factor such that the difference of two twins of one model has a root mean square of 1."""
+    if difference is None:
+        return sd
+    known = (sd > 0) & np.isfinite(difference)
+    if known.sum() < 3:
+        return sd
+    return sd * float(np.sqrt(np.mean((difference[known] / sd[known]) ** 2)))
 
 
 # --- rates
@@ -288,21 +302,22 @@ def spectrum_panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]
             frequency, measured, count = spectrum(t.measured.frame, frame_rate_hz)
             before = spectrum(t.before.frame, frame_rate_hz)[1]
             after = spectrum(t.after.frame, frame_rate_hz)[1] if t.after else None
-            sd = before * _log_error(measured / before, count)
+            sd = before * np.sqrt(2 / count)
+            sd = np.maximum(sd, before * _local_scatter(measured / before))
             panels.append(Panel(f"Power spectrum, {t.shown.name}", "frequency [Hz]", "power over white noise's",
                                 frequency, measured, before, after, sd, log="xy"))  # fmt: skip
         yield from loudest(panels, 1)
 
 
-def _log_error(ratio: Array, count: Array) -> Array:
-    """Standard error of log(ratio) of two spectra over `count` periodogram values each.
+def _local_scatter(ratio: Array) -> Array:
+    """Scatter of log(ratio) between adjacent frequencies.
 
-    At least the root of 2/n of independent values.  Pixels that keep their beat make values less independent than
-    that; the scatter between adjacent frequencies shows it, and sees neither few lines nor a broad rise.
+    Pixels that keep their beat make periodogram values depend on one another, more at some frequencies than at others;
+    their scatter shows it, and sees neither a few lines nor a broad rise.
     """
     jumps = np.abs(np.diff(np.log(ratio)))
     local = ndimage.median_filter(jumps, 21, mode="nearest") * 1.4826 / np.sqrt(2)
-    return np.maximum(np.sqrt(2 / count), np.append(local, local[-1]))
+    return np.append(local, local[-1])
 
 
 def spectrum(counts: NDArray[np.int32], frame_rate_hz: float) -> tuple[Array, Array, Array]:
@@ -354,14 +369,14 @@ def step_panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             after = around(t.after, mine)[1].mean(axis=1) if t.after else None
             ms = x * 1e3 / frame_rate_hz
             sd = (measured - before).std(axis=1) / np.sqrt(measured.shape[1])
-            rates = Panel(f"Rate around a {name}, {t.shown.name}", f"time from the {name} [ms]", "spikes a frame", ms,
+            rates = Panel(f"Rate around a {name} ({t.shown.name})", f"time from the {name} [ms]", "spikes a frame", ms,
                           measured.mean(axis=1), before.mean(axis=1), after, sd)  # fmt: skip
             height = abs(rates.before[x > 0].mean() - rates.before[x < 0].mean())
             scale = 100 / max(height, 1e-9)
             yield rates
             yield Panel(
-                f"What is left after the {name}, {t.shown.name}", f"time from the {name} [ms]",
-                "off the model's [% of the step]", ms, scale * (rates.measured - rates.before), np.zeros(x.size),
+                f"What is left after a {name} ({t.shown.name})", f"time from the {name} [ms]",
+                "less the model's [% of step]", ms, scale * (rates.measured - rates.before), np.zeros(x.size),
                 None if after is None else scale * (after - rates.before), scale * sd,
             )  # fmt: skip
 
@@ -399,7 +414,7 @@ def motion_panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             continue
         assert t.shown.light is not None
         for name, feature in features(t.shown.light, len(films[0]), t.measured.shape).items():
-            panel = _over_feature(f"{name}, {t.shown.name}", feature, films)
+            panel = _over_feature(f"{name} ({t.shown.name})", feature, films)
             if panel:
                 panels.append(panel)
     yield from loudest(panels, 4)
@@ -530,6 +545,7 @@ def interval_panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]
         measured, before = t.measured.lengths[shown] / total[0], t.before.lengths[shown] / total[1]
         after = t.after.lengths[shown] / total[2] if t.after else None
         sd = np.sqrt(np.maximum(measured, 1 / total[0]) / total[0] + np.maximum(before, 1 / total[1]) / total[1])
+        sd = scaled(sd, t.again.lengths[shown] / max(t.again.lengths.sum(), 1) - before if t.again else None)
         panels.append(Panel(
             f"Intervals by length, {t.shown.name}", "length [frames]", "share, less the model's [%]",
             shown + 1.0, 100 * (measured - before), np.zeros(shown.size),
@@ -547,11 +563,13 @@ def neighbour_panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel
             continue
         after = t.after.coincidences.T.reshape(-1) if t.after else None
         labels = tuple(f"{where}, {lag}" for where in ("in a row", "in a column") for lag in range(len(measured) // 2))
+        again = t.again.coincidences.T.reshape(-1) if t.again else None
         # Every pair is counted both ways round.
+        sd = scaled(np.sqrt(2 / measured + 2 / before), None if again is None else again / before - 1)
         panels.append(Panel(
             f"Coincidences of neighbours, {t.shown.name}", "", "over the model's, less 1 [%]",
             np.arange(len(labels), dtype=np.float64), 100 * (measured / before - 1), np.zeros(len(labels)),
-            None if after is None else 100 * (after / before - 1), 100 * np.sqrt(2 / measured + 2 / before),
+            None if after is None else 100 * (after / before - 1), 100 * sd,
             labels=labels, line=False,
         ))  # fmt: skip
     yield from loudest(panels, 2)
@@ -563,12 +581,12 @@ def _no_maps(evidence: Evidence) -> Iterator[Maps]:
 
 _EXHIBITS: tuple[tuple[str, str, str, tuple[str, ...], Callable, Callable], ...] = (
     ("rates", "Rates and levels",
-     "Left: how far mean rates are off a straight line through each pixel's own levels. A camera that saturates bends "
-     "down at high levels. Right: the array's rate over the model's, recording by recording.",
+     "How far mean rates are off a straight line through each pixel's own levels (a camera that saturates bends down "
+     "at high levels), and the array's rate over the model's, recording by recording.",
      ("rate", "level", "linear", "response curve"), rate_panels, _no_maps),
     ("noise", "Temporal noise",
      "Noise of single spikes, from second differences A_k of spike times k apart. Level over k: drawn anew for each "
-     "spike; rising: slow noise. Below: variance of intervals, and whether a long one follows a short one.",
+     "spike; rising: slow noise. Then the variance of intervals, and whether a long one follows a short one.",
      ("noise", "jitter", "variance", "a_k", "lag-1", "lag1"), noise_panels, _no_maps),
     ("spectrum", "Spectrum of the population",
      "Power of the number of spikes of the whole array, over that of independent random spikes. Lines are flicker or "

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import matplotlib as mpl
+import matplotlib.ticker
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,18 +26,28 @@ _FONTS = {"font.size": 10, "axes.titlesize": 10.5, "axes.spines.top": False, "ax
 _MANY = 40
 """Points from which measured is drawn as a thin line."""
 
+_plain = mpl.ticker.FuncFormatter(lambda value, _: f"{value:g}")
+
 
 def panel(p: Panel) -> Figure:
     """Measured, before and after, with a band of two standard errors around before."""
     with mpl.rc_context(_FONTS):
-        figure = Figure((_WIDTH, _height(len(p.labels))), layout="constrained")
-        axis = figure.subplots()
+        figure, axis = _plot(_height(len(p.labels)), p.labels)
         if p.labels:
             _by_name(axis, p)
         else:
             _over_x(axis, p)
         axis.set_title(p.title)
         return figure
+
+
+def _plot(height: float, names: Sequence[str] = ()) -> tuple[Figure, Axes]:
+    """A figure with one axis; margins in inches, wide enough for names on the left.  (A layout engine draws twice.)"""
+    left = max(0.78, 0.25 + 0.087 * max(map(len, names), default=0))
+    bottom, top, right = 0.52, 0.32, 0.12
+    figure = Figure((_WIDTH, height))
+    box = (left / _WIDTH, bottom / height, 1 - (left + right) / _WIDTH, 1 - (bottom + top) / height)
+    return figure, figure.add_axes(box)
 
 
 def _height(names: int) -> float:
@@ -55,15 +66,17 @@ def _over_x(axis: Axes, p: Panel) -> None:
         axis.plot(p.x, p.after, color=AFTER, lw=1.4, marker=None if many else "^", ms=4.5, zorder=3)
     axis.plot(p.x, p.measured, color=MEASURED, lw=0.9, marker="." if many else "o", ms=3 if many else 4.5, zorder=4,
               alpha=0.8 if many else 1.0)  # fmt: skip
-    if "x" in p.log and p.x.min() > 0:
-        axis.set_xscale("log")
     if "y" in p.log:
         axis.set_yscale("log")
     axis.set(xlabel=p.xlabel, ylabel=p.ylabel)
-    if "x" in p.log and p.x.max() < 20 * p.x.min():
+    if "x" in p.log and p.x.min() > 0:
+        axis.set_xscale("log")
+        axis.xaxis.set_major_formatter(_plain)
         axis.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
-        shown = p.x if p.x.size <= 6 else p.x[:: p.x.size // 5]
-        axis.set_xticks(shown, [f"{v:.3g}" for v in shown])
+        if p.x.size <= 8:
+            axis.set_xticks(p.x, [f"{v:.3g}" for v in p.x])
+    elif np.all(p.x == np.round(p.x)):
+        axis.xaxis.set_major_locator(mpl.ticker.MaxNLocator(8, integer=True))
 
 
 def _by_name(axis: Axes, p: Panel) -> None:
@@ -75,6 +88,7 @@ def _by_name(axis: Axes, p: Panel) -> None:
         axis.plot(p.after, y, color=AFTER, marker="^", ms=6, ls="", zorder=3)
     axis.plot(p.measured, y, color=MEASURED, marker="o", ms=4.5, ls="", zorder=4)
     axis.set_yticks(y, p.labels)
+    axis.use_sticky_edges = False
     axis.set(xlabel=p.ylabel)
     axis.grid(axis="y", color="0.93", zorder=-1)
 
@@ -82,10 +96,10 @@ def _by_name(axis: Axes, p: Panel) -> None:
 def pixel_map(values: NDArray[np.float64], title: str, limits: tuple[float, float]) -> Figure:
     """Every pixel (H, W) in colour, between limits."""
     with mpl.rc_context(_FONTS):
-        figure = Figure((3.4, 3.0), layout="constrained")
-        axis = figure.subplots()
+        figure = Figure((3.4, 2.9))
+        axis = figure.add_axes((0.02, 0.02, 0.74, 0.87))
         image = axis.imshow(values, vmin=limits[0], vmax=limits[1], interpolation="nearest", cmap="viridis")
-        figure.colorbar(image, ax=axis, shrink=0.85)
+        figure.colorbar(image, cax=figure.add_axes((0.78, 0.1, 0.04, 0.7)))
         axis.set_title(title)
         axis.set(xticks=[], yticks=[])
         return figure
@@ -101,8 +115,7 @@ def strip(statistics: Sequence[Statistic]) -> Figure:
     """z of every statistic by group, before and after; loudest group on top."""
     groups = sorted({s.group for s in statistics}, key=lambda g: max(abs(s.z) for s in statistics if s.group == g))
     with mpl.rc_context(_FONTS):
-        figure = Figure((_WIDTH + 0.8, 1.3 + 0.36 * len(groups)), layout="constrained")
-        axis = figure.subplots()
+        figure, axis = _plot(1.1 + 0.36 * len(groups), groups)
         axis.axvspan(-3, 3, color=BAND, lw=0, zorder=0)
         for y, group in enumerate(groups):
             mine = [s for s in statistics if s.group == group]
@@ -129,11 +142,12 @@ def gap_bars(gap: Gap) -> Figure:
     names.append("all held out")
     y = -np.arange(len(rows), dtype=np.float64)
     with mpl.rc_context(_FONTS):
-        figure = Figure((_WIDTH + 0.8, 1.1 + 0.5 * len(rows)), layout="constrained")
-        axis = figure.subplots()
+        figure, axis = _plot(0.9 + 0.5 * len(rows), names)
         values = [v for row in rows for v in row.values() if np.isfinite(v) and v > 0]
         left = 0.5 * min(values, default=1.0)
-        for key, up, colour in (("before", 0.27, BEFORE), ("after", 0.0, AFTER), ("floor", -0.27, FLOOR)):
+        patched = gap.after != gap.before
+        bars = [("before", 0.27, BEFORE), *([("after", 0.0, AFTER)] if patched else []), ("floor", -0.27, FLOOR)]
+        for key, up, colour in bars:
             widths = np.array([row.get(key, np.nan) for row in rows], dtype=np.float64)
             axis.barh(y + up, np.maximum(widths - left, 0), left=left, height=0.25, color=colour)
             for at, value in zip(y + up, widths, strict=True):
@@ -142,6 +156,8 @@ def gap_bars(gap: Gap) -> Figure:
                                   va="center", fontsize=8)  # fmt: skip
         axis.set_xscale("log")
         axis.set_xlim(left, 1.6 * max(values, default=1.0))
+        axis.xaxis.set_major_formatter(_plain)
+        axis.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
         axis.set_yticks(y, names)
         axis.set(xlabel="mean square distance, in noise")
         return figure

@@ -100,7 +100,10 @@ def _opening_class(d: Diagnosis) -> Iterator[str]:
     for name in class_.get("members", ()):
         yield from _effect_summary(str(name))
     if class_.get("experiment"):
-        yield f'<div class="do">{element("h3", "The experiment that would tell")}{element("p", str(class_["experiment"]))}</div>'
+        yield '<div class="do">'
+        yield element("h3", "The experiment that would tell")
+        yield element("p", str(class_["experiment"]))
+        yield "</div>"
     for effect in d.effects:
         yield from _effect_card(effect)
 
@@ -155,7 +158,7 @@ def _effect_card(effect: NamedEffect) -> Iterator[str]:
     yield from _effect_summary(effect.name)
     rows = [_parameter_row(effect.name, name, e) for name, e in effect.parameters.items()]
     if rows:
-        yield table(("parameter", "value ± sd", "90 % interval", "meaning"), rows, numbers=(1, 2))
+        yield table(("parameter", "value ± sd", "90 % interval", "meaning"), rows, numbers=(1, 2), stack=True)
     others = "; ".join(f"{human(n)} {_percent(c)}" for n, c in effect.alternatives)
     told = f"Family: {human(effect.family)}. Confidence in the name: {_percent(effect.confidence)}."
     yield element("p", told + (f" Instead of it: {others}." if others else ""))
@@ -164,12 +167,15 @@ def _effect_card(effect: NamedEffect) -> Iterator[str]:
 
 def _effect_summary(name: str) -> Iterator[str]:
     found = sheet(name)
-    yield element("h3", human(name).capitalize())
-    if found:
-        _, _, said = found.summary.partition(": ")
-        yield element("p", (said or found.summary)[:1].upper() + (said or found.summary)[1:])
+    if not found:
+        yield element("h3", human(name).capitalize())
+    else:
+        title, _, said = found.summary.partition(": ")
+        yield element("h3", title)
+        yield element("p", said[:1].upper() + said[1:])
         yield element("pre", law(name))
-        yield element("p", f"Seen in: {found.sections['Seen in']}" if "Seen in" in found.sections else "")
+        if "Seen in" in found.sections:
+            yield element("p", f"Seen in: {found.sections['Seen in']}")
 
 
 def _parameter_row(effect: str, name: str, e: Estimate) -> tuple[str, ...]:
@@ -187,7 +193,7 @@ def _parameters_off(d: Diagnosis) -> str:
     """One row a parameter; its columns are what the diagnosis says of it."""
     keys = list(dict.fromkeys(key for row in d.parameters.values() for key in row))
     rows = [(name, *(_number(row.get(key)) for key in keys)) for name, row in d.parameters.items()]
-    return table(("parameter", *map(human, keys)), rows, numbers=range(1, len(keys) + 1))
+    return table(("parameter", *map(human, keys)), rows, numbers=range(1, len(keys) + 1), stack=True)
 
 
 def _structure_table(unknown: dict[str, Any]) -> str:
@@ -267,13 +273,12 @@ def _evidence(d: Diagnosis) -> Iterator[str]:
         yield element(
             "p", f"Nowhere do measured and model differ by {LOUD:g} standard deviations. What was looked at:"
         )
-        for exhibit in quiet:
-            yield from _exhibit(exhibit, d)
-        return
+        loud, quiet = quiet[:3], quiet[3:]
     for exhibit in loud:
         yield from _exhibit(exhibit, d)
     if quiet:
-        yield f"<details><summary>{element('span', 'Also looked at, with no difference: ' + ', '.join(e.title.lower() for e in quiet))}</summary>"
+        also = "Also looked at, with no difference: " + ", ".join(e.title.lower() for e in quiet)
+        yield f"<details>{element('summary', also)}"
         for exhibit in quiet:
             yield from _exhibit(exhibit, d)
         yield "</details>"
@@ -282,8 +287,12 @@ def _evidence(d: Diagnosis) -> Iterator[str]:
 def _legend(*, after: bool) -> str:
     keys = [("measured", "●", "measured"), ("before", "■", "model before"), ("after", "▲", "model after"),
             ("band", "▮", "noise: two standard errors of measured less before")]  # fmt: skip
-    shown = [f'<span class="{c}">{mark}</span> {text}' for c, mark, text in keys if after or c != "after"]
-    return f'<p class="legend">{" &nbsp; ".join(shown)}</p>'
+    shown = [
+        f'<span class="key"><span class="{c}">{mark}</span> {text}</span>'
+        for c, mark, text in keys
+        if after or c != "after"
+    ]
+    return f'<p class="legend">{" ".join(shown)}</p>'
 
 
 def _exhibit(exhibit: Exhibit, d: Diagnosis) -> Iterator[str]:
@@ -324,15 +333,19 @@ def _bank(d: Diagnosis) -> Iterator[str]:
     caption = "Every statistic by group. Orange squares: model before; blue triangles: after. Grey: within 3."
     yield f'<div class="single">{captioned(picture(plots.strip(d.statistics), "z by group"), caption)}</div>'
     rows = [
-        (s.name, ", ".join(s.recordings), _number(s.measured), _number(s.before), _number(s.after), f"{s.z:+.1f}",
-         f"{s.z_after:+.1f}")
+        (s.name, ", ".join(s.recordings), _number(s.measured), _number(s.before), _number(s.after), _signed(s.z),
+         _signed(s.z_after))
         for s in found[:15]
     ]  # fmt: skip
     if rows:
         head = ("statistic", "recordings", "measured", "before", "after", "z before", "z after")
         title = "The largest differences" + (f" ({len(rows)} of {len(found)})" if len(found) > len(rows) else "")
         yield element("h3", title)
-        yield table(head, rows, numbers=range(2, 7))
+        yield table(head, rows, numbers=range(2, 7), optional=range(2, 5))
+
+
+def _signed(z: float) -> str:
+    return f"{z:+.1f}".replace("-", "−")
 
 
 def _candidates(d: Diagnosis) -> Iterator[str]:
@@ -349,7 +362,7 @@ def _candidates(d: Diagnosis) -> Iterator[str]:
         for r in d.ranking
     ]  # fmt: skip
     classes = ["accepted" if r.accepted else "" for r in d.ranking]
-    yield table(("candidate", "misfit before", "misfit", "best fit", "outcome"), rows, numbers=(1, 2), classes=classes)
+    yield table(("candidate", "misfit before", "misfit", "best fit", "outcome"), rows, numbers=(1, 2), classes=classes, stack=True)
 
 
 def _bounds(d: Diagnosis) -> Iterator[str]:
@@ -429,14 +442,14 @@ nav {{ font-size: .9em; color: #777; margin: 1em 0 }} a {{ color: #0059a3 }}
 .card, .do {{ border: 1px solid #ddd; border-radius: 6px; padding: .2em 1.2em .6em; margin: 1em 0 }}
 .do {{ background: #eef6fb; border-color: #bcdcf0 }}
 .caption, .legend {{ color: #444 }} .legend {{ font-size: .95em }}
-.legend span {{ font-size: 1.1em }}
+.key {{ display: inline-block; margin-right: 1em }}
 .measured {{ color: {plots.MEASURED} }} .before {{ color: {plots.BEFORE} }} .after {{ color: {plots.AFTER} }}
 .band {{ color: #bbb }}
 .plots {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 380px), 1fr)); gap: 1em;
           align-items: start }}
-.maps {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 250px), 1fr)); gap: .5em }}
+.maps {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 165px), 1fr)); gap: .5em }}
 .plots img, .maps img, .single img {{ width: 100%; height: auto; display: block }}
-.single {{ max-width: 620px }} .maps {{ max-width: 1000px }}
+.single {{ max-width: 620px }} .maps {{ max-width: 900px }}
 tr.accepted td {{ background: #eef6fb }} td:last-child, th:last-child {{ padding-right: 0 }}
 summary {{ cursor: pointer; color: #0059a3; margin: 1em 0 }}
 pre {{ white-space: pre-wrap; overflow-wrap: anywhere }}

@@ -97,7 +97,10 @@ class Gap:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the report draws: conditions and observations of the measurement, and of one twin before and after."""
+    """What the report draws: conditions and observations of the measurement, and of one twin before and after.
+
+    again: another twin of the model before, with another seed: what chance alone makes differ.
+    """
 
     conditions: tuple[Shown, ...]
     measured: tuple[Observation, ...]
@@ -106,6 +109,7 @@ class Evidence:
     measured_base: BaseFit
     before_base: BaseFit
     after_base: BaseFit | None
+    again: tuple[Observation, ...] | None = None
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def evidence(effect: str | None, *, named: bool = True) -> Evidence:
     shown = conditions()
     streams = [recorded(effect, 0), recorded(None, 1), recorded(effect, 2) if named and effect else None]
     bases = [measured_base(list(s), list(shown)) if s else None for s in streams]
-    return Evidence(shown, *streams, *bases)  # type: ignore[arg-type]
+    return Evidence(shown, *streams, *bases, again=recorded(None, 3))  # type: ignore[arg-type]
 
 
 def statistics(loud: dict[str, float]) -> tuple[Statistic, ...]:
@@ -165,7 +165,7 @@ def class_() -> Diagnosis:
     members = ["photo_response_nonlinearity", "ir_drop"]
     return replace(
         base, verdict="class", effects=(),
-        sentence="Your camera has photo_response_nonlinearity or ir_drop: these recordings cannot tell which; either "
+        sentence="Your camera has a nonlinear response or an IR drop: these recordings cannot tell which; either "
         "removes 96 % of the gap.",
         class_={"members": members, "experiment": "Cover every second row and repeat the flat at level 0.6: IR drop "
                 "halves, a nonlinearity stays."},
