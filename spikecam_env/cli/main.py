@@ -13,6 +13,7 @@ from spikecam_env.cli.bench import Bench
 from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
+from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.train import Train
@@ -34,6 +35,7 @@ COMMANDS: dict[str, Any] = {
     "train": Train,
     "evaluate": Evaluate,
     "calibrate": Calibrate,
+    "diagnose": Diagnose,
     "bench": Bench,
 }
 

@@ -2,16 +2,17 @@
 
 An exhibit is one way to look at recordings (rates, noise, spectrum ...), with a few panels: a measured curve, one twin
 of the model before and one after, and `sd`, the standard error of measured less before.  It comes from the scatter of
-that difference over pixels or columns, which the fixed pattern, the same on both sides, drops out of.  Shares of intervals
-and coincidences have no such scatter, and regular spikes are far less random than independent ones: their sd is that of
-independent spikes, scaled by what two twins of the same model differ by, where there are two.
+that difference over pixels or columns, which the fixed pattern, the same on both sides, drops out of.
+
+Shares of intervals and coincidences have no such scatter, and regular spikes are far less random than independent
+ones: their sd is that of independent spikes, scaled by what two twins of one model differ by, where there are two.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from spikecam_env.gap.result import Evidence, Statistic
 from spikecam_env.gap.world import STATIC, Shown
 from spikecam_env.sensor import Keyframes
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 LOUD = 4.0
 """|z| from which an exhibit is shown among the evidence."""
@@ -293,7 +294,7 @@ def _jitter(observations: Sequence[Observation | None]):  # type: ignore[no-unty
 
 
 def spectrum_panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
-    """Power of the population's spike count over frequency: the lit recording that is furthest off, and the dark one."""
+    """Power of the population's spike count over frequency: of the lit recording furthest off, and of the dark one."""
     for kind in (("flat", "picture", "unknown"), ("dark",)):
         panels = []
         for t in takes(evidence, kind):
@@ -386,8 +387,9 @@ def edges_of(light: Keyframes, frames: int) -> list[tuple[int, int]]:
     level = np.interp(np.arange(frames) + 0.5, light.frame, light.radiance.mean(axis=(1, 2)))
     jump = level[2:] - level[:-2]
     large = np.flatnonzero(np.abs(jump) > max(np.ptp(level) / 3, 1e-12))
-    first = [int(f) for i, f in enumerate(large) if i == 0 or f - large[i - 1] > _EDGE_BIN]
-    return [(f + 1, int(np.sign(jump[f]))) for f in first]
+    groups = np.split(large, np.flatnonzero(np.diff(large) > _EDGE_BIN) + 1) if large.size else []
+    peaks = [int(g[np.argmax(np.abs(jump[g]))]) for g in groups]
+    return [(f + 1, int(np.sign(jump[f]))) for f in peaks]
 
 
 def around(observation: Observation, edges: Sequence[int]) -> tuple[Array, Array]:
@@ -397,7 +399,7 @@ def around(observation: Observation, edges: Sequence[int]) -> tuple[Array, Array
     seen = np.zeros((bins.size, 1))
     for edge in edges:
         for i, first in enumerate(edge + bins):
-            if 0 <= first and first + _EDGE_BIN <= observation.frames:
+            if first >= 0 and first + _EDGE_BIN <= observation.frames:
                 total[i] += observation.column[first : first + _EDGE_BIN].sum(axis=0)
                 seen[i] += 1
     known = seen[:, 0] > 0
@@ -523,7 +525,10 @@ def pattern_maps(evidence: Evidence) -> Iterator[Maps]:
     if shape is None:
         return
     bases = (evidence.measured_base, evidence.before_base, evidence.after_base)
-    for what, title in (("gain", "Response [thresholds a frame at radiance 1]"), ("dark", "Dark level [thresholds a frame]")):
+    for what, title in (
+        ("gain", "Response [thresholds a frame at radiance 1]"),
+        ("dark", "Dark level [thresholds a frame]"),
+    ):
         measured, before, after = (None if b is None else np.asarray(getattr(b, what)).reshape(shape) for b in bases)
         assert measured is not None and before is not None
         yield Maps(title, measured, before, after)

@@ -7,21 +7,21 @@ colours of Okabe and Ito, told apart by form as well.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib as mpl
 import matplotlib.ticker
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from spikecam_env.gap.evidence import Panel
+from spikecam_env.gap.evidence import Array, Panel
 from spikecam_env.gap.result import Gap, Statistic
 
 MEASURED, BEFORE, AFTER, BAND, FLOOR = "#000000", "#D55E00", "#0072B2", "#D9D9D9", "#8C8C8C"
 
 _WIDTH, _HEIGHT = 4.8, 3.3
-_FONTS = {"font.size": 10, "axes.titlesize": 10.5, "axes.spines.top": False, "axes.spines.right": False,
+_FONTS: Any = {"font.size": 10, "axes.titlesize": 10.5, "axes.spines.top": False, "axes.spines.right": False,
           "font.family": "DejaVu Sans", "axes.titlelocation": "left"}  # fmt: skip
 _MANY = 40
 """Points from which measured is drawn as a thin line."""
@@ -41,10 +41,10 @@ def panel(p: Panel) -> Figure:
         return figure
 
 
-def _plot(height: float, names: Sequence[str] = ()) -> tuple[Figure, Axes]:
+def _plot(height: float, names: Sequence[str] = (), top: float = 0.32) -> tuple[Figure, Axes]:
     """A figure with one axis; margins in inches, wide enough for names on the left.  (A layout engine draws twice.)"""
     left = max(0.78, 0.25 + 0.087 * max(map(len, names), default=0))
-    bottom, top, right = 0.52, 0.32, 0.12
+    bottom, right = 0.52, 0.12
     figure = Figure((_WIDTH, height))
     box = (left / _WIDTH, bottom / height, 1 - (left + right) / _WIDTH, 1 - (bottom + top) / height)
     return figure, figure.add_axes(box)
@@ -55,10 +55,7 @@ def _height(names: int) -> float:
 
 
 def _over_x(axis: Axes, p: Panel) -> None:
-    low, high = p.before - 2 * p.sd, p.before + 2 * p.sd
-    if "y" in p.log:
-        share = 2 * p.sd / p.before
-        low, high = p.before * np.exp(-share), p.before * np.exp(share)
+    low, high = _band(p)
     many = p.x.size > _MANY
     axis.fill_between(p.x, low, high, color=BAND, lw=0, zorder=0)
     axis.plot(p.x, p.before, color=BEFORE, ls=(0, (5, 2)), lw=1.4, marker=None if many else "s", ms=4, zorder=2)
@@ -79,6 +76,13 @@ def _over_x(axis: Axes, p: Panel) -> None:
         axis.xaxis.set_major_locator(mpl.ticker.MaxNLocator(8, integer=True))
 
 
+def _band(p: Panel) -> tuple[Array, Array]:
+    """Two standard errors around before; of its logarithm where y is logarithmic."""
+    if "y" in p.log:
+        return p.before * np.exp(-2 * p.sd / p.before), p.before * np.exp(2 * p.sd / p.before)
+    return p.before - 2 * p.sd, p.before + 2 * p.sd
+
+
 def _by_name(axis: Axes, p: Panel) -> None:
     """Names down the left, values across."""
     y = -p.x
@@ -93,7 +97,7 @@ def _by_name(axis: Axes, p: Panel) -> None:
     axis.grid(axis="y", color="0.93", zorder=-1)
 
 
-def pixel_map(values: NDArray[np.float64], title: str, limits: tuple[float, float]) -> Figure:
+def pixel_map(values: Array, title: str, limits: tuple[float, float]) -> Figure:
     """Every pixel (H, W) in colour, between limits."""
     with mpl.rc_context(_FONTS):
         figure = Figure((3.4, 2.9))
@@ -105,7 +109,7 @@ def pixel_map(values: NDArray[np.float64], title: str, limits: tuple[float, floa
         return figure
 
 
-def map_limits(values: NDArray[np.float64]) -> tuple[float, float]:
+def map_limits(values: Array) -> tuple[float, float]:
     """Colour limits: all but half a per cent of the pixels at either end."""
     low, high = np.quantile(values[np.isfinite(values)], [0.005, 0.995])
     return float(low), float(max(high, low + 1e-12))
@@ -113,15 +117,15 @@ def map_limits(values: NDArray[np.float64]) -> tuple[float, float]:
 
 def strip(statistics: Sequence[Statistic]) -> Figure:
     """z of every statistic by group, before and after; loudest group on top."""
+    patched = any(s.after != s.before for s in statistics)
     groups = sorted({s.group for s in statistics}, key=lambda g: max(abs(s.z) for s in statistics if s.group == g))
     with mpl.rc_context(_FONTS):
-        figure, axis = _plot(1.1 + 0.36 * len(groups), groups)
+        figure, axis = _plot(0.8 + 0.36 * len(groups), groups, top=0.08)
         axis.axvspan(-3, 3, color=BAND, lw=0, zorder=0)
         for y, group in enumerate(groups):
             mine = [s for s in statistics if s.group == group]
-            for values, up, colour, mark in (
-                ([s.z for s in mine], 0.18, BEFORE, "s"), ([s.z_after for s in mine], -0.18, AFTER, "^"),
-            ):  # fmt: skip
+            rows = [([s.z for s in mine], 0.18, BEFORE, "s"), ([s.z_after for s in mine], -0.18, AFTER, "^")]
+            for values, up, colour, mark in rows if patched else rows[:1]:
                 axis.plot(values, np.full(len(values), y + up), ls="", marker=mark, ms=4.5, color=colour, alpha=0.6)
         largest = max((abs(z) for s in statistics for z in (s.z, s.z_after) if np.isfinite(z)), default=1.0)
         axis.set_xscale("symlog", linthresh=5)
@@ -142,7 +146,7 @@ def gap_bars(gap: Gap) -> Figure:
     names.append("all held out")
     y = -np.arange(len(rows), dtype=np.float64)
     with mpl.rc_context(_FONTS):
-        figure, axis = _plot(0.9 + 0.5 * len(rows), names)
+        figure, axis = _plot(0.7 + 0.5 * len(rows), names, top=0.08)
         values = [v for row in rows for v in row.values() if np.isfinite(v) and v > 0]
         left = 0.5 * min(values, default=1.0)
         patched = gap.after != gap.before

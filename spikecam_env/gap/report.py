@@ -17,9 +17,19 @@ import numpy as np
 from spikecam_env.gap import plots
 from spikecam_env.gap.evidence import LOUD, Exhibit, Maps, by_loudness, exhibits
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, NamedEffect
-from spikecam_env.gap.words import CONFIDENCE, VERDICTS, bare, gap_line, human, law, meaning_of, quantity, sheet
-from spikecam_env.gap.words import sizes as sizes_of
-from spikecam_env.gap.words import unit_of
+from spikecam_env.gap.words import (
+    CONFIDENCE,
+    VERDICTS,
+    bare,
+    gap_line,
+    human,
+    law,
+    meaning_of,
+    quantity,
+    sheet,
+    sizes,
+    unit_of,
+)
 from spikecam_env.page import captioned, element, page, picture, table
 from spikecam_env.version import __version__
 from spikecam_env.whole import write_text_whole
@@ -232,7 +242,8 @@ def _value(value: Any) -> str:
 
 def _number(value: Any) -> str:
     if isinstance(value, (float, np.floating)):
-        return f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", "\u202f")
+        number = float(value)
+        return f"{number:.4g}" if abs(number) < 1e4 else f"{number:,.0f}".replace(",", "\u202f")
     return "–" if value is None else str(value)
 
 
@@ -270,14 +281,12 @@ def _evidence(d: Diagnosis) -> Iterator[str]:
     loud, quiet = by_loudness(exhibits(d.evidence, d.patched.frame_rate_hz), d.statistics)
     yield _legend(after=d.evidence.after is not None)
     if not loud:
-        yield element(
-            "p", f"Nowhere do measured and model differ by {LOUD:g} standard deviations. What was looked at:"
-        )
+        yield element("p", f"Nowhere do measured and model differ by {LOUD:g} standard deviations. What was looked at:")
         loud, quiet = quiet[:3], quiet[3:]
     for exhibit in loud:
         yield from _exhibit(exhibit, d)
     if quiet:
-        also = "Also looked at, with no difference: " + ", ".join(e.title.lower() for e in quiet)
+        also = f"Also looked at, largest |z| below {LOUD:g}: " + ", ".join(e.title.lower() for e in quiet)
         yield f"<details>{element('summary', also)}"
         for exhibit in quiet:
             yield from _exhibit(exhibit, d)
@@ -330,7 +339,9 @@ def _bank(d: Diagnosis) -> Iterator[str]:
         f"{len(d.statistics)} statistics were compared, {len(found)} of them differ from the model as given (p < 0.05 "
         "after correction for their number). z: measured less model, in standard deviations of one campaign.",
     )
-    caption = "Every statistic by group. Orange squares: model before; blue triangles: after. Grey: within 3."
+    patched = any(s.after != s.before for s in d.statistics)
+    caption = "Every statistic by group. Orange squares: model before; "
+    caption += ("blue triangles: after. " if patched else "") + "Grey: within 3."
     yield f'<div class="single">{captioned(picture(plots.strip(d.statistics), "z by group"), caption)}</div>'
     rows = [
         (s.name, ", ".join(s.recordings), _number(s.measured), _number(s.before), _number(s.after), _signed(s.z),
@@ -357,12 +368,18 @@ def _candidates(d: Diagnosis) -> Iterator[str]:
         "noise; 1 is a perfect model. The gate simulates the fitted model anew and looks at its worst group.",
     )
     rows = [
-        (human(r.name), f"{r.misfit_before:.2f}", f"{r.misfit:.2f}", sizes_of(r.parameters, r.name),
+        (human(r.name), f"{r.misfit_before:.2f}", f"{r.misfit:.2f}", sizes(r.parameters, r.name),
          ("accepted: " if r.accepted else "rejected: ") + r.reason)
         for r in d.ranking
     ]  # fmt: skip
     classes = ["accepted" if r.accepted else "" for r in d.ranking]
-    yield table(("candidate", "misfit before", "misfit", "best fit", "outcome"), rows, numbers=(1, 2), classes=classes, stack=True)
+    yield table(
+        ("candidate", "misfit before", "misfit", "best fit", "outcome"),
+        rows,
+        numbers=(1, 2),
+        classes=classes,
+        stack=True,
+    )
 
 
 def _bounds(d: Diagnosis) -> Iterator[str]:
@@ -390,7 +407,8 @@ def _list(lines: Sequence[str]) -> str:
 
 
 def _model(d: Diagnosis) -> Iterator[str]:
-    yield element("p", "model.toml beside this page; it loads wherever a model is asked for.")
+    added = "The model as it was given" if d.verdict in ("none", "data") else "The model with what was found"
+    yield element("p", f"{added}: model.toml beside this page. It loads wherever a model is asked for.")
     yield element("pre", d.patched.toml().strip())
 
 
@@ -425,7 +443,7 @@ _SECTIONS: tuple[tuple[str, str, Callable[[Diagnosis], Iterator[str]]], ...] = (
     ("bounds", "Upper bounds", _bounds),
     ("not-testable", "What could not be tested", _untested),
     ("audit", "Notes on the data", _audit),
-    ("model", "The patched model", _model),
+    ("model", "The model", _model),
     ("reproduce", "How to reproduce this page", _reproduce),
 )
 
@@ -449,7 +467,7 @@ nav {{ font-size: .9em; color: #777; margin: 1em 0 }} a {{ color: #0059a3 }}
           align-items: start }}
 .maps {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 165px), 1fr)); gap: .5em }}
 .plots img, .maps img, .single img {{ width: 100%; height: auto; display: block }}
-.single {{ max-width: 620px }} .maps {{ max-width: 900px }}
+.single {{ max-width: 540px }} .maps {{ max-width: 900px }}
 tr.accepted td {{ background: #eef6fb }} td:last-child, th:last-child {{ padding-right: 0 }}
 summary {{ cursor: pointer; color: #0059a3; margin: 1em 0 }}
 pre {{ white-space: pre-wrap; overflow-wrap: anywhere }}

@@ -89,11 +89,12 @@ def law(effect: str) -> str:
 
 def gap_line(gap: Gap) -> str:
     """What a model's patch did to the gap."""
-    before = f"On recordings kept out of the fit, statistics are {gap.before:.3g} off the model (mean square, in noise); "
-    before += f"two halves of the measurement differ by {gap.floor:.3g}."
+    off = f"statistics are {gap.before:.3g} off the model (mean square, in noise)"
+    said = f"On recordings kept out of the fit, {off}; two halves of the measurement differ by {gap.floor:.3g}."
     if not math.isfinite(gap.removed) or gap.before <= 1.2 * gap.floor:
-        return before
-    return f"{before} With the patched model it is {gap.after:.3g}: {100 * gap.removed:.0f} % of the gap is removed."
+        return said
+    removed = f"{100 * gap.removed:.0f} % of the gap is removed"
+    return f"{said} With the patched model they are {gap.after:.3g} off: {removed}."
 
 
 def sizes(parameters: dict[str, Estimate], effect: str) -> str:

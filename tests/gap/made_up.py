@@ -150,7 +150,8 @@ def named(effect: str = "photodiode_lag") -> Diagnosis:
 def none() -> Diagnosis:
     """Nothing found, with bounds."""
     bounds = (Bound("dead_time", "tau_us", "us", 0.04), Bound("photodiode_lag", "fraction", "relative", 0.002),
-              Bound("light_flicker", "modulation", "relative", 0.0007), Bound("crosstalk", "kick", "relative", 0.0011))  # fmt: skip
+              Bound("light_flicker", "modulation", "relative", 0.0007),
+              Bound("crosstalk", "kick", "thresholds", 0.0011))  # fmt: skip
     return _plain(
         "none", "No gap: these recordings and the model scsim agree to within the noise.", bounds=bounds,
         gap=Gap(1.04, 1.04, 1.0, 0.0, {"flat-200": {"before": 1.02, "after": 1.02, "floor": 1.0},
@@ -191,7 +192,7 @@ def unknown() -> Diagnosis:
 def parameter() -> Diagnosis:
     """An effect that is present is off."""
     return _plain(
-        "parameter", "No effect is missing, but shot noise is off: 31 000 quanta fit, the model has 50 000.",
+        "parameter", "No effect is missing, but shot noise is off: 31000 quanta fit, the model has 50000.",
         parameters={"shot_noise.quanta": {"model": 50000.0, "value": 31000.0, "sd": 800.0}},
         gap=gap(9.0, 1.2), statistics=statistics({"noise": 17.0}), evidence=evidence("dead_time"),
     )  # fmt: skip
