@@ -38,8 +38,8 @@ class Observation:
     """One recording in numbers; P pixels row-major, F frames, shape (H, W).
 
     times: ends, counts and A_k of each pixel.  variance, covariance: (P,) of intervals, and of successive ones, about
-    the pixel's own mean [frames^2]; NaN below 3 intervals.  short, long: (P,) intervals more than 1.5 frames off the
-    mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.  blocks: (BLOCKS, P) counts.
+    the pixel's own mean [frames^2]; NaN below 3 intervals.  short, long: (P,) intervals T below 0.6 T - 1 or
+    above 1.5 T + 1 of the mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.  blocks: (BLOCKS, P) counts.
     frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (LAGS, 2) spikes of one pixel with its neighbour's,
     lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
     """
@@ -136,8 +136,8 @@ def _intervals(bits, moments, blocks, lengths):  # type: ignore[no-untyped-def]
                 d = t[i + 1] - t[i] - mean
                 square += d * d
                 product += d * before if i else 0.0
-                short += d < -1.5
-                long += d > 1.5
+                short += d < -0.4 * mean - 1.0
+                long += d > 0.5 * mean + 1.0
                 before = d
             p = 8 * column + bit
             moments[p, 0] = square / (n - 1)

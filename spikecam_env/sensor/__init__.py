@@ -6,7 +6,7 @@ from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
 from spikecam_env.sensor.light import Keyframes
 from spikecam_env.sensor.model import SensorModel
 from spikecam_env.sensor.sensor import SensorState, SpikeSensor
-from spikecam_env.sensor.unit import Circuit
+from spikecam_env.sensor.unit import Circuit, Unit
 
 if TYPE_CHECKING:
     from spikecam_env.sensor.batch import SensorBatchState, SpikeSensorBatch
@@ -22,6 +22,7 @@ __all__ = [
     "SpikeSensor",
     "SpikeSensorBatch",
     "Stage",
+    "Unit",
 ]
 
 

@@ -10,15 +10,14 @@ it in thresholds, a power of two away, so that to go there and back changes no b
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects import Effect
-from spikecam_env.sensor.effects.base import Exposure
+from spikecam_env.sensor import drive
+from spikecam_env.sensor.effects.base import Effect, Exposure, having
 from spikecam_env.sensor.light import GRAINS, Segment, ramp
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
@@ -37,17 +36,19 @@ class ReferenceState:
     threshold: Array
     rng: np.random.Generator
     frame: int
-    memory: dict[str, Any]
+    memory: drive.Memory
 
 
-def start(first: Exposure, effects: Sequence[Effect], phase: Array, seed: int) -> ReferenceState:
+def start(
+    first: Exposure, effects: Sequence[Effect], phase: Array, seed: int, unit_seed: int | None = None
+) -> ReferenceState:
     """Pixels part-way through a cycle: phase (P,) in [0, 1) is the share of the nominal threshold collected.
 
-    Each effect has a generator of its own: adding or removing one leaves the draws of the others as they were.
+    seed: of the temporal noise.  unit_seed: of what effects draw once a unit, where it is another.
     """
     rng = generator(seed, "temporal")
     threshold = draw_threshold(first.unit.kappa, rng)
-    memory = {e.name: e.begin(first, generator(seed, f"{e.name}: temporal")) for e in effects}
+    memory = drive.begin(first, effects, seed, unit_seed)
     return ReferenceState(np.floor(phase * GRAINS), threshold, rng, first.number, memory)
 
 
@@ -67,47 +68,21 @@ def run(first: Exposure, effects: Sequence[Effect], state: ReferenceState, segme
 
 def step(now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array) -> NDArray[np.bool_]:
     """One frame: `mean` (P,) is its expected charge [grains]; returns which pixels report a spike (P,)."""
-    mean, dark = expected_charge(now, effects, state, mean)
-    state.charge += collect(now.unit, mean, dark, state.rng)
-    fired = fire(now, effects, state, mean, comparator_offset(now, effects, state))
+    light, dark = drive.expected_charge(now, effects, state.memory, mean / GRAINS)
+    dark_grains = np.maximum(dark.values[0], 0.0).reshape(-1) * GRAINS
+    mean = np.maximum(light.values[0], 0.0).reshape(-1) * GRAINS + dark_grains
+    state.charge += collect(now.unit, mean, dark_grains, state.rng)
+    fired = fire(now, effects, state, mean, references(now, effects, state)).reshape(now.shape)
     for effect in having("spiked", effects):
         charge, rate = thresholds(state.charge, now), thresholds(mean, now)
         charge, state.memory[effect.name] = effect.spiked(charge, fired, rate, now, state.memory[effect.name])
         state.charge = charge.reshape(-1) * GRAINS
-    for effect in having("read_out", effects):
-        fired, state.memory[effect.name] = effect.read_out(fired, now, state.memory[effect.name])
-    return fired.reshape(-1)
+    return drive.read_out(now, effects, state.memory, fired[None]).reshape(-1)
 
 
 def thresholds(grains: Array, now: Exposure) -> Array:
     """Charge (P,) [grains] as effects see it: (H, W) [thresholds]."""
     return (grains / GRAINS).reshape(now.shape)
-
-
-def having(hook: str, effects: Sequence[Effect]) -> Iterator[Effect]:
-    """The effects with a hook of their own of that name."""
-    return (effect for effect in effects if effect.overrides(hook))
-
-
-def expected_charge(
-    now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array
-) -> tuple[Array, Array]:
-    """Charge (P,) expected in a frame and the dark part of it [grains], given that of the light law.
-
-    The dark part matters, and is worked out, where an effect wants it or where dark charge is free of noise.
-    """
-    acting = list(having("collect", effects))
-    if not acting and now.unit.dark_is_noisy:
-        return mean, np.zeros(1)
-    dark = np.minimum(np.floor(now.unit.dark * GRAINS), mean)
-    if not acting:
-        return mean, dark
-    light_part, dark_part = thresholds(mean - dark, now), thresholds(dark, now)
-    for effect in acting:
-        memory = state.memory[effect.name]
-        light_part, dark_part, state.memory[effect.name] = effect.collect(light_part, dark_part, now, memory)
-    dark = np.maximum(dark_part, 0.0).reshape(-1) * GRAINS
-    return np.maximum(light_part, 0.0).reshape(-1) * GRAINS + dark, dark
 
 
 def collect(unit: Unit, mean: Array, dark: Array, rng: np.random.Generator) -> Array:
@@ -119,33 +94,46 @@ def collect(unit: Unit, mean: Array, dark: Array, rng: np.random.Generator) -> A
     return electrons * (GRAINS / unit.electrons) + certain
 
 
-def comparator_offset(now: Exposure, effects: Sequence[Effect], state: ReferenceState) -> Array | None:
-    """What this frame adds to the thresholds that the comparators compare with (P,) [grains]; None for nothing."""
-    threshold = state.threshold
-    for effect in having("compare", effects):
-        memory = state.memory[effect.name]
-        changed, state.memory[effect.name] = effect.compare(thresholds(threshold, now), now, memory)
-        threshold = changed.reshape(-1) * GRAINS
-    return None if threshold is state.threshold else threshold - state.threshold
+def references(now: Exposure, effects: Sequence[Effect], state: ReferenceState) -> Callable[[Array], Array]:
+    """What the comparators compare with in this frame, as a function of the thresholds (P,) [grains]."""
+    moving, reacting = having("compare", effects), having("react", effects)
+    if not moving and not reacting:
+        return lambda threshold: threshold
+    law = drive.comparators(now, moving, state.memory)
+    factor, common = (np.broadcast_to(rows.T, now.shape).reshape(-1) for rows in (law.factor, law.common))
+    offset = law.grains_per_mV * (common + law.field[0])
+
+    def compared_with(threshold: Array) -> Array:
+        limit = thresholds(threshold * factor + offset, now)
+        for effect in reacting:
+            limit = effect.react(limit, now, state.memory[effect.name])
+        return limit.reshape(-1) * GRAINS
+
+    return compared_with
 
 
 def fire(
-    now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array, offset: Array | None
+    now: Exposure,
+    effects: Sequence[Effect],
+    state: ReferenceState,
+    mean: Array,
+    compared_with: Callable[[Array], Array],
 ) -> NDArray[np.bool_]:
-    """Reset every pixel that is at its threshold until none is; returns which fired (H, W)."""
+    """Reset every pixel that is at its threshold until none is; returns which fired (P,)."""
     fired = np.zeros(mean.size, dtype=np.bool_)
-    acting = list(having("after_reset", effects))
-    crossed = np.flatnonzero(state.charge >= (state.threshold if offset is None else state.threshold + offset))
+    acting = having("after_reset", effects)
+    limit = compared_with(state.threshold)
+    crossed = np.flatnonzero(state.charge >= limit)
     while crossed.size:
         fired[crossed] = True
-        shift = 0.0 if offset is None else offset[crossed]
-        residual = (state.charge[crossed] - (state.threshold[crossed] + shift)) / GRAINS
+        residual = (state.charge[crossed] - limit[crossed]) / GRAINS
         for effect in acting:
             residual = effect.after_reset(residual, mean[crossed] / GRAINS, now)
         state.charge[crossed] = residual * GRAINS
         state.threshold[crossed] = draw_threshold(now.unit.kappa[crossed], state.rng)
-        crossed = crossed[residual * GRAINS >= state.threshold[crossed] + shift]
-    return fired.reshape(now.shape)
+        limit = compared_with(state.threshold)
+        crossed = crossed[state.charge[crossed] >= limit[crossed]]
+    return fired
 
 
 def draw_threshold(kappa: Array, rng: np.random.Generator) -> Array:

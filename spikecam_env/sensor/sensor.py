@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import operator
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Effect, Exposure
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.kernels import block, fast
 from spikecam_env.sensor.light import Keyframes, Segment, as_light, segments
 from spikecam_env.sensor.model import SensorModel, generator
+from spikecam_env.sensor.unit import Unit
 
 ENGINES = ("auto", "cuda", "fast", "reference")
 
@@ -45,12 +46,15 @@ class SpikeSensor:
     model: what kind of camera; a SensorModel, a preset's name or a TOML path.
     seed: which unit of it (fixed pattern), its starting phase and its temporal noise; same seed, same bits,
         for any cutting of the stream into steps and any number of threads.
-    engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification, every effect), "cuda"
-        (a GPU, bits of fast; for many cameras at once see SpikeSensorBatch), or "auto" (fast where it carries every
-        effect of the model, else reference).
+    engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification), "cuda" (a GPU, bits of
+        fast, no effects from frame to frame; for many cameras at once see SpikeSensorBatch), or "auto" (fast where it
+        carries every effect of the model, else reference).
     take: another recording by the same unit: other starting phase, other temporal noise.
+    unit: a camera's own firing law, as measured, in place of one drawn from the model.  The model's fixed patterns and
+        noise strengths are then not used; its optics and what its effects do from frame to frame are.
     Raises InputError for an unknown engine, a shape that is not two positive whole numbers, a negative seed, for
-    engine="fast" or "cuda" with an effect that it does not carry, and for engine="cuda" without a CUDA device.
+    engine="fast" or "cuda" with an effect that it does not carry, for engine="cuda" without a CUDA device, and for a
+    unit of another number of pixels or with values that are no firing law.
 
     >>> sensor = SpikeSensor(SensorModel.preset("ideal"), shape=(2, 2), seed=0)
     >>> sensor.step(np.full((2, 2), 0.25, np.float32), frames=8).sum(axis=0).tolist()
@@ -64,17 +68,19 @@ class SpikeSensor:
         seed: int = 0,
         engine: str = "fast",
         take: int = 0,
+        unit: Unit | None = None,
     ) -> None:
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
         self.shape = checked_shape(shape)
-        self.engine = _chosen_engine(engine, self.model)
+        self.engine = _chosen_engine(engine, self.model, unit)
         self.take = checked_seed(take, "take")
+        self._given = None if unit is None else (checked_unit(unit, self.shape), checked_seed(seed))
         self._optics = tuple(e for e in self.model.effects if e.overrides("image"))
         self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
         self._start(checked_seed(seed), phase=None)
 
     def reset(self, seed: int | None = None) -> None:
-        """Back to frame 0; with a seed, as another unit."""
+        """Back to frame 0; with a seed, as another unit, or as another recording of the unit that was given."""
         self._start(self.seed if seed is None else checked_seed(seed), phase=None)
 
     def step(self, radiance: Keyframes | ArrayLike, frames: int = 1) -> NDArray[np.uint8]:
@@ -115,7 +121,7 @@ class SpikeSensor:
 
     def clean_twin(self) -> SpikeSensor:
         """A noise-free camera at frame 0 with this one's initial phase: on the same scene it gives the clean stream."""
-        twin = SpikeSensor(self.model.noise_free(), self.shape, self.seed, engine=self.engine, take=self.take)
+        twin = SpikeSensor(self.model.noise_free(), self.shape, self.seed, self.engine, self.take)
         twin._start(self.seed, phase=self.phase)
         return twin
 
@@ -124,21 +130,25 @@ class SpikeSensor:
     def _start(self, seed: int, phase: NDArray[np.float64] | None) -> None:
         self.seed = seed
         self.frame = 0
-        self.unit = self.model.draw_unit(self.shape, seed)
+        self.unit, unit_seed = self._given or (self.model.draw_unit(self.shape, seed), seed)
         noise_seed = seed if self.take == 0 else int(generator(seed, f"take {self.take}").integers(1 << 62))
         self.phase = generator(noise_seed, "phase").random(self.shape) if phase is None else phase
         flat = self.phase.reshape(-1)
-        if self.engine == "fast":
+        if self.engine == "fast" and not self._frame_effects:
             self._pixels = fast.start(self.unit, flat, noise_seed)
+        elif self.engine == "fast":
+            self._pixels = block.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
         elif self.engine == "cuda":
             cuda = _cuda()
             self._pixels = cuda.start([self.unit], [flat], [noise_seed], cuda.checked_device("cuda"))
         else:
-            self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed)
+            self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
 
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
-        if self.engine == "fast":
+        if self.engine == "fast" and not self._frame_effects:
             fast.run(self._pixels, segment, out)
+        elif self.engine == "fast":
+            block.run(self._first_exposure(), self._frame_effects, self._pixels, segment, out)
         elif self.engine == "cuda":
             cuda = _cuda()
             batch = cuda.BatchSegment.of([segment], self._pixels.device)
@@ -193,10 +203,35 @@ def checked_seed(seed: Any, name: str = "seed") -> int:
     return number
 
 
-def _chosen_engine(engine: str, model: SensorModel) -> str:
+def checked_unit(unit: Any, shape: tuple[int, int]) -> Unit:
+    """Raises InputError unless `unit` is a firing law of rows * columns pixels."""
+    if not isinstance(unit, Unit):
+        raise InputError(f"unit = {type(unit).__name__}; it must be a Unit (spikecam_env.sensor.Unit)")
+    arrays = {field.name: getattr(unit, field.name) for field in fields(Unit) if field.name not in ("shot", "dark_is_noisy")}
+    for name, values in arrays.items():
+        if np.shape(values) != (shape[0] * shape[1],):
+            raise InputError(
+                f"unit.{name} is {np.shape(values)}, the sensor is {shape}; it must be one number a pixel, "
+                f"({shape[0] * shape[1]},)"
+            )
+        least = 0.0 if name in ("gain", "dark", "kappa") else np.finfo(np.float64).tiny
+        bad = np.flatnonzero(~((values >= least) & (values < np.inf)))
+        if bad.size:
+            raise InputError(
+                f"unit.{name} is {values[bad[0]]:g} at pixel {bad[0]}; it must be finite and "
+                f"{'0 or more' if least == 0.0 else 'above 0'}"
+            )
+    return unit
+
+
+def _chosen_engine(engine: str, model: SensorModel, unit: Unit | None) -> str:
     if engine not in ENGINES:
         raise unknown_name("engine", engine, ENGINES)
-    missing = fast.missing(model.effects)
+    if unit is None:
+        missing = fast.missing(model.effects) if engine == "cuda" else block.missing(model.effects)
+    else:
+        acting = [e for e in model.effects if not e.is_fixed()]
+        missing = (fast.missing(acting) if engine == "cuda" else block.missing(acting)) + block.missing_of(unit)
     if engine == "auto":
         return "reference" if missing else "fast"
     if engine in ("cuda", "fast") and missing:

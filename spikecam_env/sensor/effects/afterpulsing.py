@@ -19,9 +19,9 @@ from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, pa
 
 
 class Pending(NamedTuple):
-    """due: (H, W) which pixels report again, next frame first.  rng: what draws them."""
+    """due: what is still to report again, as frame * pixels + pixel (n,), in order.  rng: what draws them."""
 
-    due: tuple[NDArray[np.bool_], ...]
+    due: NDArray[np.int64]
     rng: np.random.Generator
 
 
@@ -33,11 +33,16 @@ class Afterpulsing(Effect):
     stage = Stage.READOUT
     strength = "probability"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> Pending:
-        return Pending((np.zeros(first.shape, dtype=np.bool_),) * int(self.delay_frames), rng)
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Pending:
+        return Pending(np.zeros(0, dtype=np.int64), rng)
 
     def read_out(self, spikes: Spikes, now: Exposure, memory: Pending) -> tuple[Spikes, Pending]:
+        pixels = now.shape[0] * now.shape[1]
+        start = now.number * pixels
         at = np.flatnonzero(spikes)
-        again = np.zeros(now.shape, dtype=np.bool_)
-        again.flat[at] = memory.rng.random(at.size) < self.probability
-        return spikes | memory.due[0], Pending((*memory.due[1:], again), memory.rng)
+        again = at[memory.rng.random(at.size) < self.probability] + (start + int(self.delay_frames) * pixels)
+        due = np.concatenate([memory.due, again])
+        now_due = np.searchsorted(due, start + spikes.size)
+        reported = spikes.copy()
+        reported.flat[due[:now_due] - start] = True
+        return reported, Pending(due[now_due:], memory.rng)

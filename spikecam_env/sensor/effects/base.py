@@ -5,20 +5,32 @@ Once a camera:
 
     imprint      the fixed pattern, on the array in circuit units
     image        what optics do to a picture: linear, and the same at all times
+
+once a recording:
+
     begin        what the effect remembers from frame to frame; by default a random generator of its own
 
-and then every frame, in this order; of one hook, by stage (optics, photodiode, integration, threshold, reset, read-out)
-and, within a stage, by name:
+for a block of frames, whatever fires in it; arrays have a leading axis of time:
 
-    collect      charge of the frame, from light and in the dark, before shot noise
-    compare      what the comparator compares with
-    after_reset  charge left on the pixels that fired
-    spiked       charge of all pixels, when it is known which fired
+    collect      charge expected, from light and in the dark, before shot noise
+    compare      how the comparators' reference moves
     read_out     bits reported
 
-Frame hooks are functions of their arguments: they change no array in place, and return the memory for the next frame.
+and frame by frame, for what depends on the spikes:
+
+    react        thresholds of a frame, given what fired before it
+    after_reset  charge left on the pixels that fired
+    spiked       charge of all pixels, when it is known which fired
+    feedback     the same three in numbers that the compiled kernel reads
+
+Of one hook the effects act by stage (optics, photodiode, integration, threshold, reset, read-out) and, within a stage,
+by name.  Hooks are functions of their arguments: they change no array in place, and return the memory for what follows.
+How a recording is cut into blocks must change no bit: draw frame by frame, arrays of (F, ...) in the order of time.
 Every strength has a neutral value at which each hook returns exactly what it was given, so that no bit changes.
-An effect with `imprint` and `image` alone costs nothing a frame and is carried by every engine.
+
+The reference calls every hook, a block of one frame at a time.  The fast engine calls those for blocks and takes the
+rest from `feedback`; an effect that reacts to spikes and does not declare it, it refuses by name.  An effect with
+`imprint` and `image` alone costs nothing a frame.
 """
 
 from __future__ import annotations
@@ -26,8 +38,9 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+from collections.abc import Sequence
 from enum import IntEnum
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,28 +65,77 @@ class Stage(IntEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Exposure:
-    """One frame of one camera: what a hook may know.
+    """A block of frames of one camera: what a hook may know.
 
-    number: absolute, from 0.  shape: (rows, columns).  unit: the firing law of every pixel.
+    number: of its first frame, absolute, from 0.  shape: (rows, columns).  unit: the firing law of every pixel.
+    frames: how many, F; one for the hooks that act frame by frame.
     """
 
     number: int
     frame_rate_hz: float
     shape: tuple[int, int]
     unit: Unit
+    frames: int = 1
 
     @property
-    def middle_s(self) -> float:
-        """Time of the middle of the frame [s]."""
-        return (self.number + 0.5) / self.frame_rate_hz
-
-    def share_of_swing(self, voltage_mV: float) -> Array:
-        """A voltage at the comparator as a share of each pixel's swing (H, W), that is, as charge in thresholds."""
-        return (1e-3 * voltage_mV / self.unit.swing_V).reshape(self.shape)
+    def middle_s(self) -> Array:
+        """Time of the middle of each frame (F, 1, 1) [s]."""
+        return ((self.number + np.arange(self.frames) + 0.5) / self.frame_rate_hz)[:, None, None]
 
     def charge_of(self, current_pA: float) -> Array:
         """Charge (H, W) that a current brings in a frame [thresholds]."""
         return (current_pA * 1e3 / self.frame_rate_hz / self.unit.threshold_fC).reshape(self.shape)
+
+
+@dataclasses.dataclass(frozen=True)
+class Charge:
+    """Charge expected of every pixel in every frame of a block [thresholds]: pixels * factor, below zero as zero.
+
+    pixels: (F, H, W), or (1, H, W) where all frames are alike.  factor: (F, 1, 1), (F, H, 1) or a number.
+    Two parts, so that what is common to all pixels costs a number a frame and not a picture.
+    """
+
+    pixels: Array
+    factor: Array | float = 1.0
+
+    def scaled(self, factor: Array | float) -> Charge:
+        """This, times a number a frame or a row."""
+        return Charge(self.pixels, self.factor * factor)
+
+    @property
+    def values(self) -> Array:
+        """Multiplied out: (F, H, W), or (1, H, W) where all frames are alike."""
+        return self.pixels if isinstance(self.factor, float) else self.pixels * self.factor
+
+
+@dataclasses.dataclass(frozen=True)
+class Shift:
+    """How the comparators' reference moves: a pixel fires at its threshold * factor + millivolts over its swing.
+
+    factor: (F, H, 1), with 1 for F or H where all are alike.  millivolts: (F, H, W), with 1 for F, H or W; a field
+    that differs from pixel to pixel is taken in single precision.  Either may be a number.  Several effects' factors multiply, millivolts add.
+    """
+
+    factor: Array | float = 1.0
+    millivolts: Array | float = 0.0
+
+
+class Feedback(NamedTuple):
+    """What spikes do to the pixels, in numbers; charge in thresholds, time in frames.
+
+    On a reset, x being the charge of the frame:  residual <- (residual - lost_per_root_rate sqrt(x) - lost_per_rate x) kept.
+    At the end of the frame every pixel gets `kick` for each of its four neighbours that fired, and one that fired keeps
+    left (1 - exp(-T/left_tau)), T the interval that has ended.  Thresholds of a row are (1 + droop a) times higher, a the
+    share of it that fired in the frame before.
+    """
+
+    lost_per_root_rate: float = 0.0
+    lost_per_rate: float = 0.0
+    kept: float = 1.0
+    kick: float = 0.0
+    left: float = 0.0
+    left_tau: float = 1.0
+    droop: float = 0.0
 
 
 def parameter(default: Any, *, unit: str, bounds: tuple[float, float] | None = None, doc: str) -> Any:
@@ -83,7 +145,7 @@ def parameter(default: Any, *, unit: str, bounds: tuple[float, float] | None = N
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """Base of all effects; every hook here does nothing.  Arrays are (H, W); charge is in thresholds of each pixel.
+    """Base of all effects; every hook here does nothing.  Charge is in thresholds of each pixel.
 
     strength: the parameter that says how strong the effect is.  neutral: its value at which no bit changes.
     """
@@ -127,6 +189,11 @@ class Effect:
         """Whether this effect does nothing from frame to frame, so that every engine carries it."""
         return not any(cls.overrides(hook) for hook in FRAME_HOOKS)
 
+    @classmethod
+    def is_compiled(cls) -> bool:
+        """Whether the fast engine carries this effect: it does not depend on spikes, or declares how."""
+        return cls.overrides("feedback") or not any(cls.overrides(hook) for hook in SPIKE_HOOKS)
+
     def parameters(self) -> dict[str, Any]:
         """Parameter values by name."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
@@ -139,41 +206,60 @@ class Effect:
         """The picture (H, W) that reaches the pixels; linear in `radiance`."""
         return radiance
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> Any:
-        """What the effect remembers at frame 0; picklable.  `rng` is this effect's alone."""
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Any:
+        """What the effect remembers at frame 0; picklable.
+
+        pattern: for what belongs to the unit, the same in all its recordings.  rng: for this recording.  Both are this
+        effect's alone.
+        """
         return rng
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
-        """Charge expected in this frame from light (at most two thresholds) and in the dark, and the memory."""
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+        """Charge expected in these frames from light (at most two thresholds) and in the dark, and the memory."""
         return light, dark, memory
 
-    def compare(self, threshold: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
-        """What the comparator compares the charge with in this frame, and the memory."""
-        return threshold, memory
+    def compare(self, now: Exposure, memory: Any) -> tuple[Shift, Any]:
+        """How the comparators' reference moves in these frames, and the memory."""
+        return Shift(), memory
+
+    def read_out(self, spikes: Spikes, now: Exposure, memory: Any) -> tuple[Spikes, Any]:
+        """The bits reported (F, H, W), and the memory."""
+        return spikes, memory
+
+    def react(self, threshold: Array, now: Exposure, memory: Any) -> Array:
+        """What the comparators compare with in this frame (H, W), given what the effect remembers of spikes."""
+        return threshold
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
         """Charge left on the pixels that fired (n,), given what is over their threshold and their charge a frame."""
         return residual
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
-        """Charge at the end of the frame, given who fired in it and the charge a frame, and the memory."""
+        """Charge at the end of the frame (H, W), given who fired in it and the charge a frame, and the memory."""
         return charge, memory
 
-    def read_out(self, spikes: Spikes, now: Exposure, memory: Any) -> tuple[Spikes, Any]:
-        """The bits reported, and the memory."""
-        return spikes, memory
+    def feedback(self, first: Exposure) -> Feedback:
+        """What `react`, `after_reset` and `spiked` do."""
+        return Feedback()
 
 
-FRAME_HOOKS = ("begin", "collect", "compare", "after_reset", "spiked", "read_out")
+BLOCK_HOOKS = ("collect", "compare", "read_out")
+SPIKE_HOOKS = ("react", "after_reset", "spiked")
+FRAME_HOOKS = ("begin", *BLOCK_HOOKS, *SPIKE_HOOKS)
+
+
+def having(hook: str, effects: Sequence[Effect]) -> list[Effect]:
+    """The effects with a hook of their own of that name."""
+    return [effect for effect in effects if effect.overrides(hook)]
 
 
 def neighbour_sum(values: Array) -> Array:
-    """Sum over each pixel's four neighbours (H, W); beyond the edge there is nothing."""
+    """Sum over each pixel's four neighbours (..., H, W); beyond the edge there is nothing."""
     total = np.zeros_like(values)
-    total[1:] += values[:-1]
-    total[:-1] += values[1:]
-    total[:, 1:] += values[:, :-1]
-    total[:, :-1] += values[:, 1:]
+    total[..., 1:, :] += values[..., :-1, :]
+    total[..., :-1, :] += values[..., 1:, :]
+    total[..., :, 1:] += values[..., :, :-1]
+    total[..., :, :-1] += values[..., :, 1:]
     return total
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, neighbour_sum, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, neighbour_sum, parameter
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Blooming(Effect):
     stage = Stage.PHOTODIODE
     strength = "share"
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
-        spill = self.share * np.maximum(light - self.full, 0.0)
-        return light - spill + neighbour_sum(spill) / 4.0, dark, memory
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+        x = light.values
+        spill = self.share * np.maximum(x - self.full, 0.0)
+        return Charge(x - spill + neighbour_sum(spill) / 4.0), dark, memory

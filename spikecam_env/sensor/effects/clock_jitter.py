@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
 
 
 class Edge(NamedTuple):
@@ -31,10 +31,10 @@ class ClockJitter(Effect):
     stage = Stage.READOUT
     strength = "sigma_ns"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> Edge:
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:
         return Edge(rng.standard_normal(), rng)
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Edge) -> tuple[Array, Array, Edge]:
-        end = memory.rng.standard_normal()
-        length = 1.0 + (end - memory.at) * (self.sigma_ns * 1e-9 * now.frame_rate_hz)
-        return light * length, dark * length, Edge(end, memory.rng)
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Edge) -> tuple[Charge, Charge, Edge]:
+        edges = np.concatenate([[memory.at], memory.rng.standard_normal(now.frames)])
+        length = (1.0 + np.diff(edges) * (self.sigma_ns * 1e-9 * now.frame_rate_hz))[:, None, None]
+        return light.scaled(length), dark.scaled(length), Edge(edges[-1], memory.rng)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,5 @@ class CommonThresholdNoise(Effect):
     stage = Stage.THRESHOLD
     strength = "sigma_mV"
 
-    def compare(
-        self, threshold: Array, now: Exposure, memory: np.random.Generator
-    ) -> tuple[Array, np.random.Generator]:
-        return threshold + now.share_of_swing(self.sigma_mV) * memory.standard_normal(), memory
+    def compare(self, now: Exposure, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:
+        return Shift(millivolts=self.sigma_mV * memory.standard_normal((now.frames, 1, 1))), memory

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -24,4 +24,11 @@ class ComparatorDelay(Effect):
     strength = "delay_us"
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
-        return residual - np.sqrt(rate) * (self.delay_us * 1e-6 * now.frame_rate_hz)
+        return residual - np.sqrt(rate) * self.delay(now)
+
+    def feedback(self, first: Exposure) -> Feedback:
+        return Feedback(lost_per_root_rate=self.delay(first))
+
+    def delay(self, now: Exposure) -> float:
+        """The delay c [frames]."""
+        return self.delay_us * 1e-6 * now.frame_rate_hz

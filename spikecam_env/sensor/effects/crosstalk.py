@@ -14,7 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Spikes, Stage, neighbour_sum, parameter
+from spikecam_env.sensor.effects.base import (
+    Array,
+    Effect,
+    Exposure,
+    Feedback,
+    Spikes,
+    Stage,
+    neighbour_sum,
+    parameter,
+)
 
 
 @dataclass(frozen=True)
@@ -26,3 +35,6 @@ class Crosstalk(Effect):
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
         return charge + self.kick * neighbour_sum(spikes.astype(np.float64)), memory
+
+    def feedback(self, first: Exposure) -> Feedback:
+        return Feedback(kick=self.kick)

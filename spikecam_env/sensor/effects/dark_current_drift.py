@@ -9,11 +9,12 @@ Source: dark current doubles every 6 to 8 K (Janesick, Photon Transfer); the exp
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -24,5 +25,5 @@ class DarkCurrentDrift(Effect):
     stage = Stage.PHOTODIODE
     strength = "rise"
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
-        return light, dark * (1.0 - self.rise * math.expm1(-1e3 * now.middle_s / self.tau_ms)), memory
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+        return light, dark.scaled(1.0 - self.rise * np.expm1(-1e3 * now.middle_s / self.tau_ms)), memory

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -22,4 +22,11 @@ class DeadTime(Effect):
     strength = "tau_us"
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
-        return residual - rate * (self.tau_us * 1e-6 * now.frame_rate_hz)
+        return residual - rate * self.tau(now)
+
+    def feedback(self, first: Exposure) -> Feedback:
+        return Feedback(lost_per_rate=self.tau(first))
+
+    def tau(self, now: Exposure) -> float:
+        """The dead time [frames]."""
+        return self.tau_us * 1e-6 * now.frame_rate_hz

@@ -10,11 +10,11 @@ Source: SCSim's public script (6.36 mV), kept for comparison with it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.kernels.field import Words, white_field, words
 
 
 @dataclass(frozen=True)
@@ -24,5 +24,8 @@ class FrameThresholdNoise(Effect):
     stage = Stage.THRESHOLD
     strength = "sigma_mV"
 
-    def compare(self, threshold: Array, now: Exposure, memory: np.random.Generator) -> tuple[Array, Any]:
-        return threshold + now.share_of_swing(self.sigma_mV) * memory.standard_normal(now.shape), memory
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Words:
+        return words(rng)
+
+    def compare(self, now: Exposure, memory: Words) -> tuple[Shift, Words]:
+        return Shift(millivolts=self.sigma_mV * white_field(memory, now.number, now.frames, now.shape)), memory

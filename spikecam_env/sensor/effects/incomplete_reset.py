@@ -10,11 +10,12 @@ Source: image lag of a soft reset (Pain et al. 1999, sub-threshold reset); expon
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -25,15 +26,26 @@ class IncompleteReset(Effect):
     stage = Stage.RESET
     strength = "fraction"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> Array:
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Array:
         return np.full(first.shape, -np.inf)
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Array) -> tuple[Array, Array]:
         at = np.flatnonzero(spikes)
         over = np.clip(charge.flat[at] / np.maximum(rate.flat[at], 1e-12), 0.0, 1.0)
         crossing, last = now.number + 1.0 - over, memory.copy()
-        tau = self.tau_us * 1e-6 * now.frame_rate_hz
         left = charge.copy()
-        left.flat[at] -= self.fraction * np.expm1(-(crossing - memory.flat[at]) / tau)
+        left.flat[at] -= self.fraction * _expm1(-(crossing - memory.flat[at]) / self.tau(now))
         last.flat[at] = crossing
         return left, last
+
+    def feedback(self, first: Exposure) -> Feedback:
+        return Feedback(left=self.fraction, left_tau=self.tau(first))
+
+    def tau(self, now: Exposure) -> float:
+        """Time constant of filling [frames]."""
+        return self.tau_us * 1e-6 * now.frame_rate_hz
+
+
+def _expm1(x: Array) -> Array:
+    """exp(x) - 1 by the C library, as the compiled kernel has it; numpy's own differs in the last bit."""
+    return np.array([math.expm1(value) for value in x])

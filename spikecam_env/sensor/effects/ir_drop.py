@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,14 @@ class IrDrop(Effect):
     stage = Stage.THRESHOLD
     strength = "droop"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> Array:
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Array:
         return np.zeros((first.shape[0], 1))
 
-    def compare(self, threshold: Array, now: Exposure, memory: Array) -> tuple[Array, Array]:
-        return threshold * (1.0 + self.droop * memory), memory
+    def react(self, threshold: Array, now: Exposure, memory: Array) -> Array:
+        return threshold * (1.0 + self.droop * memory)
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Array) -> tuple[Array, Array]:
         return charge, spikes.mean(axis=1, keepdims=True)
+
+    def feedback(self, first: Exposure) -> Feedback:
+        return Feedback(droop=self.droop)

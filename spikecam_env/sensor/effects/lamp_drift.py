@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
 
 
 class Walk(NamedTuple):
@@ -34,10 +34,10 @@ class LampDrift(Effect):
     stage = Stage.OPTICS
     strength = "sigma_per_root_s"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> Walk:
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:
         return Walk(0.0, rng)
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Walk) -> tuple[Array, Array, Walk]:
-        step = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz) * memory.rng.standard_normal()
-        at = memory.at + step
-        return light * max(1.0 + at, 0.0), dark, Walk(at, memory.rng)
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Walk) -> tuple[Charge, Charge, Walk]:
+        steps = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz) * memory.rng.standard_normal(now.frames)
+        path = np.cumsum(np.concatenate([[memory.at], steps]))
+        return light.scaled(np.maximum(1.0 + path[1:, None, None], 0.0)), dark, Walk(path[-1], memory.rng)

@@ -9,11 +9,12 @@ Source: lamps on 50 Hz mains swing at 100 Hz, by per cents (LED) to tens of them
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,6 @@ class LightFlicker(Effect):
     stage = Stage.OPTICS
     strength = "modulation"
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
-        wave = math.sin(2.0 * math.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))
-        return light * (1.0 + self.modulation * wave), dark, memory
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+        wave = np.sin(2.0 * np.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))
+        return light.scaled(1.0 + self.modulation * wave), dark, memory

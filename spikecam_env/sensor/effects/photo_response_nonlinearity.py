@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -22,5 +22,6 @@ class PhotoResponseNonlinearity(Effect):
     stage = Stage.PHOTODIODE
     strength = "beta"
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
-        return light * (1.0 - self.beta * light), dark, memory
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+        x = light.values
+        return Charge(x * (1.0 - self.beta * x)), dark, memory

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,21 @@ class PhotodiodeLag(Effect):
     stage = Stage.PHOTODIODE
     strength = "fraction"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> None:
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None
 
     def collect(
-        self, light: Array, dark: Array, now: Exposure, memory: Array | None
-    ) -> tuple[Array, Array, Array | None]:
+        self, light: Charge, dark: Charge, now: Exposure, memory: Array | None
+    ) -> tuple[Charge, Charge, Array | None]:
+        x = light.values
+        slow = x[0] if memory is None else memory
+        if len(x) == 1 and np.array_equal(slow, x[0]):
+            return light, dark, slow
         tau = self.tau_us * 1e-6 * now.frame_rate_hz
-        slow = light if memory is None else memory
         kept = math.exp(-1.0 / tau)
-        late = light + (slow - light) * (tau * (1.0 - kept))
-        return (1.0 - self.fraction) * light + self.fraction * late, dark, light + (slow - light) * kept
+        late = np.empty((now.frames, *now.shape))
+        for frame, level in zip(late, np.broadcast_to(x, late.shape), strict=True):
+            behind = slow - level
+            frame[:] = level + behind * (self.fraction * tau * (1.0 - kept))
+            slow = level + behind * kept
+        return Charge(late), dark, slow

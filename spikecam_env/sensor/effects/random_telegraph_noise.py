@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
 
 
 class Traps(NamedTuple):
@@ -42,14 +42,16 @@ class RandomTelegraphNoise(Effect):
     stage = Stage.PHOTODIODE
     strength = "amplitude_pA"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> Traps:
-        pixels = np.flatnonzero(rng.random(first.shape) < self.fraction)
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Traps:
+        pixels = np.flatnonzero(pattern.random(first.shape) < self.fraction)
         charge = first.charge_of(self.amplitude_pA).reshape(-1)[pixels]
         return Traps(pixels, rng.random(pixels.size) < 0.5, charge, rng)
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Traps) -> tuple[Array, Array, Traps]:
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Traps) -> tuple[Charge, Charge, Traps]:
         leaves = -math.expm1(-2e3 / (self.dwell_ms * now.frame_rate_hz)) / 2.0
-        upper = memory.upper ^ (memory.rng.random(memory.upper.size) < leaves)
-        raised = dark.reshape(-1).copy()
-        raised[memory.pixels] += memory.charge * upper
-        return light, raised.reshape(dark.shape), memory._replace(upper=upper)
+        switches = memory.rng.random((now.frames, memory.upper.size)) < leaves
+        upper = np.logical_xor.accumulate(np.concatenate([memory.upper[None], switches]))[1:]
+        raised = np.empty((now.frames, *now.shape))
+        raised[:] = dark.values
+        raised.reshape(now.frames, -1)[:, memory.pixels] += memory.charge * upper
+        return light, Charge(raised), memory._replace(upper=upper[-1].copy())

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,18 @@ class ReadoutSkew(Effect):
     stage = Stage.READOUT
     strength = "span"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> None:
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None
 
     def collect(
-        self, light: Array, dark: Array, now: Exposure, memory: Array | None
-    ) -> tuple[Array, Array, Array | None]:
+        self, light: Charge, dark: Charge, now: Exposure, memory: Array | None
+    ) -> tuple[Charge, Charge, Array | None]:
+        x = light.values
+        first = x[0] if memory is None else memory
+        if len(x) == 1 and np.array_equal(first, x[0]):
+            return light, dark, first
+        x = np.broadcast_to(x, (now.frames, *now.shape))
         rows = now.shape[0]
         early = self.span * (1.0 - np.arange(rows)[:, None] / max(rows - 1, 1))
-        before = light if memory is None else memory
-        return (1.0 - early) * light + early * before, dark, light
+        before = np.concatenate([first[None], x[:-1]])
+        return Charge(x + early * (before - x)), dark, x[-1].copy()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,5 @@ class RowTemporalNoise(Effect):
     stage = Stage.THRESHOLD
     strength = "sigma_mV"
 
-    def compare(
-        self, threshold: Array, now: Exposure, memory: np.random.Generator
-    ) -> tuple[Array, np.random.Generator]:
-        rows = memory.standard_normal((now.shape[0], 1))
-        return threshold + now.share_of_swing(self.sigma_mV) * rows, memory
+    def compare(self, now: Exposure, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:
+        return Shift(millivolts=self.sigma_mV * memory.standard_normal((now.frames, now.shape[0], 1))), memory

@@ -10,10 +10,22 @@ Source: bit errors of the link or a metastable latch; independent by assumption.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, parameter
+
+_AT_ONCE = 256
+"""Gaps drawn at a time; part of the law of which draw goes where, not to be changed by the block's length."""
+
+
+class Strikes(NamedTuple):
+    """at: the next bits struck, as frame * pixels + pixel (n,), in order, at least one.  rng: what draws the gaps."""
+
+    at: NDArray[np.int64]
+    rng: np.random.Generator
 
 
 @dataclass(frozen=True)
@@ -23,7 +35,22 @@ class SpuriousSpikes(Effect):
     stage = Stage.READOUT
     strength = "probability"
 
-    def read_out(
-        self, spikes: Spikes, now: Exposure, memory: np.random.Generator
-    ) -> tuple[Spikes, np.random.Generator]:
-        return spikes | (memory.random(now.shape) < self.probability), memory
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Strikes:
+        return Strikes(np.array([-1]), rng)
+
+    def read_out(self, spikes: Spikes, now: Exposure, memory: Strikes) -> tuple[Spikes, Strikes]:
+        if self.probability == 0.0:
+            return spikes, memory
+        start = now.number * (spikes.size // now.frames)
+        at = self.struck_until(start + spikes.size, memory)
+        due = at[(at >= start) & (at < start + spikes.size)]
+        reported = spikes.copy()
+        reported.flat[due - start] = True
+        return reported, Strikes(at[at >= start + spikes.size], memory.rng)
+
+    def struck_until(self, end: int, memory: Strikes) -> NDArray[np.int64]:
+        """Bits struck, up to one at or after `end`: the gaps between them are geometric."""
+        runs = [memory.at]
+        while runs[-1][-1] < end:
+            runs.append(runs[-1][-1] + np.cumsum(memory.rng.geometric(self.probability, _AT_ONCE)))
+        return np.concatenate(runs)

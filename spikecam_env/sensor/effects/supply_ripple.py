@@ -9,11 +9,12 @@ Source: rectified mains ripples at 100 or 120 Hz, converters from 100 kHz; 0.1 %
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,6 @@ class SupplyRipple(Effect):
     stage = Stage.THRESHOLD
     strength = "ripple"
 
-    def compare(self, threshold: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
-        wave = math.sin(2.0 * math.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))
-        return threshold * (1.0 + self.ripple * wave), memory
+    def compare(self, now: Exposure, memory: Any) -> tuple[Shift, Any]:
+        wave = np.sin(2.0 * np.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))
+        return Shift(factor=1.0 + self.ripple * wave), memory

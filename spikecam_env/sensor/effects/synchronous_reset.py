@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -24,3 +24,6 @@ class SynchronousReset(Effect):
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
         return residual * (1.0 - self.fraction)
+
+    def feedback(self, first: Exposure) -> Feedback:
+        return Feedback(kept=1.0 - self.fraction)

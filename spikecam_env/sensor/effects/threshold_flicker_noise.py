@@ -10,20 +10,21 @@ Source: 1/f noise of MOS transistors as a sum of Lorentzians (McWhorter 1957); o
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.kernels.field import Words, octave_field, words
 
 
 class Octaves(NamedTuple):
-    """value: one (H, W) array of unit variance an octave, fastest first.  rng: what drives them."""
+    """value: (octaves, H, W) of unit variance, fastest first.  words: what drives each of them."""
 
-    value: tuple[Array, ...]
-    rng: np.random.Generator
+    value: NDArray[np.float32]
+    words: tuple[Words, ...]
 
 
 @dataclass(frozen=True)
@@ -36,19 +37,13 @@ class ThresholdFlickerNoise(Effect):
     stage = Stage.THRESHOLD
     strength = "sigma_mV"
 
-    def begin(self, first: Exposure, rng: np.random.Generator) -> Octaves:
-        return Octaves(tuple(rng.standard_normal(first.shape) for _ in range(int(self.octaves))), rng)
+    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Octaves:
+        shape = (int(self.octaves), *first.shape)
+        return Octaves(rng.standard_normal(shape, dtype=np.float32), tuple(words(rng) for _ in range(shape[0])))
 
-    def compare(self, threshold: Array, now: Exposure, memory: Octaves) -> tuple[Array, Octaves]:
-        octaves = tuple(advanced(j, o, now.number, memory.rng) for j, o in enumerate(memory.value))
-        return threshold + now.share_of_swing(self.sigma_mV) * sum(octaves), Octaves(octaves, memory.rng)
-
-
-def advanced(octave: int, value: Array, frame: int, rng: np.random.Generator) -> Array:
-    """An octave's value in this frame; it moves every eighth of its correlation time, no oftener than every frame."""
-    tau = 2 ** (octave + 1)
-    every = max(1, tau // 8)
-    if frame % every:
-        return value
-    kept = math.exp(-every / tau)
-    return kept * value + math.sqrt(1.0 - kept * kept) * rng.standard_normal(value.shape)
+    def compare(self, now: Exposure, memory: Octaves) -> tuple[Shift, Octaves]:
+        """An octave moves every eighth of its correlation time, no oftener than every frame."""
+        tau = 2.0 ** (1 + np.arange(len(memory.words)))
+        every = np.maximum(1, tau // 8)
+        total, value = octave_field(memory.words, memory.value, every, np.exp(-every / tau), now.number, now.frames)
+        return Shift(millivolts=self.sigma_mV * total), Octaves(value, memory.words)

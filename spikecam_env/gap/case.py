@@ -1,0 +1,76 @@
+"""One measurement under diagnosis: what was shown and seen, and how to simulate the same campaign under a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from spikecam_env.gap.observe import Observation
+from spikecam_env.gap.refit import BaseFit, measured_base, within
+from spikecam_env.gap.statistics import Key, bank, pattern_bank
+from spikecam_env.gap.statistics.moving import Film, films
+from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.world import Shown
+from spikecam_env.sensor import SensorModel
+
+
+@dataclass(frozen=True)
+class Case:
+    """conditions, observations: of the measurement.  base: its free refit.  bank: its statistics."""
+
+    shape: tuple[int, int]
+    conditions: tuple[Shown, ...]
+    observations: tuple[Observation, ...]
+    films: Mapping[str, Film]
+    base: BaseFit
+    bank: dict[Key, float]
+    seed: int
+    jobs: int = 1
+
+
+@dataclass(frozen=True)
+class Twin:
+    """One simulated campaign: its statistics and its own refit."""
+
+    bank: dict[Key, float]
+    base: BaseFit
+
+
+def case_of(
+    shape: tuple[int, int],
+    conditions: Sequence[Shown],
+    observations: Sequence[Observation],
+    seed: int = 0,
+    jobs: int = 1,
+) -> Case:
+    """Refit and statistics of a measurement."""
+    moving = films(conditions, shape)
+    base = measured_base(list(observations), list(conditions))
+    reading = Reading(observations, conditions, base, moving)
+    statistics = {**bank(reading), **pattern_bank(reading)}
+    return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs)
+
+
+def twins(case: Case, model: SensorModel, base: BaseFit, count: int, first: int = 0) -> list[Twin]:
+    """Campaigns of the unit `base` under `model`, numbers first .. first + count; one number is one set of draws."""
+    with ThreadPoolExecutor(case.jobs) as pool:
+        return list(pool.map(lambda n: _twin(case, model, base, case.seed * 1000 + 17 + n), range(first, first + count)))
+
+
+def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int) -> Twin:
+    observations = simulate(model, base, case.conditions, case.shape, seed)
+    own = measured_base(observations, list(case.conditions))
+    return Twin(bank(Reading(observations, case.conditions, own, case.films)), own)
+
+
+def settled(model: SensorModel, used: BaseFit, measured: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
+    """Indirect inference: shift the unit so that a twin's refit comes out as the measurement's does."""
+    gain = used.gain * measured.gain / np.maximum(np.mean([s.gain for s in simulated], axis=0), 1e-9)
+    dark = used.dark + measured.dark - np.mean([s.dark for s in simulated], axis=0)
+    ratio = measured.white / np.mean([s.white for s in simulated])
+    return within(model, replace(used, gain=np.where(measured.live, gain, used.gain), dark=np.maximum(dark, 0.0),
+                                 white=used.white * float(np.clip(ratio, 0.3, 3.0))))  # fmt: skip

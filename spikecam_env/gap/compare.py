@@ -1,0 +1,89 @@
+"""How far a measurement lies from what a model gives: every statistic in units of its own noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special, stats
+
+from spikecam_env.gap.statistics import Key, floor_of
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 0.05
+"""Share of an effect's own size by which its simulation may be off: laws are first order, and simulated with noise."""
+
+HEAVY = 8.0
+"""Degrees of freedom of the loss: statistics far off count by their logarithm."""
+
+
+@dataclass(frozen=True)
+class Null:
+    """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns.
+
+    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.
+    """
+
+    keys: tuple[Key, ...]
+    mean: Array
+    sd: Array
+    floor: Array
+    twins: int
+
+    @property
+    def noise(self) -> Array:
+        """(S,) standard deviation of measured less mean."""
+        return np.sqrt(self.sd**2 * (1.0 + 1.0 / self.twins) + self.floor**2)
+
+
+def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key]) -> Null:
+    """From simulated campaigns, for the statistics in `keys` that all of them have."""
+    there = tuple(k for k in keys if all(k in b for b in banks))
+    values = np.array([[b[k] for k in there] for b in banks])
+    floor = np.array([floor_of(k) for k in there])
+    sd = values.std(axis=0, ddof=1)
+    return Null(there, values.mean(axis=0), _shrunk(sd, len(banks) - 1), floor, len(banks))
+
+
+def _shrunk(sd: Array, freedom: int, prior: float = 4.0) -> Array:
+    """A spread from few twins cannot be trusted to be tiny: as if `prior` more twins had the median relative spread."""
+    return np.sqrt((freedom * sd**2 + prior * np.maximum(sd, 1e-12) ** 2) / (freedom + prior))
+
+
+def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
+    """(S,) in the order of keys; NaN where the bank has none."""
+    return np.array([bank.get(k, np.nan) for k in keys])
+
+
+def deviates(null: Null, values: Array) -> Array:
+    """(S,) normal deviates: Student's t of few twins, made normal; 0 where unknown."""
+    t = np.nan_to_num((values - null.mean) / null.noise)
+    known = null.sd**2 * (1.0 + 1.0 / null.twins)
+    freedom = (null.twins - 1) * np.minimum((1.0 + null.floor**2 / np.maximum(known, 1e-300)) ** 2, 1e4)
+    log_p = stats.t.logsf(np.abs(t), freedom)
+    return np.sign(t) * -special.ndtri_exp(log_p)
+
+
+def adjusted(z: Array) -> Array:
+    """(S,) two-sided p-values, by Holm's step-down for as many statistics as there are."""
+    p = 2.0 * special.ndtr(-np.abs(z))
+    order = np.argsort(p)
+    stepped = np.maximum.accumulate(p[order] * (p.size - np.arange(p.size)))
+    out = np.empty_like(p)
+    out[order] = np.minimum(stepped, 1.0)
+    return out
+
+
+def residual(null: Null, measured: Array, predicted: Array, twins: int) -> Array:
+    """(S,) measured less predicted in noise; `predicted` is a mean over `twins`, good to TOLERANCE of its effect."""
+    effect = predicted - null.mean
+    noise = np.sqrt(null.sd**2 * (1.0 + 1.0 / twins) + null.floor**2 + (TOLERANCE * effect) ** 2)
+    return np.nan_to_num((measured - predicted) / noise)
+
+
+def misfit(rho: Array) -> float:
+    """Heavy-tailed sum of squares: of order S for noise alone."""
+    return float(np.sum((HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))

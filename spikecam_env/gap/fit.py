@@ -1,0 +1,224 @@
+"""Fitting one candidate: simulate the campaign with it, scale and shape it until its statistics are the measured ones.
+
+Statistics move in proportion to the strength (or its square), so each twin says by how much to scale the next; other
+parameters follow by Gauss-Newton.  The unit is refitted along the way, so that the candidate cannot borrow from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates import candidate, is_pattern
+from spikecam_env.gap.case import Case, settled, twins
+from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, residual, values_of
+from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.units import drawn_banks
+from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.sensor.effects.base import build
+
+Array = NDArray[np.float64]
+
+UNITS = 24
+"""Units drawn for the pattern statistics of one model."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A candidate at its best.  parameters, sd: by name.  predicted: (S,) mean over `count` twins; base: its unit.
+
+    rho: (S,) what it leaves, in noise.  misfit: their heavy-tailed sum.  direction: (S,) change with the strength.
+    """
+
+    name: str
+    parameters: dict[str, float]
+    sd: dict[str, float]
+    predicted: Array
+    count: int
+    base: BaseFit
+    rho: Array
+    misfit: float
+    model: SensorModel
+    correlated: dict[str, Array] = field(default_factory=dict)
+
+
+def predict(
+    case: Case, model: SensorModel, base: BaseFit, null: Null, count: int, first: int = 0, pattern: Array | None = None
+) -> tuple[Array, list[BaseFit]]:
+    """(S,) mean statistics of twins under a model, pattern statistics of its units, and the twins' refits.
+
+    pattern: (S,) values to take for pattern statistics instead of drawing units.
+    """
+    made = twins(case, model, base, count, first)
+    mean = np.nanmean([values_of(t.bank, null.keys) for t in made], axis=0)
+    mean = np.where(np.isnan(mean), null.mean, mean)
+    mean = with_pattern(case, model, null, mean) if pattern is None else np.where(is_of_pattern(null), pattern, mean)
+    return mean, [t.base for t in made]
+
+
+def is_of_pattern(null: Null) -> NDArray[np.bool_]:
+    return np.array([k.group == "pattern" for k in null.keys])
+
+
+def with_pattern(case: Case, model: SensorModel, null: Null, mean: Array) -> Array:
+    """`mean` with its pattern statistics replaced by those of units of the model."""
+    drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
+    pattern = np.nanmean([values_of(b, null.keys) for b in drawn], axis=0)
+    return np.where(np.isnan(pattern), mean, pattern)
+
+
+def fit(
+    case: Case,
+    model: SensorModel,
+    null: Null,
+    measured: Array,
+    name: str,
+    start: Mapping[str, float],
+    rounds: int = 3,
+) -> Fit:
+    """Best fit of one candidate added to `model`, whose own predictions are `null`."""
+    if is_pattern(name):
+        return _fit_pattern(case, model, null, measured, name, start)
+    return _fit_twins(case, model, null, measured, name, dict(start), rounds)
+
+
+def _with(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
+    return model.with_effect(build(CATALOGUE, name, dict(parameters)))
+
+
+def _bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
+    out = {}
+    for key, f in CATALOGUE[name].__dataclass_fields__.items():
+        if key not in parameters:
+            continue
+        low, high = f.metadata["bounds"] or (-np.inf, np.inf)
+        value = float(np.clip(parameters[key], low, high))
+        out[key] = round(value) if isinstance(f.default, int) and not isinstance(f.default, bool) else value
+    return out
+
+
+def scale_of(null: Null, measured: Array, effect: Array, twin_count: int) -> tuple[float, float]:
+    """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one."""
+    d = np.nan_to_num(measured - null.mean)
+    scale = 0.0
+    for _ in range(12):
+        noise2 = null.sd**2 * (1 + 1 / null.twins + 1 / twin_count) + null.floor**2 + (TOLERANCE * scale * effect) ** 2
+        rho2 = (d - scale * effect) ** 2 / noise2
+        w = (HEAVY + 1) / (HEAVY + rho2) / noise2
+        total = float(np.sum(w * effect**2))
+        if total <= 0:
+            return 0.0, np.inf
+        scale = float(np.sum(w * effect * d)) / total
+    return scale, float(1 / np.sqrt(total))
+
+
+def _fit_twins(
+    case: Case,
+    model: SensorModel,
+    null: Null,
+    measured: Array,
+    name: str,
+    parameters: dict[str, float],
+    rounds: int,
+) -> Fit:
+    what = candidate(name)
+    strength, *shape = what.fitted
+    power = 2.0 if what.square else 1.0
+    base = within(model, case.base)
+    parameters = _bounded(name, parameters)
+    best: Fit | None = None
+    for turn in range(rounds):
+        tried = _with(model, name, parameters)
+        predicted, refits = predict(case, tried, within(tried, base), null, 1, first=100, pattern=null.mean)
+        effect = predicted - null.mean
+        scale, sd = scale_of(null, measured, effect, 1)
+        relative = sd / max(abs(scale), 1e-9) / power
+        rho = residual(null, measured, predicted, 1)
+        now = Fit(name, dict(parameters), {strength: abs(parameters[strength]) * relative}, predicted, 1, base, rho,
+                  misfit(rho), tried)  # fmt: skip
+        best = now if best is None or now.misfit < best.misfit else best
+        if turn == rounds - 1:
+            break
+        base = settled(tried, within(tried, base), case.base, refits)
+        factor = float(np.sign(scale) * abs(scale) ** (1 / power)) if scale else 0.0
+        if factor <= 0 and not _may_be_negative(name):
+            factor = 0.3
+        factor = float(np.sign(factor) * np.clip(abs(factor), 1e-3, 1e3))
+        if shape and turn > 0:
+            step = _gauss_newton(case, model, null, measured, name, parameters, what.fitted, predicted, base)
+            parameters = _bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
+        else:
+            if abs(factor - 1.0) < 0.02:
+                break
+            parameters = _bounded(name, {**parameters, strength: parameters[strength] * factor})
+    assert best is not None
+    return best
+
+
+def _may_be_negative(name: str) -> bool:
+    strength = CATALOGUE[name].strength
+    bounds = CATALOGUE[name].__dataclass_fields__[strength].metadata["bounds"]
+    return bool(bounds and bounds[0] < 0)
+
+
+def _gauss_newton(
+    case: Case,
+    model: SensorModel,
+    null: Null,
+    measured: Array,
+    name: str,
+    parameters: dict[str, float],
+    fitted: tuple[str, ...],
+    predicted: Array,
+    base: BaseFit,
+) -> dict[str, float]:
+    """Factors to multiply the fitted parameters by: one damped step in their logarithms, differences of 30 %."""
+    columns = []
+    for key in fitted:
+        nudged = _with(model, name, _bounded(name, {**parameters, key: parameters[key] * 1.3}))
+        there, _ = predict(case, nudged, within(nudged, base), null, 1, first=100, pattern=null.mean)
+        columns.append((there - predicted) / np.log(1.3))
+    jacobian = np.stack(columns, axis=1)
+    noise2 = null.sd**2 * (2 + 1 / null.twins) + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2
+    gap = np.nan_to_num(measured - predicted)
+    w = (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
+    normal = jacobian.T @ (w[:, None] * jacobian)
+    normal += 0.02 * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(fitted))
+    step = np.clip(np.linalg.solve(normal, jacobian.T @ (w * gap)), -1.0, 1.0)
+    return {key: float(np.exp(s)) for key, s in zip(fitted, step, strict=True)}
+
+
+def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, count: int = 4) -> Fit:
+    """The fit simulated anew with other draws, its unit settled once more: for the gate."""
+    if is_pattern(found.name):
+        return found
+    _, refits = predict(case, found.model, within(found.model, found.base), null, 1, first=200, pattern=null.mean)
+    base = settled(found.model, within(found.model, found.base), case.base, refits)
+    predicted, _ = predict(case, found.model, base, null, count, first=300, pattern=null.mean)
+    rho = residual(null, measured, predicted, count)
+    return replace(found, predicted=predicted, count=count, base=base, rho=rho, misfit=misfit(rho))
+
+
+def _fit_pattern(
+    case: Case, model: SensorModel, null: Null, measured: Array, name: str, start: Mapping[str, float]
+) -> Fit:
+    """Coarse to fine search over the strength (and one more parameter), drawing units."""
+    what = candidate(name)
+    parameters = _bounded(name, start)
+    best: Fit | None = None
+    for factors in ((0.03, 0.1, 0.3, 1.0, 3.0), (0.55, 0.75, 1.35, 1.8), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05)):
+        for key in what.fitted:
+            centre = best.parameters if best else parameters
+            for factor in factors:
+                tried = _bounded(name, {**centre, key: centre[key] * factor})
+                there = _with(model, name, tried)
+                predicted = with_pattern(case, there, null, null.mean)
+                rho = residual(null, measured, predicted, UNITS)
+                now = Fit(name, tried, {}, predicted, UNITS, within(there, case.base), rho, misfit(rho), there)
+                best = now if best is None or now.misfit < best.misfit else best
+    assert best is not None
+    return best

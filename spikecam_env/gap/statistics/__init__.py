@@ -1,0 +1,79 @@
+"""The statistics bank: physics statistics in named groups, one file a group; each says which effects it reveals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.statistics import drift, intervals, moving, neighbours, noise, pattern, rates, rows, spectrum, step
+from spikecam_env.gap.statistics.reading import Reading
+
+GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
+    module.__name__.rsplit(".", 1)[1]: module.statistics
+    for module in (rates, noise, intervals, drift, spectrum, rows, neighbours, step, moving)
+}
+
+
+FLOORS: dict[tuple[str, str], float] = {
+    ("rates", ""): 1e-4,
+    ("rates", "scatter"): 0.05,
+    ("noise", "variance"): 1e-3,
+    ("noise", "lag-1"): 2e-3,
+    ("noise", "A_"): 0.01,
+    ("noise", "tail"): 0.02,
+    ("drift", ""): 2e-5,
+    ("drift", "wander"): 0.2,
+    ("drift", "pixel"): 0.02,
+    ("spectrum", ""): 0.1,
+    ("rows", ""): 0.02,
+    ("neighbours", ""): 2e-3,
+    ("step", ""): 2e-3,
+    ("moving", ""): 5e-4,
+    ("moving", "left"): 5e-3,
+    ("pattern", ""): 0.02,
+}
+"""How exactly labels and laws can be known at all, whatever the number of spikes, by group and start of the name:
+light labels to 1e-4, the first-order laws of noise to 1 %."""
+
+
+def floor_of(key: Key) -> float:
+    """The least noise of a statistic, in its own unit."""
+    fitting = [n for g, n in FLOORS if g == key.group and key.name.startswith(n)]
+    return FLOORS[key.group, max(fitting, key=len)] if fitting else 0.0
+
+
+class Key(NamedTuple):
+    """Which statistic: its group, the recording it is of, and its name in the group."""
+
+    group: str
+    recording: str
+    name: str
+
+
+def bank(reading: Reading) -> dict[Key, float]:
+    """Every statistic of a campaign."""
+    found = {}
+    for i, condition in enumerate(reading.conditions):
+        for group, statistics in GROUPS.items():
+            for name, value in statistics(reading, i).items():
+                found[Key(group, condition.name, name)] = value
+    return found
+
+
+def pattern_bank(reading: Reading) -> dict[Key, float]:
+    """The pattern statistics of a measurement's rate maps: of the dark recording and of every flat."""
+    found = {}
+    for condition, o in zip(reading.conditions, reading.observations, strict=True):
+        if condition.kind in ("dark", "flat"):
+            for name, value in pattern.statistics(o.rate.reshape(o.shape)).items():
+                found[Key("pattern", condition.name, name)] = value
+    return found
+
+
+def aligned(banks: list[dict[Key, float]]) -> tuple[list[Key], NDArray[np.float64]]:
+    """Statistics that every bank has, and their values (B, S)."""
+    keys = [k for k in banks[0] if all(k in b for b in banks[1:])]
+    return keys, np.array([[b[k] for k in keys] for b in banks])

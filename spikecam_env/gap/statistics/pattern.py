@@ -1,0 +1,53 @@
+"""The fixed pattern of a recording's rates: how wide, how lopsided, how smooth, along rows and columns.
+
+Reveals hot_pixels, dark_current_tail, dead_pixels, row_fixed_pattern, column_fixed_pattern, vignetting.
+Compared with fresh units drawn from the model, not with the twin, whose pattern is the measured one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.statistics.reading import log, root, slope
+
+Array = NDArray[np.float64]
+
+
+def statistics(rate: Array) -> dict[str, float]:
+    """Of a rate map (H, W).
+
+    width: log of the robust relative spread.  low / high tail: how much further the 0.5 % and 99.5 % quantiles lie
+    than those of a Gaussian, in spreads; top: the largest.  silent: pixels below a tenth of the median, counted.
+    rows, columns: log variance of their means over a pixel's.  bowl, across, down: radial slope and gradients.
+    near: correlation of neighbours.
+    """
+    flat = rate.reshape(-1)
+    middle = float(np.median(flat))
+    if middle <= 0:
+        return {}
+    relative = rate / middle - 1.0
+    low, lower, upper, high = np.quantile(relative, [0.005, 0.1587, 0.8413, 0.995])
+    width = max((upper - lower) / 2, 1e-9)
+    inside = np.clip(relative, -4 * width, 4 * width)
+    rows, columns = rate.shape
+    y, x = np.mgrid[:rows, :columns] - np.array([(rows - 1) / 2, (columns - 1) / 2])[:, None, None]
+    radius = (y**2 + x**2) / (y**2 + x**2).max()
+    smooth = inside - inside.mean()
+    variance = max(float(np.mean(smooth**2)), 1e-18)
+    across = (smooth[:, 1:] * smooth[:, :-1]).mean() / variance
+    down = (smooth[1:] * smooth[:-1]).mean() / variance
+    return {
+        "width": log(width),
+        "lopsided": float((upper + lower) / width),
+        "low tail": float(-low / width),
+        "high tail": log(max(high / width, 0.1)),
+        "top": log(max(float(relative.max()) / width, 0.1)),
+        "silent": root(float((flat < 0.1 * middle).sum())),
+        "rows": log(float(inside.mean(axis=1).var()) / variance * columns),
+        "columns": log(float(inside.mean(axis=0).var()) / variance * rows),
+        "bowl": slope(inside.reshape(-1), radius.reshape(-1)) / width,
+        "across": slope(inside.reshape(-1), x.reshape(-1)) * columns / width,
+        "down": slope(inside.reshape(-1), y.reshape(-1)) * rows / width,
+        "near": float((across + down) / 2),
+    }

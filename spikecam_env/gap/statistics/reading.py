@@ -1,0 +1,55 @@
+"""What a statistic may look at: a campaign's observations, its conditions, and its own base refit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.observe import Observation
+from spikecam_env.gap.refit import BaseFit
+from spikecam_env.gap.statistics.moving import Film
+from spikecam_env.gap.world import Shown
+
+Array = NDArray[np.float64]
+
+STILL = ("dark", "flat", "picture", "unknown")
+"""Kinds of recording with steady light."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One campaign, measured or simulated.  base: refitted from these observations and no others.
+
+    films: of moving light, by recording (`moving.films`).
+    """
+
+    observations: Sequence[Observation]
+    conditions: Sequence[Shown]
+    base: BaseFit
+    films: Mapping[str, Film]
+
+    def expected(self, i: int) -> Array:
+        """(P,) thresholds a frame of recording i, steady light, by the refit; its own rate where light is unknown."""
+        condition = self.conditions[i]
+        if condition.light is None:
+            return self.observations[i].rate
+        return self.base.gain * condition.picture + self.base.dark
+
+
+def root(count: float) -> float:
+    """A count on a scale where its Poisson spread is 1 (Anscombe 1948)."""
+    return 2.0 * float(np.sqrt(count + 0.375))
+
+
+def log(value: float, floor: float = 1e-12) -> float:
+    """Natural logarithm of a positive quantity; nothing counts as `floor`."""
+    return float(np.log(max(value, floor)))
+
+
+def slope(y: Array, x: Array) -> float:
+    """Least-squares slope of y on x, both about their means."""
+    x = x - x.mean()
+    return float((x @ (y - y.mean())) / max(x @ x, 1e-30))

@@ -1,0 +1,30 @@
+"""Noise that rows or columns have in common, in steady light.  Reveals row_temporal_noise, common_threshold_noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.statistics.reading import STILL, Reading, log
+
+
+def statistics(reading: Reading, i: int) -> dict[str, float]:
+    """row n, column n: log variance in time of a row's (column's) spikes in n frames less the array's share."""
+    if reading.conditions[i].kind not in STILL:
+        return {}
+    o = reading.observations[i]
+    if o.frame.sum() < 500:
+        return {}
+    found = {}
+    for name, lines in (("row", o.row), ("column", o.column)):
+        for n in (1, 16):
+            found[f"{name} {n}"] = log(_common(lines, n), 1e-9)
+    return found
+
+
+def _common(lines: NDArray[np.int32], frames: int) -> float:
+    whole = len(lines) // frames * frames
+    binned = lines[:whole].reshape(-1, frames, lines.shape[1]).sum(axis=1).astype(np.float64)
+    binned -= binned.mean(axis=0)
+    share = binned.mean(axis=1, keepdims=True)
+    return float(np.mean((binned - share) ** 2))

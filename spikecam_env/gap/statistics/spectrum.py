@@ -1,0 +1,51 @@
+"""Power spectrum of the array's spikes a frame in steady light: bands, and the strongest line.
+
+Reveals light_flicker (lines in the light), supply_ripple (in the dark too), common_threshold_noise and clock_jitter
+(white, differenced), lamp_drift (low bands).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.statistics.reading import STILL, Reading, log
+
+BANDS = 8
+
+
+def spectrum(frame: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Periodogram of spikes a frame, relative to their mean; bin n is n cycles in the recording."""
+    relative = frame / max(float(frame.mean()), 1e-9) - 1.0
+    power: NDArray[np.float64] = np.abs(np.fft.rfft(relative)) ** 2 / len(frame)
+    return power
+
+
+def bands(frames: int) -> NDArray[np.int64]:
+    """Edges [bins] of the bands, in even steps of log frequency from 3 cycles in the recording to half the rate."""
+    return np.unique(np.round(np.geomspace(3, frames // 2, BANDS + 1)).astype(np.int64))
+
+
+def statistics(reading: Reading, i: int) -> dict[str, float]:
+    """band n: log power.  line: log of the strongest bin over the median around it, below a quarter of the rate."""
+    if reading.conditions[i].kind not in STILL:
+        return {}
+    o = reading.observations[i]
+    if o.frame.sum() < 500:
+        return {}
+    power = spectrum(o.frame)
+    edges = bands(o.frames)
+    found = {f"band {n}": log(float(power[a:b].mean())) for n, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True))}
+    found["line"] = log(strongest_line(power)[1])
+    return found
+
+
+def strongest_line(power: NDArray[np.float64]) -> tuple[int, float]:
+    """(bin, power over the median of its neighbourhood) of the strongest bin above the slowest two."""
+    low = power[3 : max(len(power) // 2, 8)]
+    width = 25
+    padded = np.pad(low, width, mode="reflect") if len(low) > width else np.pad(low, width, mode="edge")
+    local = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1), axis=1)
+    ratio = low / np.maximum(local, 1e-30)
+    at = int(np.argmax(ratio))
+    return at + 3, float(ratio[at])

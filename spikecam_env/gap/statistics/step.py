@@ -1,0 +1,59 @@
+"""The response to steps of uniform light, frame by frame after each edge.
+
+Reveals photodiode_lag (tails), incomplete_reset (the first intervals), readout_skew (rows late by different times).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.statistics.reading import Reading, slope
+
+EDGES = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256)
+"""Lags after an edge [frames], ends of the windows."""
+
+
+def uniform_light(condition) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+    """(F,) radiance of every frame, by the light law: the value at its middle."""
+    light = condition.light
+    return np.interp(np.arange(condition.frames) + 0.5, light.frame, light.radiance[:, 0, 0])
+
+
+def edges_of(level: NDArray[np.float64]) -> list[tuple[int, float]]:
+    """(frame, height) where light has changed by most of the recording's range within two frames."""
+    change = level[2:] - level[:-2]
+    least = 0.5 * (level.max() - level.min())
+    found: list[tuple[int, float]] = []
+    for t in np.flatnonzero(np.abs(change) > least):
+        if not found or t - found[-1][0] > 8:
+            found.append((int(t), float(change[t])))
+    return [(t + 1, h) for t, h in found]
+
+
+def statistics(reading: Reading, i: int) -> dict[str, float]:
+    """up / down a-b: spikes missing or over, a to b frames after an edge, in frames of the step's height.
+
+    row up / row down: the same of the first 4 frames, as a slope from the first row to the last.
+    """
+    condition = reading.conditions[i]
+    if condition.kind != "step":
+        return {}
+    o = reading.observations[i]
+    level = uniform_light(condition)
+    rows = o.shape[0]
+    gain = reading.base.gain.reshape(o.shape).sum(axis=1)
+    dark = reading.base.dark.reshape(o.shape).sum(axis=1)
+    left = o.row - (level[:, None] * gain + dark)
+    edges = edges_of(level)
+    found: dict[str, float] = {}
+    for name, sign in (("up", 1), ("down", -1)):
+        at = [(t, h) for t, h in edges if h * sign > 0 and t + EDGES[-1] < o.frames]
+        if not at:
+            continue
+        for a, b in zip(EDGES[:-1], EDGES[1:], strict=True):
+            windows = [left[t + a : t + b].sum() / (abs(h) * gain.sum()) for t, h in at]
+            found[f"{name} {a}-{b}"] = float(np.mean(windows))
+        late = np.mean([left[t - 1 : t + 4].sum(axis=0) / (h * gain) for t, h in at], axis=0)
+        found[f"row {name}"] = slope(late, np.linspace(-0.5, 0.5, rows))
+    return found

@@ -1,0 +1,187 @@
+"""The block kernel of the fast engine: every effect, a block of frames at a time.
+
+The effects' hooks say once a block what arrives and how the references move (`drive`); a compiled loop (`block_loop`)
+then goes from frame to frame and does what depends on the spikes, from the numbers of `Feedback`.
+
+Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's draw
+mixed in, and what the reference adds or takes from the threshold is counted in at the reset.  What moves the reference or
+the charge by delta between a reset and the next spike is taken without the shot noise of delta: of a spike's variance a
+share |delta|, 1 % where a reference moves by 1 % of the swing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.sensor import drive
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback
+from spikecam_env.sensor.kernels import block_loop, fast
+from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
+from spikecam_env.sensor.light import GRAINS, Segment, ramp
+from spikecam_env.sensor.unit import Unit
+
+_BLOCK = 1 << 18
+"""Pixel-steps of a block, at most: arrays of one number each stay in the second-level cache."""
+
+
+def missing(effects: Sequence[Effect]) -> list[str]:
+    """Names of effects, or options of them, that this kernel does not carry."""
+    return [e.name for e in effects if not e.is_compiled()] + fast.missing([e for e in effects if e.is_fixed()])
+
+
+def missing_of(unit: Unit) -> list[str]:
+    """What of a given unit's law this kernel, and the jump kernel, do not carry."""
+    certain_dark = unit.shot and not unit.dark_is_noisy
+    few = unit.shot and float(unit.electrons.min()) < MIN_ELECTRONS
+    return ["unit.dark_is_noisy=false"] * certain_dark + [f"unit.electrons below {MIN_ELECTRONS:g}"] * few
+
+
+@dataclass(frozen=True)
+class BlockLaw:
+    """A unit in the loop's numbers: per_electron (1/N, 0 without shot noise) and kappa_squared (P,), and the polynomial."""
+
+    per_electron: Array
+    kappa_squared: Array
+    polynomial: tuple[np.float32, ...]
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> BlockLaw:
+        return self  # never written to
+
+
+@dataclass
+class BlockState:
+    """Pixels mid-stream.
+
+    charge, threshold: (P,) float64 [grains].  fired: (P,) uint32 spikes so far.  activity: (H,) share of a row that fired
+    in the last frame.  crossing: (P,) time of the last crossing [frames].  frame: number of the next.
+    seeds: the two words that, with a pixel's number and its spike's, fix every draw.  memory: the effects'.
+    """
+
+    law: BlockLaw
+    charge: Array
+    threshold: Array
+    fired: NDArray[np.uint32]
+    activity: Array
+    crossing: Array
+    frame: int
+    seeds: tuple[np.uint32, np.uint32]
+    memory: drive.Memory
+
+
+def start(
+    first: Exposure, effects: Sequence[Effect], phase: Array, seed: int, unit_seed: int | None = None
+) -> BlockState:
+    """Pixels part-way through a cycle; arguments as for `reference.start`."""
+    pixels = fast.start(first.unit, phase, seed)
+    charge = np.floor(phase * GRAINS)
+    inverse = 1.0 / first.unit.electrons if first.unit.shot else np.zeros(phase.size)
+    return BlockState(
+        BlockLaw(inverse, first.unit.kappa**2, pixels.law.polynomial),
+        charge,
+        threshold=charge + pixels.remaining[: phase.size],
+        fired=np.zeros(phase.size, dtype=np.uint32),
+        activity=np.zeros(first.shape[0]),
+        crossing=np.full(phase.size, -np.inf),
+        frame=first.number,
+        seeds=pixels.seeds,
+        memory=drive.begin(first, effects, seed, unit_seed),
+    )
+
+
+def run(
+    first: Exposure,
+    effects: Sequence[Effect],
+    state: BlockState,
+    segment: Segment,
+    out: NDArray[np.uint8] | None = None,
+    *,
+    threads: int | None = None,
+) -> NDArray[np.uint8]:
+    """Advance `state` over a segment; returns spikes (count, P) uint8, 0 or 1, in `out` where that is given.
+
+    first, effects: as given to `start`.  threads: default NUMBA_NUM_THREADS.
+    """
+    spikes = np.empty((segment.count, state.charge.size), dtype=np.uint8) if out is None else out
+    frames = max(1, _BLOCK // state.charge.size)
+    for done in range(0, segment.count, frames):
+        part = replace(segment, first=segment.first + done, count=min(frames, segment.count - done))
+        now = replace(first, number=state.frame, frames=part.count)
+        spikes[done : done + part.count] = _block(now, effects, state, part, threads)
+        state.frame += part.count
+    return spikes
+
+
+def _block(
+    now: Exposure, effects: Sequence[Effect], state: BlockState, segment: Segment, threads: int | None
+) -> NDArray[np.uint8]:
+    light, dark = drive.expected_charge(now, effects, state.memory, _mean(now.unit, segment))
+    law = drive.comparators(now, effects, state.memory)
+    spikes = np.empty((now.frames, state.charge.size), dtype=np.uint8)
+    work = (
+        now.number,
+        now.shape[1],
+        _pixels(light),
+        _pixels(dark),
+        _rows(light.factor, now),
+        _rows(dark.factor, now),
+        np.ascontiguousarray(law.factor),
+        np.ascontiguousarray(law.common),
+        law.field,
+        law.grains_per_mV,
+        tuple(float(number) for number in _together([e.feedback(now) for e in effects])),
+        state.law.per_electron,
+        state.law.kappa_squared,
+        state.law.polynomial,
+        *state.seeds,
+        state.charge,
+        state.threshold,
+        state.fired,
+        state.activity,
+        state.crossing,
+        spikes,
+    )
+    block_loop.advance(0, now.shape[0], *work)
+    return drive.read_out(now, effects, state.memory, spikes.view(np.bool_).reshape(-1, *now.shape)).reshape(
+        now.frames, -1
+    )
+
+
+def _mean(unit: Unit, segment: Segment) -> Array:
+    """Charge of the light law (count, P) [thresholds], or (1, P) in steady light."""
+    law = ramp(segment, *unit.grains_per_frame)
+    if not law.curve.any() and not law.rest.any():
+        return law.level[None] / GRAINS
+    mean = np.empty((segment.count, unit.gain.size))
+    block_loop.ramp_charge(law.level, law.curve, law.rest, segment.first, mean)
+    return mean
+
+
+def _pixels(charge: Charge) -> Array:
+    return np.ascontiguousarray(charge.pixels).reshape(len(charge.pixels), -1)
+
+
+def _rows(factor: Array | float, now: Exposure) -> Array:
+    return np.ascontiguousarray(np.broadcast_to(factor, (now.frames, now.shape[0], 1))[:, :, 0])
+
+
+def _together(feedbacks: Sequence[Feedback]) -> Feedback:
+    """One law of several: losses, kicks and droops add, what is kept multiplies."""
+    total = Feedback()
+    for one in feedbacks:
+        total = Feedback(
+            total.lost_per_root_rate + one.lost_per_root_rate,
+            total.lost_per_rate + one.lost_per_rate,
+            total.kept * one.kept,
+            total.kick + one.kick,
+            total.left + one.left,
+            one.left_tau if one.left else total.left_tau,
+            total.droop + one.droop,
+        )
+    return total
