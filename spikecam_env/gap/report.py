@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.gap import plots
-from spikecam_env.gap.evidence import LOUD, Exhibit, Maps, by_loudness, exhibits
+from spikecam_env.gap.evidence import Maps, shape_of
+from spikecam_env.gap.exhibits import LOUD, Exhibit, by_loudness, exhibits
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, NamedEffect
 from spikecam_env.gap.words import (
     CONFIDENCE,
@@ -61,12 +62,12 @@ def report(diagnosis: Diagnosis) -> str:
 
 def _subject(d: Diagnosis) -> str:
     said = f"Recordings of {Path(d.campaign).name} against the model {d.model_name}"
-    e = d.evidence
-    if e and e.measured:
-        rows, columns = e.measured[0].shape
-        held = sum(c.use == "holdout" for c in e.conditions)
+    shape = shape_of(d.evidence) if d.evidence else None
+    if d.evidence and shape:
+        shown = d.evidence.conditions
+        held = sum(c.use == "holdout" for c in shown)
         said += (
-            f": {rows} × {columns} pixels at {d.patched.frame_rate_hz:g} Hz, {len(e.conditions)} recordings, "
+            f": {shape[0]} × {shape[1]} pixels at {d.patched.frame_rate_hz:g} Hz, {len(shown)} recordings, "
             f"{held} of them kept out of the fit"
         )
     return f"{said}. {sum(d.stages.values()):.0f} s, spikecam-env {__version__}."

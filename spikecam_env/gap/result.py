@@ -100,6 +100,8 @@ class Evidence:
     """What the report draws: conditions and observations of the measurement, and of one twin before and after.
 
     again: another twin of the model before, with another seed: what chance alone makes differ.
+    drawn_before, drawn_after: gain and dark (P,) of a fresh unit of each model (`units.drawn`): the fixed pattern to
+    expect, where twins have the measured one.
     """
 
     conditions: tuple[Shown, ...]
@@ -110,6 +112,8 @@ class Evidence:
     before_base: BaseFit
     after_base: BaseFit | None
     again: tuple[Observation, ...] | None = None
+    drawn_before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    drawn_after: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
 
 @dataclass(frozen=True)

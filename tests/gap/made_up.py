@@ -10,6 +10,7 @@ import numpy as np
 from spikecam_env.gap.observe import Observation, observe
 from spikecam_env.gap.refit import measured_base
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.units import drawn
 from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
@@ -69,13 +70,16 @@ def evidence(effect: str | None, *, named: bool = True) -> Evidence:
     shown = conditions()
     streams = [recorded(effect, 0), recorded(None, 1), recorded(effect, 2) if named and effect else None]
     bases = [measured_base(list(s), list(shown)) if s else None for s in streams]
-    return Evidence(shown, *streams, *bases, again=recorded(None, 3))  # type: ignore[arg-type]
+    fresh = drawn(MODEL, bases[0], SHAPE, seed=11)  # type: ignore[arg-type]
+    return Evidence(
+        shown, *streams, *bases, again=recorded(None, 3), drawn_before=fresh, drawn_after=fresh if streams[2] else None
+    )  # type: ignore[arg-type]
 
 
 def statistics(loud: dict[str, float]) -> tuple[Statistic, ...]:
     """A bank: quiet but for the groups in `loud`, where z reaches the figure given; what is left is quiet."""
     rng = np.random.default_rng(1)
-    groups = ("rates", "noise", "spectrum", "step", "pattern", "intervals", "neighbours", "motion")
+    groups = ("rates", "noise", "intervals", "drift", "spectrum", "rows", "neighbours", "step", "moving", "pattern")
     names = [c.name for c in conditions()]
     out = []
     for group in groups:
@@ -128,8 +132,8 @@ def named(effect: str = "photodiode_lag") -> Diagnosis:
     """One effect found, at its true value."""
     found = {k: Estimate(v * 1.02, abs(v) * 0.02) for k, v in EFFECTS[effect].items()}
     e = NamedEffect(effect, "light", 0.97, found, (("incomplete_reset", 0.02), ("optical_blur", 0.003)))
-    loud = {"photodiode_lag": {"step": 38.0, "motion": 21.0}, "dead_time": {"rates": 44.0, "intervals": 12.0},
-            "light_flicker": {"spectrum": 61.0}}[effect]  # fmt: skip
+    loud = {"photodiode_lag": {"step": 38.0, "moving": 21.0}, "dead_time": {"rates": 44.0, "intervals": 12.0},
+            "light_flicker": {"spectrum": 61.0, "drift": 30.0}}[effect]  # fmt: skip
     words = {
         "photodiode_lag": "Your camera has photodiode lag: 6.1 % of the charge comes late, with a tail of 1.2 ms; "
         "adding it removes 97 % of the gap on recordings that were not used.",

@@ -9,6 +9,7 @@ import made_up
 import pytest
 
 import spikecam_env.gap
+from spikecam_env.cli.diagnose import summary
 from spikecam_env.cli.main import run
 
 
@@ -21,12 +22,10 @@ def campaign(tmp_path: Path, monkeypatch) -> Path:
 
     def diagnose(campaign, model, **options):
         asked.update(campaign=campaign, model=model, **options)
-        return made_up.EVERY[model_verdict["is"]]()
+        return made_up.named()
 
-    model_verdict = {"is": "named"}
     monkeypatch.setattr(spikecam_env.gap, "diagnose", diagnose, raising=False)
     monkeypatch.setattr(made_up, "ASKED", asked, raising=False)
-    monkeypatch.setattr(made_up, "VERDICT", model_verdict, raising=False)
     return folder
 
 
@@ -47,10 +46,12 @@ def test_it_writes_three_files_and_prints_verdict_parameters_and_gap(campaign: P
 
 
 @pytest.mark.parametrize("verdict", sorted(made_up.EVERY))
-def test_every_verdict_prints_its_sentence(verdict: str, campaign: Path, tmp_path: Path, capsys) -> None:
-    made_up.VERDICT["is"] = verdict
-    assert run(["diagnose", str(campaign), "--out", str(tmp_path / "out")]) == 0
-    assert f"{verdict}: {made_up.EVERY[verdict]().sentence}" in capsys.readouterr().out
+def test_a_terminal_is_told_the_verdict_and_what_was_found(verdict: str) -> None:
+    d = made_up.EVERY[verdict]()
+    printed = summary(d)
+    assert printed.startswith(f"{verdict}: {d.sentence}")
+    for said in (*(e.name for e in d.effects), *d.parameters, *d.data):
+        assert said in printed
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from functools import lru_cache
 from html.parser import HTMLParser
 from pathlib import Path
@@ -13,7 +14,8 @@ import made_up
 import numpy as np
 import pytest
 
-from spikecam_env.gap.evidence import by_loudness, edges_of, exhibits, spectrum
+from spikecam_env.gap.exhibits import by_loudness, exhibits
+from spikecam_env.gap.exhibits.spectrum import averaged
 from spikecam_env.gap.report import command_of, report, write_report
 from spikecam_env.gap.result import VERDICTS
 from spikecam_env.gap.words import quantity
@@ -131,8 +133,6 @@ def test_the_same_diagnosis_gives_the_same_bytes() -> None:
 
 
 def test_text_of_a_campaign_cannot_become_markup(tmp_path: Path) -> None:
-    from dataclasses import replace
-
     d = replace(made_up.data(), campaign="<script>x</script>", data=("flat <b>&amp;",), evidence=None)
     write_report(d, tmp_path / "report.html")
     page = Page((tmp_path / "report.html").read_text(encoding="utf-8"))
@@ -171,14 +171,25 @@ def test_without_a_gap_the_panels_stay_within_their_bands() -> None:
     assert np.mean(np.abs(z) > 2) < 0.12
 
 
-def test_edges_are_where_the_light_jumps() -> None:
-    step = next(c for c in made_up.conditions() if c.name == "step")
-    assert edges_of(step.light, made_up.FRAMES) == [(499, 1), (999, -1)]
+def test_recordings_without_spikes_or_labels_leave_out_what_they_cannot_show() -> None:
+    d = made_up.named("dead_time")
+    e = d.evidence
+    unlabelled = tuple(replace(c, kind="unknown", level=np.nan, light=None) if c.name == "flat-200" else c
+                       for c in e.conditions)  # fmt: skip
+    bases = [replace(b, residual=b.residual[:5]) for b in (e.measured_base, e.before_base, e.after_base)]
+    e = replace(e, conditions=unlabelled, measured_base=bases[0], before_base=bases[1], after_base=bases[2])
+    assert {x.name for x in exhibits(e, 40_000.0)} == {x.name for x in exhibits(d.evidence, 40_000.0)}
+    only_rates = (None,) * len(e.conditions)
+    e = replace(e, measured=only_rates, before=only_rates, after=only_rates, again=None)
+    left = exhibits(e, 40_000.0)
+    print([(x.name, [p.title for p in x.panels]) for x in left])
+    assert {x.name for x in left} == {"rates", "pattern"}
+    Page(report(replace(d, evidence=e)))
 
 
 def test_the_spectrum_of_independent_spikes_is_flat_at_one() -> None:
     counts = np.random.default_rng(0).poisson(50, 20_000).astype(np.int32)
-    frequency, power, count = spectrum(counts, 40_000.0)
+    frequency, power, count = averaged(counts, 40_000.0)
     z = (power - 1) * np.sqrt(count)
     print(f"mean power {np.average(power, weights=count):.3f}, rms z {np.sqrt(np.mean(z**2)):.2f}")
     assert abs(np.average(power, weights=count) - 1) < 0.05
