@@ -28,7 +28,7 @@ Array = NDArray[np.floating[Any]]
 class Panel:
     """One plot.  x, measured, before, sd (N,); after (N,) or None.  log: axes that are logarithmic, "", "x", "y", "xy".
 
-    labels: names on the x axis instead of numbers.  line: whether neighbours on x are joined.
+    labels: names of the points instead of numbers on the x axis.
     """
 
     title: str
@@ -41,7 +41,6 @@ class Panel:
     sd: Array
     log: str = ""
     labels: tuple[str, ...] = ()
-    line: bool = True
 
     @property
     def z(self) -> float:
@@ -149,7 +148,7 @@ def against_before(
     """A quantity of each recording less the model's, times `scale`."""
     return Panel(
         title, "", ylabel, np.arange(len(found), dtype=np.float64), scale * (measured - before), np.zeros(len(found)),
-        None if after is None else scale * (after - before), scale * sd, labels=names(found), line=False,
+        None if after is None else scale * (after - before), scale * sd, labels=names(found),
     )  # fmt: skip
 
 

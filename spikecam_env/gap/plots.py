@@ -24,7 +24,7 @@ _WIDTH, _HEIGHT = 4.8, 3.3
 _FONTS: Any = {"font.size": 10, "axes.titlesize": 10.5, "axes.spines.top": False, "axes.spines.right": False,
           "font.family": "DejaVu Sans", "axes.titlelocation": "left"}  # fmt: skip
 _MANY = 40
-"""Points from which measured is drawn as a thin line."""
+"""Points from which measured is drawn as a thin line, not as dots."""
 
 _plain = mpl.ticker.FuncFormatter(lambda value, _: f"{value:g}")
 
@@ -60,9 +60,9 @@ def _over_x(axis: Axes, p: Panel) -> None:
     axis.fill_between(p.x, low, high, color=BAND, lw=0, zorder=0)
     axis.plot(p.x, p.before, color=BEFORE, ls=(0, (5, 2)), lw=1.4, marker=None if many else "s", ms=4, zorder=2)
     if p.after is not None:
-        axis.plot(p.x, p.after, color=AFTER, lw=1.4, marker=None if many else "^", ms=4.5, zorder=3)
-    axis.plot(p.x, p.measured, color=MEASURED, lw=0.9, marker="." if many else "o", ms=3 if many else 4.5, zorder=4,
-              alpha=0.8 if many else 1.0)  # fmt: skip
+        axis.plot(p.x, p.after, color=AFTER, lw=1.4, marker=None if many else "^", ms=7, zorder=3)
+    dots: Any = {"lw": 0.9, "marker": ".", "ms": 3, "alpha": 0.8} if many else {"ls": "", "marker": "o", "ms": 4.5}
+    axis.plot(p.x, p.measured, color=MEASURED, zorder=4, **dots)
     if "y" in p.log:
         axis.set_yscale("log")
     axis.set(xlabel=p.xlabel, ylabel=p.ylabel)
@@ -89,10 +89,11 @@ def _by_name(axis: Axes, p: Panel) -> None:
     axis.barh(y, 4 * p.sd, left=p.before - 2 * p.sd, height=0.8, color=BAND, zorder=0)
     axis.plot(p.before, y, color=BEFORE, marker="s", ms=5, ls="", zorder=2)
     if p.after is not None:
-        axis.plot(p.after, y, color=AFTER, marker="^", ms=6, ls="", zorder=3)
+        axis.plot(p.after, y, color=AFTER, marker="^", ms=8, ls="", zorder=3)
     axis.plot(p.measured, y, color=MEASURED, marker="o", ms=4.5, ls="", zorder=4)
     axis.set_yticks(y, p.labels)
     axis.use_sticky_edges = False
+    axis.autoscale()
     axis.set(xlabel=p.ylabel)
     axis.grid(axis="y", color="0.93", zorder=-1)
 

@@ -93,12 +93,14 @@ def _opening_none(d: Diagnosis) -> Iterator[str]:
 
 
 def _opening_named(d: Diagnosis) -> Iterator[str]:
-    both = "is" if len(d.effects) == 1 else "are"
-    yield element(
-        "p",
-        f"The model {d.model_name}, fitted to this unit, does not make these recordings; with what {both} named here "
-        "it does, in every group of statistics, within the noise.",
-    )
+    said = f"The model {d.model_name}, fitted to this unit, does not make these recordings."
+    if d.statistics:
+        before, after = max(abs(s.z) for s in d.statistics), max(abs(s.z_after) for s in d.statistics)
+        said += (
+            f" With what is named here, the largest of {len(d.statistics)} deviations falls from |z| {before:.1f} "
+            f"to {after:.1f}."
+        )
+    yield element("p", said)
     for effect in d.effects:
         yield from _effect_card(effect)
 

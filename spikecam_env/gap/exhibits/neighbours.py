@@ -32,6 +32,6 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             f"Coincidences of neighbours, {t.shown.name}", "", "over the model's, less 1 [%]",
             np.arange(len(labels), dtype=np.float64), 100 * (measured / before - 1), np.zeros(len(labels)),
             None if after is None else 100 * (after / before - 1), 100 * sd,
-            labels=labels, line=False,
+            labels=labels,
         ))  # fmt: skip
     yield from loudest(made, 2)

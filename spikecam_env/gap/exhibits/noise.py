@@ -37,7 +37,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         measured, before, after, sd = by_recording(enough, lambda o: o.covariance / np.nanmean(o.variance))
         yield Panel(
             "Correlation of successive intervals", "", "lag-1 correlation", np.arange(len(enough), dtype=np.float64),
-            measured, before, after, sd, labels=names(enough), line=False,
+            measured, before, after, sd, labels=names(enough),
         )  # fmt: skip
 
 
