@@ -55,16 +55,35 @@ def case_of(
     return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs)
 
 
-def twins(case: Case, model: SensorModel, base: BaseFit, count: int, first: int = 0) -> list[Twin]:
-    """Campaigns of the unit `base` under `model`, numbers first .. first + count; one number is one set of draws."""
+def twins(
+    case: Case,
+    model: SensorModel,
+    base: BaseFit,
+    count: int,
+    first: int = 0,
+    only: Sequence[int] | None = None,
+) -> list[Twin]:
+    """Campaigns of the unit `base` under `model`, numbers first .. first + count; one number is one set of draws.
+
+    only: recordings to simulate, by index; without all of those that the refit rests on, `base` stands for it.
+    """
+    numbers = range(first, first + count)
     with ThreadPoolExecutor(case.jobs) as pool:
-        return list(pool.map(lambda n: _twin(case, model, base, case.seed * 1000 + 17 + n), range(first, first + count)))
+        return list(pool.map(lambda n: _twin(case, model, base, case.seed * 1000 + 17 + n, only), numbers))
 
 
-def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int) -> Twin:
-    observations = simulate(model, base, case.conditions, case.shape, seed)
-    own = measured_base(observations, list(case.conditions))
-    return Twin(bank(Reading(observations, case.conditions, own, case.films)), own)
+def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None) -> Twin:
+    which = range(len(case.conditions)) if only is None else only
+    conditions = [case.conditions[i] for i in which]
+    observations = simulate(model, base, conditions, case.shape, seed, which)
+    own = measured_base(observations, conditions) if rests_on(case) <= set(which) else base
+    return Twin(bank(Reading(observations, conditions, own, case.films)), own)
+
+
+def rests_on(case: Case) -> set[int]:
+    """Recordings that the base refit rests on."""
+    still = ("dark", "flat", "picture")
+    return {i for i, c in enumerate(case.conditions) if c.kind in still}
 
 
 def settled(model: SensorModel, used: BaseFit, measured: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:

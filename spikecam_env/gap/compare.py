@@ -45,12 +45,7 @@ def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key]) -> Null:
     values = np.array([[b[k] for k in there] for b in banks])
     floor = np.array([floor_of(k) for k in there])
     sd = values.std(axis=0, ddof=1)
-    return Null(there, values.mean(axis=0), _shrunk(sd, len(banks) - 1), floor, len(banks))
-
-
-def _shrunk(sd: Array, freedom: int, prior: float = 4.0) -> Array:
-    """A spread from few twins cannot be trusted to be tiny: as if `prior` more twins had the median relative spread."""
-    return np.sqrt((freedom * sd**2 + prior * np.maximum(sd, 1e-12) ** 2) / (freedom + prior))
+    return Null(there, values.mean(axis=0), sd, floor, len(banks))
 
 
 def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
@@ -63,7 +58,7 @@ def deviates(null: Null, values: Array) -> Array:
     t = np.nan_to_num((values - null.mean) / null.noise)
     known = null.sd**2 * (1.0 + 1.0 / null.twins)
     freedom = (null.twins - 1) * np.minimum((1.0 + null.floor**2 / np.maximum(known, 1e-300)) ** 2, 1e4)
-    log_p = stats.t.logsf(np.abs(t), freedom)
+    log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)
     return np.sign(t) * -special.ndtri_exp(log_p)
 
 

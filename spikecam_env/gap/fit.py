@@ -6,14 +6,14 @@ parameters follow by Gauss-Newton.  The unit is refitted along the way, so that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.case import Case, settled, twins
+from spikecam_env.gap.case import Case, rests_on, settled, twins
 from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, residual, values_of
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.statistics import Key
@@ -43,32 +43,30 @@ class Fit:
     rho: Array
     misfit: float
     model: SensorModel
-    correlated: dict[str, Array] = field(default_factory=dict)
 
 
 def predict(
-    case: Case, model: SensorModel, base: BaseFit, null: Null, count: int, first: int = 0, pattern: Array | None = None
+    case: Case,
+    model: SensorModel,
+    base: BaseFit,
+    null: Null,
+    count: int,
+    first: int = 0,
+    only: Sequence[int] | None = None,
 ) -> tuple[Array, list[BaseFit]]:
-    """(S,) mean statistics of twins under a model, pattern statistics of its units, and the twins' refits.
-
-    pattern: (S,) values to take for pattern statistics instead of drawing units.
-    """
-    made = twins(case, model, base, count, first)
-    mean = np.nanmean([values_of(t.bank, null.keys) for t in made], axis=0)
-    mean = np.where(np.isnan(mean), null.mean, mean)
-    mean = with_pattern(case, model, null, mean) if pattern is None else np.where(is_of_pattern(null), pattern, mean)
-    return mean, [t.base for t in made]
-
-
-def is_of_pattern(null: Null) -> NDArray[np.bool_]:
-    return np.array([k.group == "pattern" for k in null.keys])
+    """(S,) mean statistics of twins under a model, and the twins' refits; what is not simulated is as in `null`."""
+    made = twins(case, model, base, count, first, only)
+    values = np.array([values_of(t.bank, null.keys) for t in made])
+    known = np.isfinite(values).all(axis=0)
+    return np.where(known, np.where(known, values, 0.0).mean(axis=0), null.mean), [t.base for t in made]
 
 
 def with_pattern(case: Case, model: SensorModel, null: Null, mean: Array) -> Array:
     """`mean` with its pattern statistics replaced by those of units of the model."""
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
-    pattern = np.nanmean([values_of(b, null.keys) for b in drawn], axis=0)
-    return np.where(np.isnan(pattern), mean, pattern)
+    values = np.array([values_of(b, null.keys) for b in drawn])
+    known = np.isfinite(values).all(axis=0)
+    return np.where(known, np.where(known, values, 0.0).mean(axis=0), mean)
 
 
 def fit(
@@ -78,7 +76,7 @@ def fit(
     measured: Array,
     name: str,
     start: Mapping[str, float],
-    rounds: int = 3,
+    rounds: int = 6,
 ) -> Fit:
     """Best fit of one candidate added to `model`, whose own predictions are `null`."""
     if is_pattern(name):
@@ -86,11 +84,13 @@ def fit(
     return _fit_twins(case, model, null, measured, name, dict(start), rounds)
 
 
-def _with(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
+def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
+    """The model with a candidate added."""
     return model.with_effect(build(CATALOGUE, name, dict(parameters)))
 
 
-def _bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
+def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
+    """Parameters within what their effect allows, whole where they must be."""
     out = {}
     for key, f in CATALOGUE[name].__dataclass_fields__.items():
         if key not in parameters:
@@ -126,20 +126,23 @@ def _fit_twins(
     rounds: int,
 ) -> Fit:
     what = candidate(name)
-    strength, *shape = what.fitted
+    strength = what.fitted[0]
     power = 2.0 if what.square else 1.0
     base = within(model, case.base)
-    parameters = _bounded(name, parameters)
+    parameters = bounded(name, parameters)
+    only: list[int] | None = None
     best: Fit | None = None
     for turn in range(rounds):
-        tried = _with(model, name, parameters)
-        predicted, refits = predict(case, tried, within(tried, base), null, 1, first=100, pattern=null.mean)
+        tried = with_effect(model, name, parameters)
+        predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
         effect = predicted - null.mean
         scale, sd = scale_of(null, measured, effect, 1)
         relative = sd / max(abs(scale), 1e-9) / power
         rho = residual(null, measured, predicted, 1)
         now = Fit(name, dict(parameters), {strength: abs(parameters[strength]) * relative}, predicted, 1, base, rho,
                   misfit(rho), tried)  # fmt: skip
+        if best is not None and now.misfit > best.misfit - 1.0 and turn > 1:
+            break
         best = now if best is None or now.misfit < best.misfit else best
         if turn == rounds - 1:
             break
@@ -148,15 +151,32 @@ def _fit_twins(
         if factor <= 0 and not _may_be_negative(name):
             factor = 0.3
         factor = float(np.sign(factor) * np.clip(abs(factor), 1e-3, 1e3))
-        if shape and turn > 0:
-            step = _gauss_newton(case, model, null, measured, name, parameters, what.fitted, predicted, base)
-            parameters = _bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
+        only = concerned(case, null, effect * factor)
+        if len(what.fitted) > 1 and 0.3 < abs(factor) < 3:
+            step = _gauss_newton(
+                case, model, null, measured, name, parameters, what.fitted, predicted, base, only
+            )
+            parameters = bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
+        elif abs(factor - 1.0) < 0.02:
+            break
         else:
-            if abs(factor - 1.0) < 0.02:
-                break
-            parameters = _bounded(name, {**parameters, strength: parameters[strength] * factor})
+            parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
     assert best is not None
     return best
+
+
+def concerned(case: Case, null: Null, effect: Array) -> list[int] | None:
+    """Recordings on which an effect shows, by index; with those that the refit rests on where it shows on one of them.
+
+    None for all.
+    """
+    shows = {k.recording for k, e, n in zip(null.keys, effect, null.noise, strict=True) if abs(e) > 5 * n}
+    which = {i for i, c in enumerate(case.conditions) if c.name in shows}
+    if not which:
+        return None
+    if which & rests_on(case):
+        which |= rests_on(case)
+    return sorted(which) if len(which) < len(case.conditions) else None
 
 
 def _may_be_negative(name: str) -> bool:
@@ -175,12 +195,13 @@ def _gauss_newton(
     fitted: tuple[str, ...],
     predicted: Array,
     base: BaseFit,
+    only: Sequence[int] | None,
 ) -> dict[str, float]:
     """Factors to multiply the fitted parameters by: one damped step in their logarithms, differences of 30 %."""
     columns = []
     for key in fitted:
-        nudged = _with(model, name, _bounded(name, {**parameters, key: parameters[key] * 1.3}))
-        there, _ = predict(case, nudged, within(nudged, base), null, 1, first=100, pattern=null.mean)
+        nudged = with_effect(model, name, bounded(name, {**parameters, key: parameters[key] * 1.3}))
+        there, _ = predict(case, nudged, within(nudged, base), null, 1, 100, only)
         columns.append((there - predicted) / np.log(1.3))
     jacobian = np.stack(columns, axis=1)
     noise2 = null.sd**2 * (2 + 1 / null.twins) + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2
@@ -196,9 +217,10 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
     """The fit simulated anew with other draws, its unit settled once more: for the gate."""
     if is_pattern(found.name):
         return found
-    _, refits = predict(case, found.model, within(found.model, found.base), null, 1, first=200, pattern=null.mean)
+    only = concerned(case, null, found.predicted - null.mean)
+    _, refits = predict(case, found.model, within(found.model, found.base), null, 1, 200, only)
     base = settled(found.model, within(found.model, found.base), case.base, refits)
-    predicted, _ = predict(case, found.model, base, null, count, first=300, pattern=null.mean)
+    predicted, _ = predict(case, found.model, base, null, count, 300, only)
     rho = residual(null, measured, predicted, count)
     return replace(found, predicted=predicted, count=count, base=base, rho=rho, misfit=misfit(rho))
 
@@ -208,14 +230,14 @@ def _fit_pattern(
 ) -> Fit:
     """Coarse to fine search over the strength (and one more parameter), drawing units."""
     what = candidate(name)
-    parameters = _bounded(name, start)
+    parameters = bounded(name, start)
     best: Fit | None = None
     for factors in ((0.03, 0.1, 0.3, 1.0, 3.0), (0.55, 0.75, 1.35, 1.8), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05)):
         for key in what.fitted:
             centre = best.parameters if best else parameters
             for factor in factors:
-                tried = _bounded(name, {**centre, key: centre[key] * factor})
-                there = _with(model, name, tried)
+                tried = bounded(name, {**centre, key: centre[key] * factor})
+                there = with_effect(model, name, tried)
                 predicted = with_pattern(case, there, null, null.mean)
                 rho = residual(null, measured, predicted, UNITS)
                 now = Fit(name, tried, {}, predicted, UNITS, within(there, case.base), rho, misfit(rho), there)

@@ -12,7 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from spikecam_env.calibration.spike_times import SpikeTimes, spike_times
+from spikecam_env.calibration.spike_times import SpikeTimes
+from spikecam_env.streams.bits import as_words, by_pixel, ones, times_of
 from spikecam_env.streams.packing import unpack_frames
 
 Array = NDArray[np.float64]
@@ -71,31 +72,45 @@ class Observation:
 def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = False) -> Observation:
     """Reduce (F, ceil(H W / 8)) uint8 bits; film: keep counts in bins of time."""
     pixels = shape[0] * shape[1]
-    bits = np.ascontiguousarray(packed)
-    times = spike_times(bits, pixels, STEPS, threads=1)
-    moments = np.full((8 * bits.shape[1], 4), np.nan)
-    blocks = np.zeros((BLOCKS, 8 * bits.shape[1]), np.int32)
+    ends = np.full((pixels, 3), -1, np.int64)
+    square, terms = np.zeros((pixels, len(STEPS))), np.zeros((pixels, len(STEPS)), np.int64)
+    moments = np.full((pixels, 4), np.nan)
+    blocks = np.zeros((BLOCKS, pixels), np.int32)
     lengths = np.zeros(LENGTHS + 1, np.int64)
-    _intervals(bits, moments, blocks, lengths)
-    spikes = unpack_frames(bits, shape)
-    row, column = np.zeros((len(bits), shape[0]), np.int32), np.zeros((len(bits), shape[1]), np.int32)
+    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths)
+    spikes = unpack_frames(packed, shape)
+    row = np.zeros((len(packed), shape[0]), np.int32)
     coincidences = np.zeros((LAGS, 2))
-    _neighbours(spikes, row, column, coincidences)
+    _neighbours(_rows_in_words(packed, spikes), shape[0], row, coincidences)
+    count, first, last = ends.T
     return Observation(
         shape,
-        times,
-        moments[:pixels, 0],
-        moments[:pixels, 1],
-        np.nan_to_num(moments[:pixels, 2]).astype(np.int64),
-        np.nan_to_num(moments[:pixels, 3]).astype(np.int64),
+        SpikeTimes(len(packed), count, first, last, np.array(STEPS), square, terms),
+        moments[:, 0],
+        moments[:, 1],
+        np.nan_to_num(moments[:, 2]).astype(np.int64),
+        np.nan_to_num(moments[:, 3]).astype(np.int64),
         lengths[1:],
-        blocks[:, :pixels],
+        blocks,
         row.sum(axis=1, dtype=np.int32),
         row,
-        column,
+        _columns(spikes),
         coincidences,
         _film(spikes) if film else None,
     )
+
+
+def _rows_in_words(packed: NDArray[np.uint8], spikes: NDArray[np.uint8]) -> NDArray[np.uint64]:
+    """(F, rows * words) bits with every row of pixels in words of its own."""
+    if spikes.shape[2] % 64 == 0:
+        return as_words(packed)
+    padded = np.pad(spikes, ((0, 0), (0, 0), (0, -spikes.shape[2] % 64)))
+    return np.packbits(padded, axis=2, bitorder="little").reshape(len(spikes), -1).view(np.uint64)
+
+
+def _columns(spikes: NDArray[np.uint8]) -> NDArray[np.int32]:
+    kind = np.uint8 if spikes.shape[1] < 256 else np.uint16
+    return np.add.reduce(spikes, axis=1, dtype=kind).astype(np.int32)
 
 
 def _film(spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -104,68 +119,94 @@ def _film(spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _intervals(bits, moments, blocks, lengths):  # type: ignore[no-untyped-def]
-    frames = bits.shape[0]
-    times = np.empty((8, frames), np.int32)
-    count = np.empty(8, np.int64)
+def _pixels(words, ends, square, terms, moments, blocks, lengths):  # type: ignore[no-untyped-def]
+    frames = words.shape[0]
+    bits = np.empty((64, (frames + 63) // 64), np.uint64)
+    t = np.empty(frames + 1, np.int32)
+    d = np.empty(frames + 1, np.int32)
     block = (frames + BLOCKS - 1) // BLOCKS
-    for column in range(bits.shape[1]):
-        count[:] = 0
-        for t in range(frames):
-            byte = bits[t, column]
-            if byte:
-                b = t // block
-                for bit in range(8):
-                    if (byte >> bit) & 1:
-                        times[bit, count[bit]] = t
-                        count[bit] += 1
-                        blocks[b, 8 * column + bit] += 1
-        for bit in range(8):
-            n = count[bit]
+    for column in range(words.shape[1]):
+        by_pixel(words, column, bits)
+        for within in range(64):
+            p = 64 * column + within
+            if p >= ends.shape[0]:
+                break
+            n = times_of(bits[within], t)
+            ends[p, 0] = n
+            if n == 0:
+                continue
+            ends[p, 1], ends[p, 2] = t[0], t[n - 1]
+            i = 0
+            for b in range(BLOCKS):
+                start, stop = i, min((b + 1) * block, frames)
+                i = np.searchsorted(t[:n], stop)
+                blocks[b, p] = i - start
+            for j in range(len(STEPS)):
+                k = STEPS[j]
+                if n > 2 * k:
+                    square[p, j] = _second_differences(t, n, k)
+                    terms[p, j] = n - 2 * k
             if n < 2:
                 continue
-            t = times[bit]
             for i in range(n - 1):
-                lengths[min(t[i + 1] - t[i] - 1, LENGTHS - 1) + 1] += 1
+                d[i] = t[i + 1] - t[i]
+            for i in range(n - 1):
+                lengths[min(d[i], LENGTHS)] += 1
             if n < 4:
                 continue
             mean = (t[n - 1] - t[0]) / (n - 1)
-            square, product, short, long = 0.0, 0.0, 0, 0
-            before = t[1] - t[0] - mean
+            squares, products, short, long = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
+            least, most = np.int32(np.ceil(0.6 * mean - 1.0)), np.int32(np.floor(1.5 * mean + 1.0))
             for i in range(n - 1):
-                d = t[i + 1] - t[i] - mean
-                square += d * d
-                product += d * before if i else 0.0
-                short += d < -0.4 * mean - 1.0
-                long += d > 0.5 * mean + 1.0
-                before = d
-            p = 8 * column + bit
-            moments[p, 0] = square / (n - 1)
-            moments[p, 1] = product / (n - 2)
-            moments[p, 2] = short
-            moments[p, 3] = long
+                squares += np.int64(d[i]) * d[i]
+                short += d[i] < least
+                long += d[i] > most
+            for i in range(n - 2):
+                products += np.int64(d[i]) * d[i + 1]
+            # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2
+            moments[p, 0] = squares / (n - 1) - mean * mean
+            inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
+            moments[p, 1] = (products - mean * inner) / (n - 2) + mean * mean
+            moments[p, 2], moments[p, 3] = short, long
+
+
+@njit(inline="always")
+def _second_differences(t, n, k):  # type: ignore[no-untyped-def]
+    total = np.float64(0.0)
+    for start in range(0, n - 2 * k, 4096):  # in blocks, so that int64 sums vectorise and cannot overflow
+        part = np.int64(0)
+        for j in range(start, min(start + 4096, n - 2 * k)):
+            e = np.int64(t[j + 2 * k]) - 2 * np.int64(t[j + k]) + np.int64(t[j])
+            part += e * e
+        total += part
+    return total
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _neighbours(spikes, row, column, coincidences):  # type: ignore[no-untyped-def]
-    frames, rows, columns = spikes.shape
-    for t in range(frames):
+def _neighbours(words, rows, row, coincidences):  # type: ignore[no-untyped-def]
+    """words: (F, rows * n) uint64, each row of pixels n whole words, padded with zeros."""
+    frames = words.shape[0]
+    each = words.shape[1] // rows
+    one = np.uint64(1)
+    top = np.uint64(63)
+    for f in range(frames):
         for r in range(rows):
-            fired = 0
-            for c in range(columns):
-                fired += spikes[t, r, c]
-                column[t, c] += spikes[t, r, c]
-            row[t, r] = fired
-            if not fired:
-                continue
-            for lag in range(min(LAGS, t + 1)):
-                across, down = np.int64(0), np.int64(0)
-                now, then = spikes[t, r], spikes[t - lag, r]
-                for c in range(columns - 1):
-                    across += (now[c] & then[c + 1]) + (now[c + 1] & then[c])
-                if r:
-                    above, was = spikes[t, r - 1], spikes[t - lag, r - 1]
-                    for c in range(columns):
-                        down += (now[c] & was[c]) + (above[c] & then[c])
-                coincidences[lag, 0] += across
-                coincidences[lag, 1] += down
+            fired = np.uint64(0)
+            for w in range(each):
+                fired += ones(words[f, r * each + w])
+            row[f, r] = fired
+        for lag in range(min(LAGS, f + 1)):
+            across, down = np.uint64(0), np.uint64(0)
+            for r in range(rows):
+                for w in range(each):
+                    at = r * each + w
+                    now, then = words[f, at], words[f - lag, at]
+                    right_now, right_then = now >> one, then >> one
+                    if w + 1 < each:
+                        right_now |= words[f, at + 1] << top
+                        right_then |= words[f - lag, at + 1] << top
+                    across += ones(now & right_then) + ones(right_now & then)
+                    if r:
+                        down += ones(now & words[f - lag, at - each]) + ones(words[f, at - each] & then)
+            coincidences[lag, 0] += across
+            coincidences[lag, 1] += down

@@ -17,13 +17,21 @@ _BLOCK = 1024
 
 
 def simulate(
-    model: SensorModel, base: BaseFit, conditions: Sequence[Shown], shape: tuple[int, int], seed: int
+    model: SensorModel,
+    base: BaseFit,
+    conditions: Sequence[Shown],
+    shape: tuple[int, int],
+    seed: int,
+    takes: Sequence[int] | None = None,
 ) -> list[Observation]:
-    """One simulated campaign of the unit `base` under `model`; another seed is other temporal noise and phases."""
+    """One simulated campaign of the unit `base` under `model`; another seed is other temporal noise and phases.
+
+    takes: number of each recording, by default in order; the same number and seed give the same draws.
+    """
     unit = unit_of(model, base, shape)
     return [
         observe(expose(model, unit, c, base, shape, seed, take), shape, film=c.moves)
-        for take, c in enumerate(conditions)
+        for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,54 @@ from spikecam_env.sensor import SensorModel
 Array = NDArray[np.float64]
 
 
+_SPREADS = {
+    "gain": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
+    "dark": {"dark_current_spread": "sigma_pA"},
+}
+WITHIN = (0.6, 1.67)
+"""Units' spreads lie within this of the model's; beyond, it is a gap."""
+
+
 def drawn_banks(
     model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], count: int, seed: int
 ) -> list[dict[Key, float]]:
-    """Pattern statistics of `count` units of the model, at the measured unit's mean response, dark level and noise."""
-    return [_bank(model, base, shown, shape, seed + n) for n in range(count)]
+    """Pattern statistics of `count` units of the model, at the measured unit's mean response, dark level and noise.
+
+    The model's own spreads are scaled, within limits, so that the whole spread is the measured one.
+    """
+    fitted = model
+    for _ in range(2):
+        fitted = _rescaled(fitted, model, base, shape, seed)
+    return [_bank(fitted, base, shown, shape, seed + n) for n in range(count)]
+
+
+def _rescaled(model: SensorModel, nominal: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> SensorModel:
+    unit = model.draw_unit(shape, seed)
+    out = model
+    for what, spreads in _SPREADS.items():
+        here = {e.name: e for e in model.effects if e.name in spreads}
+        if not here:
+            continue
+        wanted, whole = width(getattr(base, what)[base.live]), width(getattr(unit, what))
+        rest = model
+        for name in here:
+            rest = rest.without(name)
+        others = width(getattr(rest.draw_unit(shape, seed), what))
+        own = whole**2 - others**2
+        factor = np.sqrt(max(wanted**2 - others**2, 0.0) / own) if own > 1e-10 else 1.0
+        for name, effect in here.items():
+            key = spreads[name]
+            first = next(e for e in nominal.effects if e.name == name).parameters()[key]
+            value = float(np.clip(effect.parameters()[key] * factor, WITHIN[0] * first, WITHIN[1] * first))
+            out = out.with_effect(replace(effect, **{key: value}))
+    return out
+
+
+def width(values: Array) -> float:
+    """Robust relative spread: half of the middle 68 % over the median."""
+    middle = float(np.median(values))
+    low, high = np.quantile(values, [0.1587, 0.8413])
+    return float(high - low) / 2 / middle if middle > 0 else 0.0
 
 
 def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:

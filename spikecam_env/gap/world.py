@@ -6,6 +6,7 @@ Kinds of light: `dark`, `flat` (uniform and steady), `picture` (steady), `step` 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.calibration.campaign import Campaign, CampaignRecording
+from spikecam_env.gap.recordings import Planned
 from spikecam_env.gap.observe import Observation, observe
 from spikecam_env.sensor import Keyframes
 
@@ -48,6 +50,20 @@ def shown(recording: CampaignRecording) -> Shown:
     light = recording.light()
     if light is None:
         return Shown(recording.name, "unknown", np.nan, None, recording.frames, recording.use, recording.v_d)
+    return _classed(recording.name, light, recording.frames, recording.use, recording.v_d)
+
+
+def planned(design: Sequence[Planned], shape: tuple[int, int], frames: int) -> list[Shown]:
+    """Conditions of recordings that are planned, not made."""
+    found = []
+    for p in design:
+        light = p.light(shape, frames)
+        whole = Keyframes(light.frame, np.broadcast_to(light.radiance, (len(light.frame), *shape)))
+        found.append(_classed(p.file_name, whole, frames, p.use, p.v_d))
+    return found
+
+
+def _classed(name: str, light: Keyframes, frames: int, use: str, v_d: float | None) -> Shown:
     uniform = bool(np.all(light.radiance == light.radiance[:, :1, :1]))
     steady = bool(np.all(light.radiance == light.radiance[:1]))
     level = float(light.radiance.mean())
@@ -56,7 +72,7 @@ def shown(recording: CampaignRecording) -> Shown:
         light = Keyframes(light.frame[:1], light.radiance[:1])
     else:
         kind = "step" if uniform else "moving"
-    return Shown(recording.name, kind, level, light, recording.frames, recording.use, recording.v_d)
+    return Shown(name, kind, level, light, frames, use, v_d)
 
 
 def observed(campaign: Campaign, conditions: list[Shown], *, progress: bool = False) -> list[Observation | None]:

@@ -1,0 +1,253 @@
+"""What each candidate does to the statistics bank, simulated beforehand on the standard design: to screen by.
+
+    python -m spikecam_env.gap.templates          rebuilds them (resumable; minutes an effect), and the limits table
+
+A template is a direction, in noise, at a strength that shows clearly.  Screening scales it to what was measured; the fit
+that follows simulates the campaign at hand and rests on no template.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
+from spikecam_env.gap.case import Case, case_of, twins
+from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, null_of
+from spikecam_env.gap.fit import UNITS, bounded, predict, with_effect, with_pattern
+from spikecam_env.gap.refit import within
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.units import drawn_banks
+from spikecam_env.gap.world import Shown
+from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.whole import whole_file
+
+Array = NDArray[np.float64]
+
+SHAPE, FRAMES, SEED = (64, 64), 8000, 20
+MODEL = "scsim"
+PEAK = 40.0
+"""Templates are taken where the statistic that shows the effect best is this many noises off."""
+
+FILE = "templates.npz"
+
+
+@dataclass(frozen=True)
+class Template:
+    """parameters: at which `shift` (S,), in noise, was simulated."""
+
+    name: str
+    parameters: dict[str, float]
+    shift: Array
+
+
+@dataclass(frozen=True)
+class Templates:
+    """keys: (S,) of the standard design's statistics.  levels: radiance of its recordings by name; kinds: of them."""
+
+    keys: tuple[Key, ...]
+    levels: dict[str, float]
+    kinds: dict[str, str]
+    entries: tuple[Template, ...]
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A candidate as its template sees it.  start: parameters to fit from.  misfit: what it would leave."""
+
+    name: str
+    start: dict[str, float]
+    misfit: float
+    scale: float
+
+
+def load() -> Templates:
+    """The shipped templates."""
+    with resources.as_file(resources.files("spikecam_env.gap") / FILE) as path, np.load(path) as file:
+        about = json.loads(str(file["about"]))
+        shifts = file["shift"].astype(np.float64)
+    entries = tuple(Template(e["name"], e["parameters"], s) for e, s in zip(about["entries"], shifts, strict=True))
+    return Templates(tuple(Key(*k) for k in about["keys"]), about["levels"], about["kinds"], entries)
+
+
+def screen(
+    templates: Templates, conditions: Sequence[Shown], null: Null, measured: Array, names: Sequence[str]
+) -> list[Screened]:
+    """Candidates by what their best template, scaled, would leave unexplained; least first."""
+    at = _places(templates, conditions, null.keys)
+    d = np.nan_to_num((measured - null.mean) / null.noise)
+    best: dict[str, Screened] = {}
+    for entry in templates.entries:
+        if entry.name not in names:
+            continue
+        shift = np.where(at >= 0, entry.shift[at], 0.0)
+        scale = _scale(d, shift)
+        strength = CATALOGUE[entry.name].strength
+        power = 2.0 if candidate(entry.name).square else 1.0
+        if scale <= 0 and not _signed(entry.name):
+            continue
+        rho = (d - scale * shift) / np.sqrt(1.0 + (2 * TOLERANCE * scale * shift) ** 2)
+        start = {**entry.parameters, strength: entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)}
+        now = Screened(entry.name, bounded(entry.name, start), misfit(rho), scale)
+        if entry.name not in best or now.misfit < best[entry.name].misfit:
+            best[entry.name] = now
+    return sorted(best.values(), key=lambda s: s.misfit)
+
+
+def _signed(name: str) -> bool:
+    f = CATALOGUE[name].__dataclass_fields__[CATALOGUE[name].strength]
+    return bool(f.metadata["bounds"] and f.metadata["bounds"][0] < 0)
+
+
+def _scale(d: Array, shift: Array) -> float:
+    scale = 0.0
+    for _ in range(12):
+        noise2 = 1.0 + (2 * TOLERANCE * scale * shift) ** 2
+        w = (HEAVY + 1) / (HEAVY + (d - scale * shift) ** 2 / noise2) / noise2
+        scale = float(np.sum(w * shift * d) / max(np.sum(w * shift**2), 1e-12))
+    return scale
+
+
+def _places(templates: Templates, conditions: Sequence[Shown], keys: Sequence[Key]) -> NDArray[np.int64]:
+    """Where in the templates each statistic stands: on the recording of its kind whose level is nearest; -1 nowhere."""
+    nearest: dict[str, str] = {}
+    for c in conditions:
+        kind = "flat" if c.kind in ("picture", "unknown") else c.kind
+        same = [n for n, k in templates.kinds.items() if k == kind]
+        if not same:
+            continue
+        level = c.level if c.level > 0 else 0.1
+        byname = [n for n in same if n == c.name]
+        nearest[c.name] = (byname or [min(same, key=lambda n: abs(np.log(max(templates.levels[n], 1e-6) / level)))])[0]
+    index = {k: i for i, k in enumerate(templates.keys)}
+    return np.array([index.get(Key(k.group, nearest.get(k.recording, ""), k.name), -1) for k in keys])
+
+
+def build(folder: Path, *, jobs: int = 1, only: Sequence[str] | None = None) -> Templates:
+    """Simulate every template; one small file an entry in `folder`, so that a build that was stopped goes on."""
+    folder.mkdir(parents=True, exist_ok=True)
+    case, model, null = standard_case(jobs)
+    entries = []
+    todo = [(n, p) for n in CATALOGUE if n in (only or CATALOGUE) for p in starts(n)]
+    for name, parameters in tqdm(todo, "templates", unit="template"):
+        label = "-".join([name, *(f"{k}={v:g}" for k, v in parameters.items() if k != CATALOGUE[name].strength)])
+        path = folder / f"{label}.npz"
+        if not path.exists():
+            entry = _simulated(case, model, null, name, parameters)
+            with whole_file(path) as beside:
+                np.savez(open(beside, "wb"), parameters=json.dumps(entry.parameters), shift=entry.shift)
+        with np.load(path) as file:
+            entries.append(Template(name, json.loads(str(file["parameters"])), file["shift"]))
+    levels = {c.name: c.level for c in case.conditions}
+    kinds = {c.name: c.kind for c in case.conditions}
+    return Templates(null.keys, levels, kinds, tuple(entries))
+
+
+def save(templates: Templates, path: Path) -> None:
+    """Write them whole, in half precision."""
+    about: dict[str, Any] = {
+        "keys": templates.keys,
+        "levels": templates.levels,
+        "kinds": templates.kinds,
+        "entries": [{"name": e.name, "parameters": e.parameters} for e in templates.entries],
+    }
+    shift = np.clip([e.shift for e in templates.entries], -6e4, 6e4).astype(np.float16)
+    with whole_file(path) as beside:
+        np.savez_compressed(open(beside, "wb"), about=json.dumps(about), shift=shift)
+
+
+def standard_case(jobs: int = 1, seed: int = SEED, count: int = 12) -> tuple[Case, SensorModel, Null]:
+    """A unit of the standard model in the standard design, as a measurement, and what its model predicts."""
+    from spikecam_env.gap.campaign import standard_design
+    from spikecam_env.gap.world import planned
+
+    model = SensorModel.preset(MODEL)
+    conditions = planned(standard_design(), SHAPE, FRAMES)
+    unit = model.draw_unit(SHAPE, seed)
+    base = unit_as_base(unit)
+    case = case_of(SHAPE, conditions, simulate(model, base, conditions, SHAPE, seed), seed, jobs)
+    return case, model, model_null(case, model, count)
+
+
+def unit_as_base(unit: Any) -> Any:
+    """A drawn unit in the refit's terms."""
+    from spikecam_env.gap.refit import BaseFit
+
+    white = float(np.mean((1 / unit.electrons if unit.shot else 0.0) + unit.kappa**2))
+    zero = np.zeros_like(unit.gain)
+    return BaseFit(unit.gain, unit.dark, zero, zero, white, np.zeros((0, unit.gain.size)), unit.gain > 0)
+
+
+def model_null(case: Case, model: SensorModel, count: int) -> Null:
+    """What a model predicts for a case: twins of its unit, and drawn units for the pattern."""
+    base = within(model, case.base)
+    drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
+    banks = [{**t.bank, **d} for t, d in zip(twins(case, model, base, count), drawn, strict=False)]
+    null = null_of(banks, list(case.bank))
+    values = np.array([[d.get(k, np.nan) for k in null.keys] for d in drawn])
+    of_pattern = np.array([k.group == "pattern" for k in null.keys])
+    return Null(
+        null.keys,
+        np.where(of_pattern, values.mean(axis=0), null.mean),
+        np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
+        null.floor,
+        count,
+    )
+
+
+def starts(name: str) -> list[dict[str, float]]:
+    """Parameters to take templates at: the default strength, every combination of shapes."""
+    if name in NOISE_OF_A_RESET:
+        return []
+    shapes = candidate(name).shapes
+    default = {CATALOGUE[name].strength: CATALOGUE[name]().parameters()[CATALOGUE[name].strength]}
+    extra = {k: CATALOGUE[name]().parameters()[k] for k in candidate(name).fitted}
+    return [{**extra, **default, **dict(zip(shapes, values, strict=True))} for values in product(*shapes.values())]
+
+
+def _simulated(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Template:
+    strength = CATALOGUE[name].strength
+    power = 2.0 if candidate(name).square else 1.0
+    now = bounded(name, parameters)
+    shift = _shift(case, model, null, name, now, 1)
+    for _ in range(4):
+        peak = float(np.abs(shift).max())
+        if 0.6 * PEAK < peak < 1.7 * PEAK:
+            break
+        factor = np.clip((PEAK / max(peak - 3.0, 0.3)) ** (1 / power), 1e-3, 30.0)
+        then = bounded(name, {**now, strength: now[strength] * factor})
+        if then == now:
+            break
+        now = then
+        shift = _shift(case, model, null, name, now, 1)
+    return Template(name, now, _shift(case, model, null, name, now, 3))
+
+
+def _shift(
+    case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float], count: int
+) -> Array:
+    there = with_effect(model, name, parameters)
+    if is_pattern(name):
+        mean = with_pattern(case, there, null, null.mean)
+    else:
+        mean, _ = predict(case, there, within(there, case.base), null, count, 100)
+    return np.nan_to_num((mean - null.mean) / null.noise)
+
+
+if __name__ == "__main__":
+    import sys
+
+    out = Path(sys.argv[1] if len(sys.argv) > 1 else "out/templates")
+    made = build(out)
+    save(made, Path(__file__).with_name(FILE))
+    print(f"{len(made.entries)} templates of {len(CANDIDATES)} candidates, {len(made.keys)} statistics")

@@ -1,0 +1,82 @@
+"""Compiled helpers over spike bits: from frames of pixels to the spike times of each pixel.
+
+64 frames of 64 pixels are a square of bits; transposed, a word holds 64 frames of one pixel, and its set bits are that
+pixel's spikes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+_Q = np.uint64
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def ones(typing_context: Any, word: Any) -> Any:
+    """Number of set bits of a uint64."""
+    return types.uint64(types.uint64), lambda context, builder, signature, args: builder.ctpop(args[0])
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def lowest(typing_context: Any, word: Any) -> Any:
+    """Position of the lowest set bit of a uint64 that is not zero."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
+
+    return types.uint64(types.uint64), build
+
+
+def as_words(packed: NDArray[np.uint8]) -> NDArray[np.uint64]:
+    """(F, bytes) bits as (F, ceil(bytes / 8)) words, pixel p bit p % 64 of word p // 64."""
+    short = -packed.shape[1] % 8
+    whole = np.pad(packed, ((0, 0), (0, short))) if short else np.ascontiguousarray(packed)
+    return whole.view(np.uint64)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def transpose(square: NDArray[np.uint64]) -> None:
+    """Transpose (64,) words of 64 bits in place: bit i of word j becomes bit j of word i."""
+    width, mask = 32, _Q(0x00000000FFFFFFFF)
+    while width:
+        shift = _Q(width)
+        for half in range(0, 64, 2 * width):
+            for i in range(half, half + width):
+                t = ((square[i] >> shift) ^ square[i + width]) & mask
+                square[i] ^= t << shift
+                square[i + width] ^= t
+        width >>= 1
+        mask ^= mask << _Q(width)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def by_pixel(words: NDArray[np.uint64], column: int, out: NDArray[np.uint64]) -> None:
+    """The 64 pixels of a column of words (F, n): out (64, ceil(F / 64)), frame f is bit f % 64 of word f // 64."""
+    frames = words.shape[0]
+    square = np.empty(64, np.uint64)
+    for block in range(out.shape[1]):
+        first = 64 * block
+        for f in range(64):
+            square[f] = words[first + f, column] if first + f < frames else _Q(0)
+        transpose(square)
+        for p in range(64):
+            out[p, block] = square[p]
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def times_of(bits: NDArray[np.uint64], times: NDArray[np.int32]) -> int:
+    """Frames (n,) of one pixel's spikes into `times`, given its bits (ceil(F / 64),); returns n."""
+    n = 0
+    for block in range(bits.size):
+        word = bits[block]
+        while word:
+            times[n] = 64 * block + np.int32(lowest(word))
+            n += 1
+            word &= word - _Q(1)
+    return n
