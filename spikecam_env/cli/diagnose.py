@@ -32,7 +32,7 @@ class Diagnose:
     seed: int = 0
     """Of every simulation; the same seed gives the same result."""
     jobs: int = 1
-    """Processes that simulate at a time."""
+    """Simulations at a time."""
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder
@@ -45,7 +45,7 @@ class Diagnose:
             raise InputError(f"{self.campaign} is no campaign: there is no campaign.json in it")
         SensorModel.load(self.model)
         self._known_effects()
-        from spikecam_env.gap import diagnose  # type: ignore[attr-defined]
+        from spikecam_env.gap.diagnose import diagnose
         from spikecam_env.gap.report import write_report
 
         folder = out_folder(self.out)

@@ -17,9 +17,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.case import Case
 from spikecam_env.gap.observe import Observation
+from spikecam_env.gap.refit import BaseFit, measured_base
 from spikecam_env.gap.result import Evidence
+from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.units import drawn
 from spikecam_env.gap.world import Shown
+from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.floating[Any]]
 
@@ -71,6 +76,34 @@ class Take(NamedTuple):
     before: Observation
     after: Observation | None
     again: Observation | None
+
+
+def evidence_of(
+    case: Case, before: SensorModel, base: BaseFit, after: SensorModel | None = None, after_base: BaseFit | None = None
+) -> Evidence:
+    """What the report draws of a case: two twins of the model before, one of the patched model, fresh units of both.
+
+    base, after_base: the units to simulate under each.  after: None where nothing was added.
+    """
+
+    def twin(model: SensorModel, unit: BaseFit, number: int) -> tuple[Observation, ...]:
+        return tuple(simulate(model, unit, case.conditions, case.shape, case.seed * 1000 + 900 + number))
+
+    unit = after_base or base
+    first, again = twin(before, base, 0), twin(before, base, 1)
+    last = twin(after, unit, 2) if after else None
+    return Evidence(
+        conditions=case.conditions,
+        measured=case.observations,
+        before=first,
+        after=last,
+        measured_base=case.base,
+        before_base=measured_base(list(first), list(case.conditions)),
+        after_base=measured_base(list(last), list(case.conditions)) if last else None,
+        again=again,
+        drawn_before=drawn(before, case.base, case.shape, case.seed),
+        drawn_after=drawn(after, case.base, case.shape, case.seed) if after else None,
+    )
 
 
 def shape_of(evidence: Evidence) -> tuple[int, int] | None:

@@ -194,7 +194,7 @@ def _effect_summary(name: str) -> Iterator[str]:
 def _parameter_row(effect: str, name: str, e: Estimate) -> tuple[str, ...]:
     unit = unit_of(effect, name)
     half = CONFIDENCE * e.sd
-    interval = f"{quantity(e.value - half, unit)} … {quantity(e.value + half, unit)}"
+    interval = f"{quantity(e.value - half, unit)} … {quantity(e.value + half, unit)}" if half > 0 else "–"
     return bare(effect, name), quantity(e.value, unit, e.sd), interval, meaning_of(effect, name)
 
 
@@ -263,7 +263,7 @@ def _gap(d: Diagnosis) -> Iterator[str]:
         return
     yield element("p", gap_line(d.gap))
     caption = (
-        "Mean square distance of held-out statistics from the model, in units of their noise. Orange: model as given; "
+        "Mean square distance of statistics from the model, in units of their noise. Orange: model as given; "
         "blue: patched; grey: floor, by how much two halves of the measurement differ."
     )
     yield f'<div class="single">{captioned(picture(plots.gap_bars(d.gap), "Gap by recording"), caption)}</div>'
@@ -367,12 +367,12 @@ def _candidates(d: Diagnosis) -> Iterator[str]:
         return
     yield element(
         "p",
-        "Each candidate was fitted with the unit's own parameters free. Misfit: root mean square of what it leaves, in "
-        "noise; 1 is a perfect model. The gate simulates the fitted model anew and looks at its worst group.",
+        "Each candidate was fitted with the unit's own parameters free. Misfit: how far what it leaves is from noise; "
+        "the smaller the better. The gate simulates the fitted model anew and looks at its worst group.",
     )
     rows = [
-        (human(r.name), f"{r.misfit_before:.2f}", f"{r.misfit:.2f}", sizes(r.parameters, r.name),
-         ("accepted: " if r.accepted else "rejected: ") + r.reason)
+        (human(r.name), _number(r.misfit_before), _number(r.misfit), sizes(r.parameters, r.name),
+         ": ".join(filter(None, ("accepted" if r.accepted else "rejected", r.reason))))
         for r in d.ranking
     ]  # fmt: skip
     classes = ["accepted" if r.accepted else "" for r in d.ranking]

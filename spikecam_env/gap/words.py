@@ -7,7 +7,7 @@ import inspect
 import math
 
 from spikecam_env.errors import InputError
-from spikecam_env.gap.result import Estimate, Gap, NamedEffect
+from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.catalogue_page import Sheet
 
@@ -27,7 +27,7 @@ VERDICTS = {
 
 def human(name: str) -> str:
     """A name of the catalogue in plain words."""
-    return name.replace("_", " ")
+    return "IR drop" if name == "ir_drop" else name.replace("_", " ")
 
 
 def unit_of(effect: str, parameter: str) -> str:
@@ -109,14 +109,57 @@ def bare(effect: str, parameter: str) -> str:
     return human(parameter[: -len(ending)] if unit and parameter.lower().endswith(ending) else parameter)
 
 
-def sentence(effects: tuple[NamedEffect, ...], gap: Gap | None) -> str:
-    """The verdict on named effects: what, how large, and how much of the gap goes with it."""
-    named = " and ".join(f"{human(e.name)} ({_plain_sizes(e)})" if e.parameters else human(e.name) for e in effects)
-    removed = ""
-    if gap and math.isfinite(gap.removed):
-        them = "it" if len(effects) == 1 else "them"
-        removed = f"; adding {them} removes {100 * gap.removed:.0f} % of the gap on recordings that were not used"
-    return f"Your camera has {named}{removed}."
+def sentence(d: Diagnosis) -> str:
+    """The verdict in one sentence, from the rest of a diagnosis."""
+    return _SENTENCES[d.verdict](d)
+
+
+def _none(d: Diagnosis) -> str:
+    return f"No gap: these recordings and the model {d.model_name} agree to within the noise."
+
+
+def _named(d: Diagnosis) -> str:
+    named = [f"{human(e.name)} ({_plain_sizes(e)})" if e.parameters else human(e.name) for e in d.effects]
+    return f"Your camera has {_joined(named, 'and')}{_removed(d.gap, 'it' if len(named) == 1 else 'them')}."
+
+
+def _class(d: Diagnosis) -> str:
+    members = [human(str(name)) for name in (d.class_ or {}).get("members", ())]
+    return f"Your camera has {_joined(members, 'or')}: these recordings cannot tell which{_removed(d.gap, 'either')}."
+
+
+def _unknown(d: Diagnosis) -> str:
+    least = _removed(d.gap, "an empirical patch")
+    return f"Your camera does something that no candidate explains{least}."
+
+
+def _parameter(d: Diagnosis) -> str:
+    return f"No effect is missing, but {_joined(list(d.parameters), 'and')} of the model {d.model_name} is off."
+
+
+def _data(d: Diagnosis) -> str:
+    said = d.data[0].rstrip(".") if d.data else "see the notes"
+    return f"The recordings contradict their own labels: {said}."
+
+
+_SENTENCES = {
+    "none": _none,
+    "named": _named,
+    "class": _class,
+    "unknown": _unknown,
+    "parameter": _parameter,
+    "data": _data,
+}
+
+
+def _removed(gap: Gap | None, what: str) -> str:
+    if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
+        return ""
+    return f"; adding {what} removes {100 * gap.removed:.0f} % of the gap on recordings that were not used"
+
+
+def _joined(names: list[str], last: str) -> str:
+    return f" {last} ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
 def _plain_sizes(effect: NamedEffect) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 from pathlib import Path
 
 import made_up
 import pytest
 
-import spikecam_env.gap
 from spikecam_env.cli.diagnose import summary
 from spikecam_env.cli.main import run
 
@@ -24,7 +24,7 @@ def campaign(tmp_path: Path, monkeypatch) -> Path:
         asked.update(campaign=campaign, model=model, **options)
         return made_up.named()
 
-    monkeypatch.setattr(spikecam_env.gap, "diagnose", diagnose, raising=False)
+    monkeypatch.setattr(import_module("spikecam_env.gap.diagnose"), "diagnose", diagnose)
     monkeypatch.setattr(made_up, "ASKED", asked, raising=False)
     return folder
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import made_up
 import pytest
 
@@ -33,11 +35,26 @@ def test_every_parameter_of_the_catalogue_has_a_plain_name_and_a_unit_in_words()
     assert bare("light_flicker", "frequency_hz") == "frequency"
 
 
-def test_the_sentence_names_the_effect_its_size_and_what_it_removes() -> None:
+@pytest.mark.parametrize(
+    "verdict, said",
+    [
+        ("none", "No gap: these recordings and the model scsim agree to within the noise."),
+        ("named", "Your camera has photodiode lag (fraction 6.12 %, tau 1.22 ms); adding it removes 97 % of the gap on "
+         "recordings that were not used."),
+        ("class", "Your camera has photo response nonlinearity or IR drop: these recordings cannot tell which; adding "
+         "either removes 97 % of the gap on recordings that were not used."),
+        ("unknown", "Your camera does something that no candidate explains; adding an empirical patch removes 79 % of "
+         "the gap on recordings that were not used."),
+        ("parameter", "No effect is missing, but shot_noise.quanta of the model scsim is off."),
+        ("data", "The recordings contradict their own labels: flat-300: rates are 2.1 % (31 sd) above the line through "
+         "the other flats; its label fits 0.3063."),
+    ],
+)  # fmt: skip
+def test_a_sentence_says_the_verdict(verdict: str, said: str) -> None:
+    assert sentence(made_up.EVERY[verdict]()) == said
+
+
+def test_two_effects_are_named_together() -> None:
     d = made_up.named()
-    said = sentence(d.effects, d.gap)
-    print(said)
-    assert said == (
-        "Your camera has photodiode lag (fraction 6.12 %, tau 1.22 ms); adding it removes 97 % of the gap on "
-        "recordings that were not used."
-    )
+    both = replace(d, effects=(*d.effects, *made_up.named("dead_time").effects))
+    assert "1.22 ms) and dead time (tau 1.02 us); adding them removes" in sentence(both)
