@@ -140,11 +140,11 @@ def strip(statistics: Sequence[Statistic]) -> Figure:
         return figure
 
 
-def gap_bars(gap: Gap) -> Figure:
-    """Gap of every held-out recording before and after, and the floor."""
-    names = list(gap.by_recording)
-    rows = [*gap.by_recording.values(), {"before": gap.before, "after": gap.after, "floor": gap.floor}]
-    names.append("all held out")
+def gap_bars(gap: Gap, recordings: Sequence[str]) -> Figure:
+    """Gap of these recordings and of all that are held out, before and after, and the floor."""
+    rows = [gap.by_recording[name] for name in recordings]
+    rows.append({"before": gap.before, "after": gap.after, "floor": gap.floor})
+    names = [*recordings, "all held out"]
     y = -np.arange(len(rows), dtype=np.float64)
     with mpl.rc_context(_FONTS):
         figure, axis = _plot(0.7 + 0.5 * len(rows), names, top=0.08)
@@ -157,10 +157,10 @@ def gap_bars(gap: Gap) -> Figure:
             axis.barh(y + up, np.maximum(widths - left, 0), left=left, height=0.25, color=colour)
             for at, value in zip(y + up, widths, strict=True):
                 if np.isfinite(value):
-                    axis.annotate(f"{value:.3g}", (max(value, left), at), (3, 0), textcoords="offset points",
+                    axis.annotate(f"{value:.3g}" if value < 1000 else f"{value:.0f}", (max(value, left), at), (3, 0), textcoords="offset points",
                                   va="center", fontsize=8)  # fmt: skip
         axis.set_xscale("log")
-        axis.set_xlim(left, 1.6 * max(values, default=1.0))
+        axis.set_xlim(left, max(values, default=1.0) * (max(values, default=1.0) / left) ** 0.15)
         axis.xaxis.set_major_formatter(_plain)
         axis.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
         axis.set_yticks(y, names)

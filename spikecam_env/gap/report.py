@@ -266,13 +266,16 @@ def _gap(d: Diagnosis) -> Iterator[str]:
         "Mean square distance of statistics from the model, in units of their noise. Orange: model as given; "
         "blue: patched; grey: floor, by how much two halves of the measurement differ."
     )
-    yield f'<div class="single">{captioned(picture(plots.gap_bars(d.gap), "Gap by recording"), caption)}</div>'
+    use = {c.name: c.use for c in d.evidence.conditions} if d.evidence else {}
+    held = [name for name in d.gap.by_recording if use.get(name, "holdout") == "holdout"]
+    drawn = picture(plots.gap_bars(d.gap, held), "Gap by recording")
+    yield f'<div class="single">{captioned(drawn, caption)}</div>'
     rows = [
-        (name, *(_number(row.get(key)) for key in ("before", "after", "floor")))
+        (name, use.get(name, ""), *(_number(row.get(key)) for key in ("before", "after", "floor")))
         for name, row in d.gap.by_recording.items()
     ]
-    rows.append(("all held out", *map(_number, (d.gap.before, d.gap.after, d.gap.floor))))
-    yield table(("recording", "before", "after", "floor"), rows, numbers=(1, 2, 3))
+    rows.append(("all held out", "", *map(_number, (d.gap.before, d.gap.after, d.gap.floor))))
+    yield table(("recording", "use", "before", "after", "floor"), rows, numbers=(2, 3, 4))
 
 
 # --- evidence

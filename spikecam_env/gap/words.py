@@ -93,7 +93,7 @@ def gap_line(gap: Gap) -> str:
     said = f"On recordings kept out of the fit, {off}; two halves of the measurement differ by {gap.floor:.3g}."
     if not math.isfinite(gap.removed) or gap.before <= 1.2 * gap.floor:
         return said
-    removed = f"{100 * gap.removed:.0f} % of the gap is removed"
+    removed = f"{100 * min(gap.removed, 1.0):.0f} % of the gap is removed"
     return f"{said} With the patched model they are {gap.after:.3g} off: {removed}."
 
 
@@ -155,7 +155,7 @@ _SENTENCES = {
 def _removed(gap: Gap | None, what: str) -> str:
     if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
         return ""
-    return f"; adding {what} removes {100 * gap.removed:.0f} % of the gap on recordings that were not used"
+    return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on recordings that were not used"
 
 
 def _joined(names: list[str], last: str) -> str:

@@ -16,6 +16,7 @@ import pytest
 
 from spikecam_env.gap.exhibits import by_loudness, exhibits
 from spikecam_env.gap.exhibits.spectrum import averaged
+from spikecam_env.gap.exhibits.step import free_window
 from spikecam_env.gap.report import command_of, report, write_report
 from spikecam_env.gap.result import VERDICTS
 from spikecam_env.gap.words import quantity
@@ -185,6 +186,12 @@ def test_recordings_without_spikes_or_labels_leave_out_what_they_cannot_show() -
     print([(x.name, [p.title for p in x.panels]) for x in left])
     assert {x.name for x in left} == {"rates", "pattern"}
     Page(report(replace(d, evidence=e)))
+
+
+def test_a_window_around_an_edge_holds_no_other() -> None:
+    assert free_window([499, 999], 1500) == (64, 320)
+    assert free_window([100, 300, 500], 1500) == (64, 192)
+    assert free_window([499], 1500) == (64, 320)
 
 
 def test_the_spectrum_of_independent_spikes_is_flat_at_one() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +16,7 @@ TITLE = "After a step of light"
 CAPTION = "The array's rate around sudden changes of light. A tail after the step is lag; an offset is not."
 
 _BIN, _BEFORE, _AFTER = 8, 64, 320
-"""Frames: of a bin, and shown before and after an edge."""
+"""Frames: of a bin, and at most shown before and after an edge."""
 
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
@@ -24,11 +25,12 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         edges = edges_of(uniform_light(t.shown))
         for name, sign in (("rise", 1), ("fall", -1)):
             mine = [frame for frame, height in edges if height * sign > 0]
-            if not mine:
+            window = free_window([frame for frame, _ in edges], t.measured.frames)
+            if not mine or window[1] < 4 * _BIN:
                 continue
-            x, measured = around(t.measured, mine)
-            before = around(t.before, mine)[1]
-            after = around(t.after, mine)[1].mean(axis=1) if t.after else None
+            x, measured = around(t.measured, mine, window)
+            before = around(t.before, mine, window)[1]
+            after = around(t.after, mine, window)[1].mean(axis=1) if t.after else None
             ms = x * 1e3 / frame_rate_hz
             sd = (measured - before).std(axis=1) / np.sqrt(measured.shape[1])
             rates = Panel(f"Rate around a {name} ({t.shown.name})", f"time from the {name} [ms]", "spikes a frame", ms,
@@ -43,9 +45,18 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             )  # fmt: skip
 
 
-def around(observation: Observation, edges: Sequence[int]) -> tuple[Array, Array]:
-    """Middles of bins from an edge on [frames] and, mean over edges, spikes a frame of a pixel (bins, W columns)."""
-    bins = np.arange(-_BEFORE, _AFTER, _BIN)
+def free_window(edges: Sequence[int], frames: int) -> tuple[int, int]:
+    """Frames before and after an edge within which there is no other, whole bins."""
+    gap = min((b - a for a, b in pairwise(edges)), default=frames) - 2
+    return min(_BEFORE, gap // 2 // _BIN * _BIN), min(_AFTER, gap // _BIN * _BIN)
+
+
+def around(observation: Observation, edges: Sequence[int], window: tuple[int, int]) -> tuple[Array, Array]:
+    """Middles of bins from an edge on [frames] and, mean over edges, spikes a frame of a pixel (bins, W columns).
+
+    window: frames before and after an edge.
+    """
+    bins = np.arange(-window[0], window[1], _BIN)
     total = np.zeros((bins.size, observation.shape[1]))
     seen = np.zeros((bins.size, 1))
     for edge in edges:
