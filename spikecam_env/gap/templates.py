@@ -23,7 +23,7 @@ from tqdm import tqdm
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.case import Case, case_of, twins
 from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, null_of
-from spikecam_env.gap.fit import UNITS, bounded, predict, with_effect, with_pattern
+from spikecam_env.gap.fit import UNITS, bounded, concerned, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twin import simulate
@@ -219,28 +219,36 @@ def _simulated(case: Case, model: SensorModel, null: Null, name: str, parameters
     strength = CATALOGUE[name].strength
     power = 2.0 if candidate(name).square else 1.0
     now = bounded(name, parameters)
-    shift = _shift(case, model, null, name, now, 1)
+    only: list[int] | None = None
+    shift = _shift(case, model, null, name, now, 1, only)
     for _ in range(4):
         peak = float(np.abs(shift).max())
-        if 0.6 * PEAK < peak < 1.7 * PEAK:
+        if 0.5 * PEAK < peak < 2.5 * PEAK:
             break
         factor = np.clip((PEAK / max(peak - 3.0, 0.3)) ** (1 / power), 1e-3, 30.0)
         then = bounded(name, {**now, strength: now[strength] * factor})
         if then == now:
             break
         now = then
-        shift = _shift(case, model, null, name, now, 1)
-    return Template(name, now, _shift(case, model, null, name, now, 3))
+        only = concerned(case, null, shift * null.noise * factor**power)
+        shift = _shift(case, model, null, name, now, 1, only)
+    return Template(name, now, shift)
 
 
 def _shift(
-    case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float], count: int
+    case: Case,
+    model: SensorModel,
+    null: Null,
+    name: str,
+    parameters: Mapping[str, float],
+    count: int,
+    only: Sequence[int] | None,
 ) -> Array:
     there = with_effect(model, name, parameters)
     if is_pattern(name):
         mean = with_pattern(case, there, null, null.mean)
     else:
-        mean, _ = predict(case, there, within(there, case.base), null, count, 100)
+        mean, _ = predict(case, there, within(there, case.base), null, count, 100, only)
     return np.nan_to_num((mean - null.mean) / null.noise)
 
 
