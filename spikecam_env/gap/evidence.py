@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.observe import Observation
@@ -154,13 +155,17 @@ def loudest(panels: Sequence[Panel], number: int) -> list[Panel]:
 
 
 def scaled(sd: Array, difference: Array | None) -> Array:
-    """Standard errors times a factor such that the difference of two twins of one model has a root mean square of 1."""
+    """Standard errors times the root mean square of two twins' difference over them.
+
+    Few points know that scale poorly: its upper 90 % limit is taken.
+    """
     if difference is None:
         return sd
     known = (sd > 0) & np.isfinite(difference)
     if known.sum() < 3:
         return sd
-    return sd * float(np.sqrt(np.mean((difference[known] / sd[known]) ** 2)))
+    square = float(np.sum((difference[known] / sd[known]) ** 2))
+    return sd * np.sqrt(square / stats.chi2.ppf(0.1, int(known.sum()) - 1))
 
 
 def by_recording(found: Sequence[Take], of: Callable[[Observation], Array]) -> tuple[Array, Array, Array | None, Array]:

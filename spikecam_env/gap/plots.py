@@ -157,7 +157,7 @@ def gap_bars(gap: Gap, recordings: Sequence[str]) -> Figure:
             axis.barh(y + up, np.maximum(widths - left, 0), left=left, height=0.25, color=colour)
             for at, value in zip(y + up, widths, strict=True):
                 if np.isfinite(value):
-                    axis.annotate(f"{value:.3g}" if value < 1000 else f"{value:.0f}", (max(value, left), at), (3, 0), textcoords="offset points",
+                    axis.annotate(_short(value), (max(value, left), at), (3, 0), textcoords="offset points",
                                   va="center", fontsize=8)  # fmt: skip
         axis.set_xscale("log")
         axis.set_xlim(left, max(values, default=1.0) * (max(values, default=1.0) / left) ** 0.15)
@@ -166,3 +166,7 @@ def gap_bars(gap: Gap, recordings: Sequence[str]) -> Figure:
         axis.set_yticks(y, names)
         axis.set(xlabel="mean square distance, in noise")
         return figure
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
