@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
-import io
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -14,21 +11,11 @@ from numpy.typing import NDArray
 
 from spikecam_env.calibration.population import FLAGS
 from spikecam_env.calibration.snee import Calibration, Setting
+from spikecam_env.page import captioned, element, page, picture, table
 from spikecam_env.version import __version__
 
 if TYPE_CHECKING:
     from spikecam_env.calibration.findings import Finding
-
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: #222 }
-h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-top: 2em }
-table { border-collapse: collapse; margin: .7em 0 }
-td, th { padding: .25em .8em; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top }
-td.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap }
-img { max-width: 100% } figure { margin: 1em 0 } figcaption { color: #555 }
-.identified { color: #14663a } .assumed { color: #8a5a00 } .not { color: #9a1c1c }
-.warn { background: #fff4d6; padding: .5em 1em }
-"""
 
 
 def report(calibration: Calibration, findings: Sequence[Finding]) -> str:
@@ -36,12 +23,15 @@ def report(calibration: Calibration, findings: Sequence[Finding]) -> str:
     c = calibration
     rows, columns = c.shape
     parts = [
-        f"<h1>Calibration of {html.escape(c.campaign)}</h1>",
-        f"<p>{rows} × {columns} pixels at {c.frame_rate_hz:g} Hz; "
-        + "; ".join(f"{len(s.levels)} recordings{_at(s)}" for s in c.settings)
-        + f". {int(np.sum(c.flags == 0))} of {c.flags.size} pixels regular. spikecam-env {__version__}.</p>",
-        *(f'<p class="warn">{html.escape(w)}</p>' for w in c.warnings),
-        "<h2>What these data identify</h2>",
+        element("h1", f"Calibration of {c.campaign}"),
+        element(
+            "p",
+            f"{rows} × {columns} pixels at {c.frame_rate_hz:g} Hz; "
+            + "; ".join(f"{len(s.levels)} recordings{_at(s)}" for s in c.settings)
+            + f". {int(np.sum(c.flags == 0))} of {c.flags.size} pixels regular. spikecam-env {__version__}.",
+        ),
+        *(element("p", w, class_="warn") for w in c.warnings),
+        element("h2", "What these data identify"),
         _findings_table(findings),
     ]
     figures: list[tuple[str, Callable[[Figure, Setting, Calibration], None], tuple[float, float], str]] = [
@@ -59,15 +49,14 @@ def report(calibration: Calibration, findings: Sequence[Finding]) -> str:
         for title, draw, size, caption in figures:
             if title == "Temporal noise" and setting.jitter is None:
                 continue
-            parts += [f"<h2>{title}{_at(setting)}</h2>", _figure(draw, setting, c, size, caption)]
-        parts += [f"<h2>Recordings{_at(setting)}</h2>", _levels_table(setting)]
+            parts += [element("h2", title + _at(setting)), _figure(draw, setting, c, size, caption)]
+        parts += [element("h2", f"Recordings{_at(setting)}"), _levels_table(setting)]
     if c.swing_V is not None:
-        parts += ["<h2>V_S</h2>", _figure(_swing, c.main, c, (10, 3.6), "V_d + V_S of every pixel, from two V_d.")]
-    body = "\n".join(parts)
-    return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Calibration of {html.escape(c.campaign)}'
-        f"</title><style>{_STYLE}</style></head><body>{body}</body></html>\n"
-    )
+        parts += [
+            element("h2", "V_S"),
+            _figure(_swing, c.main, c, (10, 3.6), "V_d + V_S of every pixel, from two V_d."),
+        ]
+    return page(f"Calibration of {c.campaign}", parts)
 
 
 def _at(setting: Setting) -> str:
@@ -75,25 +64,18 @@ def _at(setting: Setting) -> str:
 
 
 def _findings_table(findings: Sequence[Finding]) -> str:
-    lines = [
-        f'<tr><td>{html.escape(f.quantity)}</td><td class="{f.status.split()[0]}">{f.status}</td>'
-        f'<td class="n">{f.text}</td><td>{html.escape(f.unit)}</td><td>{html.escape(f.basis)}</td></tr>'
-        for f in findings
-    ]
-    head = "<tr><th>quantity</th><th>status</th><th>value (90 %)</th><th>unit</th><th>from</th></tr>"
-    return f"<table>{head}{''.join(lines)}</table>"
+    head = ("quantity", "status", "value (90 %)", "unit", "from")
+    rows = [(f.quantity, f.status, f.text, f.unit, f.basis) for f in findings]
+    return table(head, rows, numbers=(2,), classes=[f.status.split()[0] for f in findings])
 
 
 def _levels_table(setting: Setting) -> str:
-    names = ("recording", "use", "frames", "radiance", "rate", "saturated", "off")
-    head = f"<tr>{''.join(f'<th>{name}</th>' for name in names)}</tr>"
-    lines = [
-        f'<tr><td>{html.escape(v.name)}</td><td>{v.use}</td><td class="n">{v.frames}</td>'
-        f'<td class="n">{v.radiance:.4g}</td><td class="n">{v.rate:.5f}</td>'
-        f'<td class="n">{v.saturated:.1%}</td><td class="n">{_signed(v.residual)}</td></tr>'
+    head = ("recording", "use", "frames", "radiance", "rate", "saturated", "off")
+    rows = [
+        (v.name, v.use, str(v.frames), f"{v.radiance:.4g}", f"{v.rate:.5f}", f"{v.saturated:.1%}", _signed(v.residual))
         for v in setting.levels
     ]
-    return f"<table>{head}{''.join(lines)}</table>"
+    return table(head, rows, numbers=range(2, 7))
 
 
 def _signed(value: float) -> str:
@@ -109,11 +91,7 @@ def _figure(
 ) -> str:
     figure = Figure(figsize=size, layout="constrained")
     draw(figure, setting, calibration)
-    held = io.BytesIO()
-    figure.savefig(held, format="png", dpi=110)
-    data = base64.b64encode(held.getvalue()).decode("ascii")
-    image = f'<img alt="{caption}" src="data:image/png;base64,{data}">'
-    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
+    return captioned(picture(figure, caption, form="png"), caption)
 
 
 def _response(figure: Figure, s: Setting, c: Calibration) -> None:

@@ -14,6 +14,7 @@ from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.campaign import Campaign
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
+from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.record import Record
@@ -37,6 +38,7 @@ COMMANDS: dict[str, Any] = {
     "evaluate": Evaluate,
     "calibrate": Calibrate,
     "campaign": Campaign,
+    "diagnose": Diagnose,
     "effects": Effects,
     "bench": Bench,
 }

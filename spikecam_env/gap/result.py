@@ -97,7 +97,12 @@ class Gap:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the report draws: conditions and observations of the measurement, and of one twin before and after."""
+    """What the report draws: conditions and observations of the measurement, and of one twin before and after.
+
+    again: another twin of the model before, with another seed: what chance alone makes differ.
+    drawn_before, drawn_after: gain and dark (P,) of a fresh unit of each model (`units.drawn`): the fixed pattern to
+    expect, where twins have the measured one.
+    """
 
     conditions: tuple[Shown, ...]
     measured: tuple[Observation, ...]
@@ -106,6 +111,9 @@ class Evidence:
     measured_base: BaseFit
     before_base: BaseFit
     after_base: BaseFit | None
+    again: tuple[Observation, ...] | None = None
+    drawn_before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    drawn_after: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
 
 @dataclass(frozen=True)
@@ -113,6 +121,7 @@ class Diagnosis:
     """The answer.  patched: the model with what was found, or with an empirical patch; loads back as a model.
 
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
+    candidates, exclude: as asked for; None: all of the catalogue.
     """
 
     verdict: str
@@ -132,6 +141,8 @@ class Diagnosis:
     campaign: str
     seed: int
     stages: dict[str, float]
+    candidates: tuple[str, ...] | None = None
+    exclude: tuple[str, ...] = ()
     evidence: Evidence | None = field(default=None, repr=False)
 
     def to_json(self) -> dict[str, Any]:

@@ -66,15 +66,21 @@ def width(values: Array) -> float:
     return float(high - low) / 2 / middle if middle > 0 else 0.0
 
 
-def _bank(
-    model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], seed: int
-) -> dict[Key, float]:
+def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:
+    """gain, dark (P,) of a fresh unit of the model, scaled to the measured unit's medians."""
     unit = model.draw_unit(shape, seed)
-    rng = np.random.default_rng([seed, 1])
     live = base.live & (base.gain > 0)
     gain = unit.gain * (np.median(base.gain[live]) / max(float(np.median(unit.gain)), 1e-12))
     middle = float(np.median(unit.dark))
     dark = unit.dark * (np.median(base.dark[live]) / middle) if middle > 0 else unit.dark
+    return gain, dark
+
+
+def _bank(
+    model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], seed: int
+) -> dict[Key, float]:
+    gain, dark = drawn(model, base, shape, seed)
+    rng = np.random.default_rng([seed, 1])
     found = {}
     for c in shown:
         if c.kind not in ("dark", "flat") or c.light is None:

@@ -110,6 +110,10 @@ class SensorModel:
 
     def to_toml(self, path: str | os.PathLike[str]) -> None:
         """Write the model; the file appears whole and loads back equal."""
+        write_text_whole(Path(path), self.toml())
+
+    def toml(self) -> str:
+        """The model as the text of its file."""
         effects = [{"name": e.name, **e.parameters()} for e in self.effects]
         data = {
             "format": FORMAT,
@@ -118,7 +122,7 @@ class SensorModel:
             "circuit": asdict(self.circuit),
             "effect": effects,
         }
-        write_text_whole(Path(path), tomli_w.dumps(data))
+        return tomli_w.dumps(data)
 
     def with_effect(self, effect: Effect) -> SensorModel:
         """This model with an effect added, or replaced where it has one of that name."""

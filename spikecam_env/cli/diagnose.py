@@ -1,0 +1,115 @@
+"""`spikecam diagnose`: where a model and measured recordings disagree, and which effect is missing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from spikecam_env.gap.result import Diagnosis
+
+
+@dataclass
+class Diagnose:
+    """Find where a model and recordings disagree, name the effect and add it: diagnosis.json, model.toml, report.html.
+
+    example:  spikecam diagnose camera-17 --model scsim --out diagnosed
+    """
+
+    campaign: tyro.conf.Positional[Path]
+    """Folder with a campaign.json (format spikecam-campaign/1)."""
+    out: Path
+    """Folder for the results."""
+    model: str = "scsim"
+    """A preset's name, or a model file (.toml)."""
+    candidates: tuple[str, ...] | None = None
+    """Effects to try; default: all of the catalogue."""
+    exclude: tuple[str, ...] = ()
+    """Effects not to try."""
+    seed: int = 0
+    """Of every simulation; the same seed gives the same result."""
+    jobs: int = 1
+    """Simulations at a time."""
+
+    def run(self) -> None:
+        from spikecam_env.cli.files import out_folder
+        from spikecam_env.errors import InputError
+        from spikecam_env.sensor import SensorModel
+
+        if self.jobs < 1:
+            raise InputError(f"--jobs {self.jobs}: it must be 1 or more")
+        if not (self.campaign / "campaign.json").is_file():
+            raise InputError(f"{self.campaign} is no campaign: there is no campaign.json in it")
+        SensorModel.load(self.model)
+        self._known_effects()
+        from spikecam_env.gap.diagnose import diagnose
+        from spikecam_env.gap.report import write_report
+
+        folder = out_folder(self.out)
+        diagnosis = diagnose(
+            self.campaign,
+            self.model,
+            candidates=self.candidates,
+            exclude=self.exclude,
+            seed=self.seed,
+            jobs=self.jobs,
+            progress=True,
+        )
+        diagnosis.write(folder)
+        write_report(diagnosis, folder / "report.html")
+        print(summary(diagnosis))
+        print(f"\nthe page: {folder / 'report.html'}   the model: {folder / 'model.toml'}")
+
+    def _known_effects(self) -> None:
+        from spikecam_env.errors import unknown_name
+        from spikecam_env.sensor import CATALOGUE
+
+        for name in (*(self.candidates or ()), *self.exclude):
+            if name not in CATALOGUE:
+                raise unknown_name("effect", name, CATALOGUE)
+
+
+def summary(diagnosis: Diagnosis) -> str:
+    """The verdict, what was found with its parameters, and the gap, for a terminal."""
+    from spikecam_env.cli.table import table
+    from spikecam_env.gap.words import gap_line
+
+    parts = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
+    found = _found(diagnosis)
+    if found:
+        parts += ["", table(found)]
+    if diagnosis.class_ and diagnosis.class_.get("experiment"):
+        parts += ["", f"to tell them apart: {diagnosis.class_['experiment']}"]
+    parts += [f"note: {line}" for line in diagnosis.data]
+    if diagnosis.gap:
+        parts += ["", gap_line(diagnosis.gap)]
+    return "\n".join(parts)
+
+
+def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
+    from spikecam_env.gap.words import bare, quantity, unit_of
+
+    rows = [
+        {
+            "effect": e.name,
+            "confidence": f"{e.confidence:.2f}",
+            "parameter": bare(e.name, name),
+            "value": quantity(estimate.value, unit_of(e.name, name), estimate.sd),
+        }
+        for e in diagnosis.effects
+        for name, estimate in e.parameters.items()
+    ]
+    if rows:
+        return rows
+    if diagnosis.parameters:
+        return [{"parameter": name, **values} for name, values in diagnosis.parameters.items()]
+    if diagnosis.verdict == "none":
+        return [
+            {"effect": b.name, "parameter": bare(b.name, b.parameter), "at most (95 %)": quantity(b.below, b.unit)}
+            for b in diagnosis.bounds
+        ]
+    return []
