@@ -10,6 +10,7 @@ from typing import Annotated, Any, Union
 import tyro
 
 from spikecam_env.cli.bench import Bench
+from spikecam_env.cli.blind_trial import BlindTrial
 from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
@@ -34,6 +35,7 @@ COMMANDS: dict[str, Any] = {
     "train": Train,
     "evaluate": Evaluate,
     "calibrate": Calibrate,
+    "blind-trial": BlindTrial,
     "bench": Bench,
 }
 

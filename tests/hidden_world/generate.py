@@ -1,4 +1,7 @@
-"""A campaign by hand:  python -m tests.hidden_world.generate --mechanism dead_time --times-limit 5 --seed 1 --out DIR"""
+"""A campaign by hand.
+
+python -m tests.hidden_world.generate --mechanism dead_time --times-limit 5 --seed 1 --out DIR
+"""
 
 from __future__ import annotations
 

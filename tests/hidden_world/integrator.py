@@ -35,10 +35,12 @@ def _no_events() -> tuple[Whole, Whole, Array]:
 
 @dataclass
 class Physics:
-    """What one recording of one camera goes through: P pixels row by row, T frames; charge in thresholds, times in frames.
+    """What one recording of one camera goes through; charge in thresholds, times in frames.
 
-    gain, dark: (P,) charge a frame at radiance 1, and without light.  quiet: (P,) 1/N, N electrons to a threshold (0: no
-    shot noise).  kappa: (P,) relative noise of a drawn threshold.  per_mv: (P,) thresholds a millivolt.
+    P pixels row by row, T frames.
+
+    gain, dark: (P,) charge a frame at radiance 1, and without light.  quiet: (P,) 1/N, N electrons to a
+    threshold (0: no shot noise).  kappa: (P,) relative noise of a drawn threshold.  per_mv: (P,) thresholds a millivolt.
     key_frame: (K,) whole frames.  key_light: (K, P) or (K, 1) radiance, linear between keys, constant outside.
     *_wave, light_leak, frame_length: (T,), one value a frame, or None.
     """
@@ -133,7 +135,7 @@ class Physics:
 
     @property
     def margin(self) -> float:
-        """Thresholds below its threshold from which no noise of a frame makes a pixel fire (seven standard deviations)."""
+        """How far below its threshold [thresholds] no noise of a frame makes a pixel fire (seven standard deviations)."""
         millivolts = 7.0 * self.frame_noise_mv + 7.0 * float(np.sqrt(np.sum(self.slow_mv**2)))
         for movie in (self.row_mv, self.column_mv):
             millivolts += 0.0 if movie is None else float(np.abs(movie).max())
@@ -146,7 +148,7 @@ class Recording:
     """A recording under way: what the pixels remember, and the frames that come next."""
 
     def __init__(self, physics: Physics, rng: np.random.Generator) -> None:
-        """Pixels anywhere in their first cycle, what is slow in its steady state for the light at frame 0, traps empty."""
+        """Pixels anywhere in their first cycle, what is slow in its steady state at frame 0, traps empty."""
         ph, pixels = physics, physics.gain.size
         self.physics, self.rng = ph, rng
         self.charge = rng.random(pixels)
@@ -403,7 +405,7 @@ def coast(charge, owed, threshold, blind, last, since, margin, x, near):
 
 @njit(cache=True)
 def slow_noise(near, n, slow, slow_at, kept, sd, random, normal, total):
-    """Add the slow noise of the pixels `near` in frame n; its components move on over all frames since the last look."""
+    """Add the slow noise of the pixels `near` in frame n; it moves on over all frames since the last look."""
     for i in range(near.size):
         p = near[i]
         gone = min(n - slow_at[p], kept.shape[0] - 1)
@@ -435,7 +437,7 @@ def cross(
     quiet, kappa, substeps, dead, delay, hold_loss, left_fraction, left_tau,
     ramp_loss, ramp_tau, alternate, outlier_share, outlier_kappa, random, normal, bits,
 ):  # fmt: skip
-    """One frame, number n, of the pixels `near`, in sub-steps; x (P,) charge a frame, bar = stretch * threshold + shift."""
+    """Frame n of the pixels `near`, in sub-steps; x (P,) charge a frame, bar = stretch * threshold + shift."""
     dt = 1.0 / substeps
     for i in range(near.size):
         p = near[i]

@@ -64,7 +64,7 @@ def square_wave(frames: int, rng: np.random.Generator) -> Light:
 
 
 def bars(shape: tuple[int, int], frames: int, rng: np.random.Generator) -> Light:
-    """Upright bars, in the upper half bright ones (also beyond one spike a frame) to the right, below dim ones to the left.
+    """Upright bars: in the upper half to the right, some beyond one spike a frame; below dim ones, to the left.
 
     At most one column from key to key.
     """

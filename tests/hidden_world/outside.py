@@ -262,7 +262,7 @@ TUNE = {
             "all thresholds follow the activity of the whole array, slowly",
             _shape(tau_frames=_log_uniform(30.0, 150.0)),
             physics=_array_sag,
-            describe="common to all pixels, follows the light's mean level with a time constant, also in pixels in the dark",
+            describe="common: follows the mean level of the scene with a time constant, also in dark pixels",
         ),
         Mechanism(
             "recovery_ramp",

@@ -1,6 +1,6 @@
 """One camera of the hidden world: its own parameters, its own fixed patterns.
 
-    phi = C V,  C = C0 + C_S,  V = 1.1 V + bias + V_S;   x = G L phi0/phi + I dt/phi;   N = N0 phi/phi0;   kappa = sigma/V
+    phi = C V,  C = C0 + C_S,  V = 1.1 V + bias + V_S;   x = G L phi0/phi + I dt/phi;  N = N0 phi/phi0;  kappa = sigma/V
 
 Published spreads, each off by 5 to 20 % in a unit; a pattern's shape is not always Gaussian (`PATTERNS`).  Where the
 charge scale is first principles (`physical`), N and the reset noise follow from this unit's own C, V and temperature.
@@ -53,7 +53,7 @@ PATTERNS: dict[str, Callable[[np.random.Generator, tuple[int, ...]], Array]] = {
         np.where(rng.random(shape) < 0.5, 0.3, -0.3) + np.sqrt(1 - 0.09) * rng.standard_normal(shape)
     ),
 }
-"""Shapes of mean 0 and variance 1.  Excess kurtosis 0, -0.15, +0.17, -0.02: real patterns are Gaussian about so well."""
+"""Shapes of mean 0, variance 1 and excess kurtosis 0, -0.15, +0.17, -0.02."""
 
 
 @dataclass(frozen=True)
