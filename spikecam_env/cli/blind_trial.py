@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import json
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -39,8 +41,8 @@ class BlindTrial:
     """Keep the campaigns' data (some 100 MB each)."""
     world: Path = WORLD
     """Folder of the hidden world, in the package's checkout."""
-    diagnose: str = "spikecam_env.gap:diagnose"
-    """module:function that is tried."""
+    diagnose: str = "spikecam_env.cli.blind_trial:diagnosed"
+    """module:function that is tried: (campaign, model, out, seed, exclude) -> what diagnosis.json holds."""
 
     def run(self) -> None:
         from tqdm import tqdm
@@ -58,10 +60,23 @@ class BlindTrial:
             with tqdm(total=len(picked), unit="case") as bar:
                 for done, _ in steps:
                     bar.update(done - bar.n)
-        except ValueError as error:
+        except (ValueError, ImportError) as error:
             raise InputError(str(error)) from error
         print(trial.as_text(trial.score_trial(self.out, picked)))
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
+
+
+def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str]) -> dict[str, Any]:
+    """`spikecam diagnose` as a trial wants it, on one thread, its report included."""
+    try:
+        from spikecam_env.gap.diagnose import diagnose
+        from spikecam_env.gap.report import write_report
+    except ImportError as error:
+        raise ImportError(f"this checkout has no spikecam_env.gap.diagnose to be tried ({error})") from error
+    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=1, progress=False)
+    found.write(out)
+    write_report(found, out / "report.html")
+    return json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
 
 
 def hidden_world(folder: Path) -> Any:

@@ -1,7 +1,7 @@
 """The trial's cases: what is hidden, what the diagnosis is told, what counts as right.
 
-Groups: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `base` (the base model's own effects, told `ideal`),
-`outside`, `left_out` (a catalogue effect, its name withheld), `pair`, `tricky`.
+Groups: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `base` (the base model's own effects,
+told `ideal`), `outside`, `left_out` (a catalogue effect, its name withheld), `pair`, `tricky`.
 
 The parts `tune` and `report` share no seed and no outside mechanism, nor do the sets `quick` and `full` share seeds.
 """
@@ -30,7 +30,8 @@ BASE_CAMERAS = ("scsim", "physical")
 class Answer:
     """A predicate on a diagnosis: one of these verdicts, all these names among its effects, and what else it must hold.
 
-    place: an effect or the description says where (`where`, `region`) or when (`when`).  not_testable: a name listed so.
+    place: an effect or the description says where (`where`, `region`) or when (`when`).
+    not_testable: a name listed so.
     """
 
     verdicts: tuple[str, ...]
@@ -41,7 +42,10 @@ class Answer:
 
 @dataclass(frozen=True)
 class Case:
-    """One campaign and its key.  id: opaque.  truth: names hidden.  accept: any of these is right (else: by the truth)."""
+    """One campaign and its key.
+
+    id: opaque.  truth: names hidden.  accept: any of these is right; where empty, the truth decides.
+    """
 
     id: str
     group: str
@@ -105,7 +109,7 @@ def cases(which: str, part: str) -> list[Case]:
     start = {("quick", "tune"): 1, ("quick", "report"): 2, ("full", "tune"): 3, ("full", "report"): 4}[which, part]
     seeds = itertools.count(1_000_000 * start)
     shift = 0 if part == "tune" else 1
-    known = list(CATALOGUE)[shift::every]
+    known = list(CATALOGUE)[shift % every :: every]
     outside = list(TUNE if part == "tune" else REPORT)[:: max(1, every // 2)]
     left_out = [name for name in known if name not in NOT_LEFT_OUT]
     made: list[Case] = []
@@ -153,7 +157,7 @@ def _single(group: str, name: str, seed: int, low: float, high: float) -> Case:
 
 
 def _base(name: str, seed: int) -> Case:
-    """An effect of the base model by itself, told that the camera is ideal; a spread of the dark needs a dark current."""
+    """An effect of the base model alone, told that the camera is ideal; a spread of the dark needs a dark current."""
     rng = stream(seed, "case")
     hidden = [_drawn(name, 3, 10, rng)]
     if name == "dark_current_spread":

@@ -40,7 +40,8 @@ class Physics:
     P pixels row by row, T frames.
 
     gain, dark: (P,) charge a frame at radiance 1, and without light.  quiet: (P,) 1/N, N electrons to a
-    threshold (0: no shot noise).  kappa: (P,) relative noise of a drawn threshold.  per_mv: (P,) thresholds a millivolt.
+    threshold (0: no shot noise).  kappa: (P,) relative noise of a drawn threshold.
+    per_mv: (P,) thresholds a millivolt.
     key_frame: (K,) whole frames.  key_light: (K, P) or (K, 1) radiance, linear between keys, constant outside.
     *_wave, light_leak, frame_length: (T,), one value a frame, or None.
     """
@@ -135,7 +136,7 @@ class Physics:
 
     @property
     def margin(self) -> float:
-        """How far below its threshold [thresholds] no noise of a frame makes a pixel fire (seven standard deviations)."""
+        """How far below its threshold [thresholds] no noise of a frame makes a pixel fire (seven sd)."""
         millivolts = 7.0 * self.frame_noise_mv + 7.0 * float(np.sqrt(np.sum(self.slow_mv**2)))
         for movie in (self.row_mv, self.column_mv):
             millivolts += 0.0 if movie is None else float(np.abs(movie).max())

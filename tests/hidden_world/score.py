@@ -1,9 +1,10 @@
 """What a diagnosis is worth, given its key.
 
 Rules
-- The names of a diagnosis are those of its `effects`; of a `class`, also those of its alternatives.
-- A single effect has its right name when the verdict is `named` (or `parameter`, see EQUIVALENT) and exactly that effect is
-  named, or when the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
+- The names of a diagnosis are those of its `effects`; of a `class`, also its members (`class.members`, or where there is no
+  such list the alternatives); of a `parameter`, also the keys of `parameters`.
+- A single effect has its right name when the verdict is `named` (or `parameter`, see EQUIVALENT) and exactly
+  that effect is named, or when the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
 - Its family is right when one effect of its family (FAMILIES) is named and none of another.
 - `unknown` where something of the catalogue is hidden is a false unknown.
 - A pair: an effect counts as found when it, or an equivalent, is named; a third is spurious when it stands for neither.
@@ -38,8 +39,8 @@ FAMILIES = {
         "shot_noise", "reset_noise", "excess_threshold_noise", "frame_threshold_noise", "threshold_flicker_noise",
     ),
     "pattern": (
-        "conversion_gain_spread", "capacitor_spread", "bias_voltage_spread", "row_fixed_pattern", "column_fixed_pattern",
-        "dead_pixels",
+        "conversion_gain_spread", "capacitor_spread", "bias_voltage_spread", "row_fixed_pattern",
+        "column_fixed_pattern", "dead_pixels",
     ),
     "read-out": ("readout_skew", "missed_spikes", "spurious_spikes", "afterpulsing"),
 }  # fmt: skip
@@ -58,6 +59,10 @@ INSEPARABLE = (
 """Sets whose `class` counts as right (DESIGN section 9)."""
 
 
+RIVAL_LESS = 0.02
+"""By how much less of the gap a wrong effect has to remove."""
+
+
 @dataclass(frozen=True)
 class Scored:
     """A case and what came of it.  answer: the label of its column in the confusion matrix."""
@@ -73,6 +78,7 @@ class Scored:
     found: tuple[str, ...]
     spurious: tuple[str, ...]
     removed: float | None
+    rival_removed: float | None
     errors: tuple[Json, ...]
     seconds: float
     error: str = ""
@@ -84,11 +90,14 @@ def family_of(name: str) -> str:
 
 
 def names_of(diagnosis: Json) -> tuple[str, ...]:
-    """Effects that a diagnosis names, in its order."""
-    effects = diagnosis.get("effects") or []
+    """Effects that a diagnosis names, in its order; of a class its members, of a parameter the effect it belongs to."""
+    effects, verdict = diagnosis.get("effects") or [], diagnosis.get("verdict")
     names = [effect["name"] for effect in effects]
-    if diagnosis.get("verdict") == "class":
-        names += [other["name"] for effect in effects for other in effect.get("alternatives") or []]
+    if verdict == "class":
+        members = (diagnosis.get("class") or {}).get("members") or []
+        names += members or [other["name"] for effect in effects for other in effect.get("alternatives") or []]
+    if verdict == "parameter":
+        names += list(diagnosis.get("parameters") or {})
     return tuple(dict.fromkeys(names))
 
 
@@ -119,6 +128,7 @@ def score_case(key: Json, result: Json) -> Scored:
         found=found,
         spurious=spurious,
         removed=None if removed is None else float(removed),
+        rival_removed=_rival(diagnosis),
         errors=tuple(_parameter_errors(diagnosis, hidden)),
         seconds=float(result.get("seconds", 0.0)),
         error=str(result.get("error", "")),
@@ -164,11 +174,24 @@ def _label(verdict: str, names: Sequence[str]) -> str:
     return verdict or "no verdict"
 
 
+def _rival(diagnosis: Json) -> float | None:
+    """Share of the gap that the best alternative removes, where the diagnosis states it (`removed` of alternatives)."""
+    stated = [
+        float(other["removed"])
+        for effect in diagnosis.get("effects") or []
+        for other in effect.get("alternatives") or []
+        if other.get("removed") is not None
+    ]
+    return max(stated, default=None)
+
+
 def _parameter_errors(diagnosis: Json, hidden: dict[str, Json]) -> Iterable[Json]:
     """For each effect named by its own name: error and stated uncertainty of each parameter that it states."""
     for effect in diagnosis.get("effects") or []:
         truth = hidden.get(effect["name"])
-        for name, stated in (effect.get("parameters") or {}).items() if truth else ():
+        if truth is None:
+            continue
+        for name, stated in (effect.get("parameters") or {}).items():
             if name in truth["parameters"] and stated.get("value") is not None:
                 true, value, sd = truth["parameters"][name], float(stated["value"]), stated.get("sd")
                 yield {

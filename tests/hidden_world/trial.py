@@ -86,6 +86,8 @@ def run_case(case: Case, out: Path, diagnose: str, keep: bool) -> None:
     try:
         function: Diagnose = _named(diagnose)
         result["diagnosis"] = function(campaign, case.model, work, 1, case.exclude)
+    except ImportError:
+        raise
     except Exception:
         result["error"] = traceback.format_exc()
     result["seconds"] = round(time.perf_counter() - began, 2)

@@ -104,9 +104,18 @@ def physics_of(recipe: Recipe, camera: Camera, shot: Shot, hidden: Sequence[Hidd
             camera = mechanism.camera(camera, h.parameters, stream(recipe.seed, h.name, "camera"))
         if mechanism.light is not None:
             light = mechanism.light(light, recipe.shape, h.parameters)
-    flat = [a.reshape(-1) for a in (camera.gain, camera.dark, camera.quiet, camera.kappa, camera.per_mv)]
     radiance = light.radiance.reshape(len(light.radiance), -1)
-    physics = Physics(recipe.shape, recipe.frames, *flat, light.key_frame, radiance)
+    physics = Physics(
+        recipe.shape,
+        recipe.frames,
+        camera.gain.reshape(-1),
+        camera.dark.reshape(-1),
+        camera.quiet.reshape(-1),
+        camera.kappa.reshape(-1),
+        camera.per_mv.reshape(-1),
+        light.key_frame,
+        radiance,
+    )
     for h in hidden:
         change = MECHANISMS[h.name].physics
         if change is not None:
