@@ -171,7 +171,7 @@ def _row_temporal_noise(ph: Physics, camera: Camera, frames: int, p: Parameters,
 
 def _threshold_flicker(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
     """S(f) = (sigma^2 / ln 2) / f from six Lorentzians two octaves apart, each with the variance of two octaves."""
-    ph.slow_tau = 3.0 * 4.0 ** np.arange(6)
+    ph.slow_tau = np.array([3.0 * 4.0**j for j in range(6)])
     ph.slow_mv = np.full(6, np.sqrt(2.0) * p["sigma_mV"])
 
 

@@ -201,7 +201,7 @@ class Recording:
         x = light + self._dark_of(n)
         if ph.frame_length is not None:
             x = x * ph.frame_length[n]
-        ramp = 12.0 * ph.ramp_tau if ph.ramp_loss else 0.0
+        ramp = 7.0 * ph.ramp_tau if ph.ramp_loss else 0.0
         near = self.near[
             : coast(self.charge, self.owed, self.threshold, self.blind, self.last, n - ramp, margin, x, self.near)
         ]
@@ -440,12 +440,15 @@ def cross(
 ):  # fmt: skip
     """Frame n of the pixels `near`, in sub-steps; x (P,) charge a frame, bar = stretch * threshold + shift."""
     dt = 1.0 / substeps
+    ramp_step = np.exp(-dt / ramp_tau)
     for i in range(near.size):
         p = near[i]
         q = charge[p] + _collected(owed[p], quiet[p], random, normal) - owed[p]
         owed[p] = 0.0
         bar = threshold[p] * stretch[i] + shift[i]
-        kept, even = 1.0, x[p] * dt
+        kept, even, ramp = 1.0, x[p] * dt, 0.0
+        if ramp_loss > 0.0:
+            ramp = ramp_loss * np.exp(-(n + 0.5 * dt - last[p]) / ramp_tau)
         many, spread = even > 16.0 * quiet[p], np.sqrt(even * quiet[p])
         for s in range(substeps):
             open_for = dt
@@ -455,7 +458,8 @@ def cross(
                 open_for -= shut
             share = open_for * kept
             if ramp_loss > 0.0:
-                share *= 1.0 - ramp_loss * np.exp(-(n + (s + 0.5) * dt - last[p]) / ramp_tau)
+                share *= 1.0 - ramp
+                ramp *= ramp_step
             if share == dt and many:
                 come = even + spread * _gauss(random, normal)
             else:
@@ -479,6 +483,8 @@ def cross(
                 if left_fraction != 0.0:
                     over -= left_fraction * np.expm1(-(crossing - last[p]) / left_tau)
                 last[p] = crossing
+                if ramp_loss > 0.0:
+                    ramp = ramp_loss * np.exp(-(n + (s + 1.5) * dt - crossing) / ramp_tau)
                 q = over
                 threshold[p] = 1.0 + kappa[p] * _gauss(random, normal)
                 if outlier_share > 0.0 and _uniform(random) < outlier_share:

@@ -1,8 +1,8 @@
 """What a diagnosis is worth, given its key.
 
 Rules
-- The names of a diagnosis are those of its `effects`; of a `class`, also its members (`class.members`, or where there is no
-  such list the alternatives); of a `parameter`, also the keys of `parameters`.
+- The names of a diagnosis are those of its `effects`; of a `class`, also its members (`class.members`, or where there
+  is no such list the alternatives); of a `parameter`, also the keys of `parameters`.
 - A single effect has its right name when the verdict is `named` (or `parameter`, see EQUIVALENT) and exactly
   that effect is named, or when the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
 - Its family is right when one effect of its family (FAMILIES) is named and none of another.

@@ -86,17 +86,21 @@ def test_the_same_recipe_gives_the_same_bytes(tmp_path):
     assert digest(tmp_path / "a") == digest(tmp_path / "b") != digest(tmp_path / "c")
 
 
+TINY = replace(SMALL, shape=(16, 16), frames=400)
+RARE = ("missed_spikes", "spurious_spikes", "afterpulsing", "spike_bursts", "repeated_frames", "cosmic_streaks")
+
+
+@pytest.fixture(scope="module")
+def nothing_hidden(tmp_path_factory):
+    return loaded(TINY, tmp_path_factory.mktemp("plain"))
+
+
 @pytest.mark.parametrize("name", sorted(MECHANISMS))
-def test_every_mechanism_makes_a_readable_campaign_that_differs(name, tmp_path):
-    recipe = replace(SMALL, shape=(16, 16), frames=400)
-    hidden = draw(MECHANISMS[name], 10.0 if name not in RARE else 1e4, stream(1, name))
-    spikes = loaded(replace(recipe, hidden=(hidden,)), tmp_path / "with")
-    plain = loaded(recipe, tmp_path / "without")
+def test_every_mechanism_makes_a_readable_campaign_that_differs(name, tmp_path, nothing_hidden):
+    hidden = draw(MECHANISMS[name], 1e3 if name in RARE else 10.0, stream(1, name))
+    spikes, plain = loaded(replace(TINY, hidden=(hidden,)), tmp_path), nothing_hidden
     assert list(spikes) == list(plain)
     assert any(np.any(spikes[key] != plain[key]) for key in plain)
-
-
-RARE = ("missed_spikes", "spurious_spikes", "afterpulsing", "spike_bursts", "repeated_frames", "cosmic_streaks")
 
 
 @pytest.mark.parametrize("trick", sorted(TRICKS))
@@ -128,7 +132,7 @@ def test_an_effect_can_be_in_one_place_or_from_a_time_on(tmp_path):
     where = (bits != plain).any(axis=0)
     assert where[:8, 16:].mean() > 0.9 and where.sum() == where[:8, 16:].sum()
     late = replace(SMALL, hidden=(Hidden("dead_time", {"tau_us": 20.0}, 1.0, since=0.5),))
-    flat = [n for n in loaded(late, tmp_path / "late") if n.startswith(("flat-6", "flat-7"))][0]
+    flat = next(n for n in loaded(late, tmp_path / "late") if n.startswith(("flat-6", "flat-7")))
     bits = {r.name: r.load() for r in read_campaign(tmp_path / "late").recordings}[flat]
     before, after = bits[:400].mean(), bits[400:].mean()
     assert abs(after / (1 / (1 / before + 0.8)) - 1) < 0.01

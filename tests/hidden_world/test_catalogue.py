@@ -223,7 +223,8 @@ def test_excess_threshold_noise_adds_in_quadrature():
 def test_base_effects_have_the_size_they_are_given(name):
     strength = {
         "shot_noise": {"quanta": 1e4}, "reset_noise": {"sigma_mV": 5.0}, "conversion_gain_spread": {"sigma": 0.05},
-        "dark_current": {"mean_pA": 0.4}, "dark_current_spread": {"sigma_pA": 0.1}, "capacitor_spread": {"sigma_fF": 0.1},
+        "dark_current": {"mean_pA": 0.4}, "dark_current_spread": {"sigma_pA": 0.1},
+        "capacitor_spread": {"sigma_fF": 0.1},
         "bias_voltage_spread": {"sigma_V": 0.05},
     }[name]  # fmt: skip
     ideal = replace(plain_camera((64, 64), electrons=0.0, spread=0.0), dark=np.full((64, 64), 0.01))
