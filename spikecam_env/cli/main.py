@@ -10,6 +10,7 @@ from typing import Annotated, Any, Union
 import tyro
 
 from spikecam_env.cli.bench import Bench
+from spikecam_env.cli.blind_trial import BlindTrial
 from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.campaign import Campaign
 from spikecam_env.cli.demo import Demo
@@ -39,6 +40,7 @@ COMMANDS: dict[str, Any] = {
     "calibrate": Calibrate,
     "campaign": Campaign,
     "diagnose": Diagnose,
+    "blind-trial": BlindTrial,
     "effects": Effects,
     "bench": Bench,
 }

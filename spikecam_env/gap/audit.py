@@ -222,8 +222,10 @@ def _shift(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64]) ->
     for shift in range(-MOST_BINS, MOST_BINS + 1):
         if 0 <= part[0] + shift and part[-1] + shift < len(expected):
             scores[shift] = float(((seen - expected[part + shift]) ** 2).sum())
-    best = min(scores, key=lambda s: scores[s])
-    return best if scores[best] < 0.8 * scores[0] else 0
+    least = min(scores.values())
+    if least > 0.8 * scores[0]:
+        return 0
+    return min((s for s in scores if scores[s] < least + 0.1 * (scores[0] - least)), key=abs)
 
 
 def without(case: Case, names: Sequence[str]) -> list[int]:

@@ -1,0 +1,92 @@
+"""`spikecam blind-trial`: how often a diagnosis is right, on campaigns whose effects it cannot know."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import spikecam_env
+from spikecam_env.errors import InputError
+
+WORLD = Path(spikecam_env.__file__).resolve().parents[1] / "tests" / "hidden_world"
+
+
+@dataclass
+class BlindTrial:
+    """Generate campaigns with hidden effects, diagnose them, open the keys and score.
+
+    What is done already in OUT is not done again.  The part `report` is for figures: do not tune on it.
+
+    example:  spikecam blind-trial --set quick --part tune --jobs 2 --out trial
+    """
+
+    out: Path
+    """Folder for manifest, sealed keys, results, trial.json and trial.md."""
+    set: Literal["quick", "full"] = "quick"
+    """Which set of cases."""
+    part: Literal["tune", "report"] = "tune"
+    """Disjoint seeds and outside mechanisms: one to work on, one to judge by."""
+    jobs: int = 1
+    """Processes."""
+    only: list[str] = field(default_factory=list)
+    """Groups: none, strong, weak, base, outside, left_out, pair, tricky; default all."""
+    limit: int | None = None
+    """At most so many cases of each group."""
+    keep: bool = False
+    """Keep the campaigns' data (some 100 MB each)."""
+    world: Path = WORLD
+    """Folder of the hidden world, in the package's checkout."""
+    diagnose: str = "spikecam_env.cli.blind_trial:diagnosed"
+    """module:function that is tried: (campaign, model, out, seed, exclude) -> what diagnosis.json holds."""
+
+    def run(self) -> None:
+        from tqdm import tqdm
+
+        if self.jobs < 1:
+            raise InputError(f"jobs = {self.jobs}; it must be at least 1")
+        if self.limit is not None and self.limit < 1:
+            raise InputError(f"limit = {self.limit}; it must be at least 1")
+        trial = hidden_world(self.world)
+        try:
+            picked = trial.chosen(self.set, self.part, self.only, self.limit)
+            steps = trial.run_trial(
+                self.out, self.set, self.part, self.diagnose, picked=picked, jobs=self.jobs, keep=self.keep
+            )
+            with tqdm(total=len(picked), unit="case") as bar:
+                for done, _ in steps:
+                    bar.update(done - bar.n)
+        except (ValueError, ImportError) as error:
+            raise InputError(str(error)) from error
+        print(trial.as_text(trial.score_trial(self.out, picked)))
+        print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
+
+
+def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str]) -> dict[str, Any]:
+    """`spikecam diagnose` as a trial wants it, on one thread, its report included."""
+    try:
+        from spikecam_env.gap.diagnose import diagnose
+        from spikecam_env.gap.report import write_report
+    except ImportError as error:
+        raise ImportError(f"this checkout has no spikecam_env.gap.diagnose to be tried ({error})") from error
+    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=1, progress=False)
+    found.write(out)
+    write_report(found, out / "report.html")
+    return json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+
+
+def hidden_world(folder: Path) -> Any:
+    """Its module `trial`; raises InputError where the folder is not the hidden world."""
+    if not (folder / "trial.py").is_file():
+        raise InputError(
+            f"there is no hidden world at {folder}; it comes with the source checkout (tests/hidden_world), "
+            "not with the installed package: clone the repository and give its folder as --world"
+        )
+    root = str(folder.resolve().parents[1])
+    if root not in sys.path:
+        sys.path.insert(0, root)
+    return importlib.import_module("tests.hidden_world.trial")

@@ -1,0 +1,281 @@
+"""The trial's cases: what is hidden, what the diagnosis is told, what counts as right.
+
+Groups: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `base` (the base model's own effects,
+told `ideal`), `outside`, `left_out` (a catalogue effect, its name withheld), `pair`, `tricky`.
+
+The parts `tune` and `report` share no seed and no outside mechanism, nor do the sets `quick` and `full` share seeds.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
+from tests.hidden_world.mechanism import Hidden, Mechanism, draw, limits
+from tests.hidden_world.outside import OUTSIDE, REPORT, TUNE
+from tests.hidden_world.world import MECHANISMS, Recipe, stream
+
+SETS = ("quick", "full")
+PARTS = ("tune", "report")
+GROUPS = ("none", "strong", "weak", "base", "outside", "left_out", "pair", "tricky")
+BASE_CAMERAS = ("scsim", "physical")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A predicate on a diagnosis: one of these verdicts, all these names among its effects, and what else it must hold.
+
+    place: an effect or the description says where (`where`, `region`) or when (`when`).
+    not_testable: a name listed so.
+    """
+
+    verdicts: tuple[str, ...]
+    names: tuple[str, ...] = ()
+    place: bool = False
+    not_testable: str = ""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One campaign and its key.
+
+    id: opaque.  truth: names hidden.  accept: any of these is right; where empty, the truth decides.
+    """
+
+    id: str
+    group: str
+    what: str
+    recipe: Recipe
+    model: str
+    truth: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    accept: tuple[Answer, ...] = ()
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many of each; per mechanism where it says so."""
+
+    none: int
+    strong_each: int
+    weak_each: int
+    base_each: int
+    outside_each: int
+    left_out_each: int
+    pairs: int
+    tricky_each: int
+
+
+COUNTS = {"full": Counts(60, 3, 2, 2, 3, 1, 30, 2), "quick": Counts(6, 1, 1, 1, 1, 1, 4, 1)}
+QUICK_SHARE = 4
+"""Of the groups that go through mechanisms, `quick` takes every fourth."""
+
+WITHHELD_TOO = {
+    "photo_response_nonlinearity": ("ir_drop",),
+    "ir_drop": ("photo_response_nonlinearity",),
+    "hot_pixels": ("dark_current_tail",),
+}
+"""Names that describe the same data as well, within what these recordings show; withheld with their twin."""
+
+NOT_LEFT_OUT = ("excess_threshold_noise",)
+"""Without its name it is a wrong parameter (reset_noise), not something unknown."""
+
+SAME_TO_THE_EYE = (
+    {
+        "dead_time",
+        "comparator_delay",
+        "photo_response_nonlinearity",
+        "ir_drop",
+        "incomplete_reset",
+        "synchronous_reset",
+    },
+    {"hot_pixels", "dark_current_tail", "random_telegraph_noise"},
+    {"excess_threshold_noise", "frame_threshold_noise", "threshold_flicker_noise"},
+    {"common_threshold_noise", "clock_jitter"},
+    {"light_flicker", "supply_ripple"},
+)
+"""Pairs are not drawn from within one of these: the second would hide in the error of the first."""
+
+
+def cases(which: str, part: str) -> list[Case]:
+    """All cases of a set and part, group by group."""
+    counts = COUNTS[which]
+    every = QUICK_SHARE if which == "quick" else 1
+    start = {("quick", "tune"): 1, ("quick", "report"): 2, ("full", "tune"): 3, ("full", "report"): 4}[which, part]
+    seeds = itertools.count(1_000_000 * start)
+    shift = 0 if part == "tune" else 1
+    known = list(CATALOGUE)[shift % every :: every]
+    outside = list(TUNE if part == "tune" else REPORT)[:: max(1, every // 2)]
+    left_out = [name for name in known if name not in NOT_LEFT_OUT]
+    made: list[Case] = []
+    made += [_nothing(next(seeds)) for _ in range(counts.none)]
+    made += [_single("strong", name, next(seeds), 3, 10) for name in known for _ in range(counts.strong_each)]
+    made += [_single("weak", name, next(seeds), 1, 3) for name in known for _ in range(counts.weak_each)]
+    made += [_base(name, next(seeds)) for name in list(BASE_EFFECTS)[::every] for _ in range(counts.base_each)]
+    made += [_ladder(next(seeds)) for _ in range(counts.base_each)]
+    made += [_single("outside", name, next(seeds), 4, 10) for name in outside for _ in range(counts.outside_each)]
+    made += [_left_out(name, next(seeds)) for name in left_out for _ in range(counts.left_out_each)]
+    made += [_pair(next(seeds)) for _ in range(counts.pairs)]
+    made += [trick(next(seeds)) for trick in TRICKY[:: max(1, every // 2)] for _ in range(counts.tricky_each)]
+    return made
+
+
+def _case(group: str, what: str, recipe: Recipe, **rest: object) -> Case:
+    opaque = hashlib.sha256(f"spikecam hidden world {recipe.seed}".encode()).hexdigest()[:12]
+    model = rest.pop("model", recipe.base)
+    return Case(opaque, group, what, recipe, model, **rest)  # type: ignore[arg-type]
+
+
+def _camera_kind(name: str, rng: np.random.Generator) -> str:
+    """Noise beside 6.36 mV of reset noise that nobody knows cannot be told from it; kT/C is known."""
+    return "physical" if name == "excess_threshold_noise" else str(rng.choice(BASE_CAMERAS))
+
+
+def _drawn(name: str, low: float, high: float, rng: np.random.Generator) -> Hidden:
+    mechanism: Mechanism = MECHANISMS[name]
+    return draw(mechanism, float(np.exp(rng.uniform(np.log(low), np.log(high)))), rng)
+
+
+def _nothing(seed: int) -> Case:
+    base = str(stream(seed, "case").choice(BASE_CAMERAS))
+    return _case("none", "nothing", Recipe(seed, base), accept=(Answer(("none",)),))
+
+
+def _single(group: str, name: str, seed: int, low: float, high: float) -> Case:
+    rng = stream(seed, "case")
+    base = _camera_kind(name, rng)
+    recipe = Recipe(seed, base, (_drawn(name, low, high, rng),))
+    if name not in OUTSIDE:
+        return _case(group, name, recipe, truth=(name,))
+    verdicts = ("unknown", "data") if name == "repeated_frames" else ("unknown",)
+    return _case(group, name, recipe, truth=(name,), accept=(Answer(verdicts),))
+
+
+def _base(name: str, seed: int) -> Case:
+    """An effect of the base model alone, told that the camera is ideal; a spread of the dark needs a dark current."""
+    rng = stream(seed, "case")
+    hidden = [_drawn(name, 3, 10, rng)]
+    if name == "dark_current_spread":
+        hidden.insert(0, Hidden("dark_current", {"mean_pA": 4.0 * hidden[0].parameters["sigma_pA"]}, 10.0))
+    return _case("base", name, Recipe(seed, "ideal", tuple(hidden)), truth=tuple(h.name for h in hidden))
+
+
+def _ladder(seed: int) -> Case:
+    """All of `physical` at once, told that the camera is ideal."""
+    return _case("base", "ladder", Recipe(seed, "physical"), model="ideal", truth=tuple(BASE_EFFECTS))
+
+
+def _left_out(name: str, seed: int) -> Case:
+    rng = stream(seed, "case")
+    recipe = Recipe(seed, _camera_kind(name, rng), (_drawn(name, 3, 10, rng),))
+    exclude = (name, *WITHHELD_TOO.get(name, ()))
+    return _case("left_out", name, recipe, truth=(name,), exclude=exclude, accept=(Answer(("unknown",)),))
+
+
+def _pair(seed: int) -> Case:
+    rng = stream(seed, "case")
+    while True:
+        first, second = (str(name) for name in rng.choice(list(CATALOGUE), 2, replace=False))
+        if not any({first, second} <= same for same in SAME_TO_THE_EYE):
+            break
+    base = "physical" if "excess_threshold_noise" in (first, second) else str(rng.choice(BASE_CAMERAS))
+    recipe = Recipe(seed, base, (_drawn(first, 3, 10, rng), _drawn(second, 3, 10, rng)))
+    return _case("pair", f"{first} + {second}", recipe, truth=(first, second))
+
+
+# ---- tricky
+
+
+def _label_trick(trick: str, verdicts: Sequence[str]) -> Callable[[int], Case]:
+    def make(seed: int) -> Case:
+        base = str(stream(seed, "case").choice(BASE_CAMERAS))
+        accept = tuple(Answer((v,), place=v == "unknown") for v in verdicts)
+        return _case("tricky", trick, Recipe(seed, base, trick=trick), accept=accept)
+
+    return make
+
+
+def _lamp(name: str) -> Callable[[int], Case]:
+    def make(seed: int) -> Case:
+        rng = stream(seed, "case")
+        recipe = Recipe(seed, str(rng.choice(BASE_CAMERAS)), (_drawn(name, 5, 15, rng),))
+        return _case("tricky", f"lamp: {name}", recipe, truth=(name,), accept=(Answer(("named",), (name,)),))
+
+    return make
+
+
+def _noise_times_three(seed: int) -> Case:
+    base = str(stream(seed, "case").choice(BASE_CAMERAS))
+    accept = (Answer(("parameter",), ("reset_noise",)), Answer(("named",), ("excess_threshold_noise",)))
+    return _case("tricky", "threshold noise x 3", Recipe(seed, base, reset_noise_times=3.0), accept=accept)
+
+
+def _in_a_corner(seed: int) -> Case:
+    rng = stream(seed, "case")
+    name = str(rng.choice(["dead_time", "spurious_spikes", "missed_spikes", "afterpulsing"]))
+    drawn = _drawn(name, 15, 40, rng)
+    r, c = ((0, 20) if rng.random() < 0.5 else (44, 64) for _ in range(2))
+    hidden = Hidden(drawn.name, drawn.parameters, drawn.times_limit, rows=r, columns=c)
+    accept = (Answer(("unknown",)), Answer(("named",), (name,), place=True))
+    recipe = Recipe(seed, str(rng.choice(BASE_CAMERAS)), (hidden,))
+    return _case("tricky", f"in a corner: {name}", recipe, truth=(name,), accept=accept)
+
+
+def _from_half_way(seed: int) -> Case:
+    rng = stream(seed, "case")
+    name = str(rng.choice(["light_flicker", "spurious_spikes", "missed_spikes", "dead_time"]))
+    drawn = _drawn(name, 10, 30, rng)
+    hidden = Hidden(drawn.name, drawn.parameters, drawn.times_limit, since=0.5)
+    accept = (Answer(("unknown",)), Answer(("named",), (name,), place=True))
+    recipe = Recipe(seed, str(rng.choice(BASE_CAMERAS)), (hidden,))
+    return _case("tricky", f"from half-way: {name}", recipe, truth=(name,), accept=accept)
+
+
+def _skew_unseen(seed: int) -> Case:
+    rng = stream(seed, "case")
+    recipe = Recipe(seed, str(rng.choice(BASE_CAMERAS)), (_drawn("readout_skew", 5, 15, rng),), trick="no_motion")
+    accept = (Answer(("none",), not_testable="readout_skew"),)
+    return _case("tricky", "skew without motion", recipe, truth=("readout_skew",), accept=accept)
+
+
+def _one_hot_pixel(seed: int) -> Case:
+    rng = stream(seed, "case")
+    hidden = Hidden("hot_pixels", {"fraction": 1 / 4096, "mean_pA": float(rng.uniform(3, 6))}, 1 / 4096 / 5e-4)
+    accept = (Answer(("none",)), Answer(("named",), ("hot_pixels",)))
+    recipe = Recipe(seed, str(rng.choice(BASE_CAMERAS)), (hidden,))
+    return _case("tricky", "one hot pixel", recipe, truth=("hot_pixels",), accept=accept)
+
+
+def _cancelling(seed: int) -> Case:
+    """T = 1/x + tau against x (1 + tau x): the same mean rate to first order in tau, of a tenth of a frame."""
+    rng = stream(seed, "case")
+    tau_us = float(rng.uniform(1.2, 2.5))
+    both = (
+        Hidden("dead_time", {"tau_us": tau_us}, tau_us / limits()["dead_time"].limit),
+        Hidden("photo_response_nonlinearity", {"beta": -tau_us / 25.0}, 0.0),
+    )
+    names = tuple(h.name for h in both)
+    accept = (Answer(("named", "class"), names),)
+    recipe = Recipe(seed, str(rng.choice(BASE_CAMERAS)), both)
+    return _case("tricky", "dead time against non-linearity", recipe, truth=names, accept=accept)
+
+
+TRICKY = (
+    _label_trick("wrong_label", ("data",)),
+    _label_trick("swapped", ("data",)),
+    _label_trick("dropped_frames", ("data", "unknown")),
+    _label_trick("reversed_rows", ("data",)),
+    _lamp("lamp_drift"),
+    _lamp("light_flicker"),
+    _noise_times_three,
+    _in_a_corner,
+    _from_half_way,
+    _skew_unseen,
+    _one_hot_pixel,
+    _cancelling,
+)

@@ -1,0 +1,96 @@
+"""What a hidden mechanism is: a name, a law for the parameters it is drawn with, and where it takes hold.
+
+    camera    once a unit: its arrays
+    light     once a recording: what falls on the pixels, key by key (linear optics)
+    physics   once a recording: fields of `integrator.Physics`
+    bits      once a recording: what is reported
+
+Each takes the parameters and a generator of its own.  A recording's generator differs from recording to recording.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.hidden_world.integrator import Physics
+from tests.hidden_world.light import Light
+from tests.hidden_world.unit import Camera
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+Parameters: TypeAlias = dict[str, float]
+Rng: TypeAlias = np.random.Generator
+Bits: TypeAlias = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """name: as in limits.toml.  law: one line.  describe: what a right description of it says (outside the catalogue).
+
+    shape: draws every parameter but the strength.
+    """
+
+    name: str
+    law: str
+    shape: Callable[[Rng], Parameters] = lambda rng: {}
+    camera: Callable[[Camera, Parameters, Rng], Camera] | None = None
+    light: Callable[[Light, tuple[int, int], Parameters], Light] | None = None
+    physics: Callable[[Physics, Camera, int, Parameters, Rng], None] | None = None
+    bits: Callable[[Bits, Parameters, Rng], Bits] | None = None
+    describe: str = ""
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A mechanism in a camera: its parameters, and where and when it acts.
+
+    times_limit: strength over the detection limit.  rows, columns: pixels it acts in (None: all).  since: share of a
+    recording after which it acts.
+    """
+
+    name: str
+    parameters: Parameters
+    times_limit: float
+    rows: tuple[int, int] | None = None
+    columns: tuple[int, int] | None = None
+    since: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A mechanism's entry in limits.toml."""
+
+    parameter: str
+    limit: float
+    way: str = "more"
+    most: float = field(default=float("inf"))
+
+    def strength(self, times: float) -> float:
+        """The parameter at so many times the limit."""
+        return self.limit / times if self.way == "less" else min(self.limit * times, self.most)
+
+
+@cache
+def limits() -> dict[str, Limit]:
+    """Detection limits by mechanism."""
+    with (Path(__file__).parent / "limits.toml").open("rb") as file:
+        return {name: Limit(**entry) for name, entry in tomllib.load(file).items()}
+
+
+def draw(mechanism: Mechanism, times_limit: float, rng: Rng) -> Hidden:
+    """The mechanism at a strength, its other parameters drawn."""
+    limit = limits()[mechanism.name]
+    return Hidden(
+        mechanism.name, {limit.parameter: limit.strength(times_limit), **mechanism.shape(rng)}, float(times_limit)
+    )

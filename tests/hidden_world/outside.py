@@ -1,0 +1,378 @@
+"""Mechanisms that no catalogue of the diagnosis holds; each says what a right description of it says.
+
+Two disjoint lists: TUNE may be looked at while a diagnosis is made, REPORT only when it is judged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tests.hidden_world.catalogue import (
+    RESET_SUBSTEPS,
+    _between,
+    _log_uniform,
+    _shape,
+    _whole,
+    chosen,
+    event_arrays,
+    times,
+)
+from tests.hidden_world.integrator import Physics
+from tests.hidden_world.light import Light
+from tests.hidden_world.mechanism import Bits, Mechanism, Parameters, Rng
+from tests.hidden_world.unit import FRAME_S, Camera
+
+# ---- to tune on
+
+
+def _ping_pong(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    ph.alternate = p["step"]
+
+
+def _two_component_lag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    fast = p["fraction"] * p["fast_share"]
+    ph.lags = ((fast, p["fast_frames"]), (p["fraction"] - fast, p["slow_frames"]))
+
+
+def _column_clock(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    phases = np.random.default_rng(int(p["phases"])).random(camera.shape[1])
+    turns = np.arange(frames)[:, None] / p["period_frames"] + phases[None, :] + rng.random()
+    ph.column_mv = (np.sqrt(2.0) * p["sigma_mV"] * np.sin(2.0 * np.pi * turns)).astype(np.float32)
+
+
+def _bursts(bits: Bits, p: Parameters, rng: Rng) -> Bits:
+    at = chosen(bits, p["probability"], rng)
+    for k in range(1, int(p["length"]) + 1):
+        again = at + k * bits[0].size
+        bits.reshape(-1)[again[again < bits.size]] = 1
+    return bits
+
+
+def _amp_glow(camera: Camera, p: Parameters, rng: Rng) -> Camera:
+    rows, columns = camera.shape
+    away = np.hypot(*np.mgrid[:rows, :columns])[:: rng.choice([-1, 1]), :: rng.choice([-1, 1])]
+    return replace(camera, dark=camera.dark + camera.charge_of(p["corner_pA"]) * np.exp(-away / p["reach_pixels"]))
+
+
+def _shutter(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    """Shut for `closed` of the time, once a period; what of a shut frame is open counts."""
+    period = int(p["period_frames"])
+    shut = p["closed"] * period
+    at = (np.arange(frames) + rng.integers(period)) % period
+    ph.light_wave = times(ph.light_wave, 1.0 - np.clip(shut - at, 0.0, 1.0))
+
+
+def _even_rows(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    every = int(p["every_frames"])
+    sign = np.where(np.arange(camera.shape[0]) % 2 == 0, 1.0, -1.0)[:, None] * np.ones((1, camera.shape[1]))
+    turns = np.where(np.arange(frames // every + 1) % 2 == 0, 1.0, -1.0)
+    movie = 1.0 + p["step"] * turns[:, None] * sign.reshape(-1)[None, :]
+    ph.gain_movie, ph.gain_every = movie.astype(np.float32), every
+
+
+def _array_sag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    ph.array_sag, ph.sag_tau = p["sag"], p["tau_frames"]
+
+
+def _recovery_ramp(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    ph.ramp_loss, ph.ramp_tau, ph.substeps = p["loss"], p["tau_frames"], RESET_SUBSTEPS
+
+
+def _flashes(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    leak, t = np.zeros(frames), np.arange(frames)
+    for at in rng.uniform(0, frames, rng.poisson(p["per_second"] * frames * FRAME_S)):
+        leak += np.where(t >= at, p["radiance"] * np.exp(-np.maximum(t - at, 0.0) / p["tau_frames"]), 0.0)
+    ph.light_leak = leak
+
+
+# ---- to report on
+
+
+def _persistence(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    ph.trap_charge, ph.trap_half, ph.trap_tau = p["charge"], p["half_radiance"], p["tau_ms"] * 1e-3 / FRAME_S
+
+
+def _alternate_frames(bits: Bits, p: Parameters, rng: Rng) -> Bits:
+    """What comes in an odd frame is seen in the next, in some pixels (the same ones in every recording)."""
+    moved = np.random.default_rng(int(p["which"])).random(bits[0].shape) < p["pixels"]
+    return _delayed(bits, moved, period=2, slot=1)
+
+
+def _missing_slot(bits: Bits, p: Parameters, rng: Rng) -> Bits:
+    """What comes in one frame of sixteen is seen in the next, in some columns."""
+    columns = np.random.default_rng(int(p["which"])).random((1, bits.shape[2])) < p["pixels"]
+    return _delayed(bits, np.broadcast_to(columns, bits[0].shape), period=16, slot=5)
+
+
+def _delayed(bits: Bits, moved: NDArray[np.bool_], period: int, slot: int) -> Bits:
+    late = bits[slot::period] & moved
+    into = bits[slot + 1 :: period]
+    into |= late[: len(into)]
+    bits[slot::period] &= ~moved
+    return bits
+
+
+def _hot_band(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    every, (rows, columns) = 40, camera.shape
+    middle = (np.arange(frames // every + 1) * every / frames * p["travel"] + rng.random()) * columns
+    away = (np.arange(columns)[None, :] - middle[:, None] + columns / 2) % columns - columns / 2
+    band = 1.0 + p["rise"] * np.exp(-0.5 * (away / p["width_pixels"]) ** 2)
+    movie = np.repeat(band[:, None, :], rows, axis=1).reshape(len(band), -1)
+    ph.dark_movie, ph.dark_every = movie.astype(np.float32), every
+
+
+def _streaks(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    rows, columns = camera.shape
+    hits: list[tuple[int, int, float]] = []
+    for _ in range(rng.poisson(p["per_second"] * frames * FRAME_S)):
+        frame, angle, length = int(rng.integers(frames)), rng.uniform(0, np.pi), rng.uniform(8, 30)
+        along = np.arange(0.0, length, 0.5) - length / 2
+        r = np.rint(rng.uniform(0, rows) + along * np.sin(angle)).astype(int)
+        c = np.rint(rng.uniform(0, columns) + along * np.cos(angle)).astype(int)
+        inside = (r >= 0) & (r < rows) & (c >= 0) & (c < columns)
+        pixels = np.unique(r[inside] * columns + c[inside])
+        hits += [(frame, pixel, p["charge"] * rng.exponential()) for pixel in pixels]
+    ph.hits = event_arrays(hits)
+
+
+def _ghost(light: Light, shape: tuple[int, int], p: Parameters) -> Light:
+    return Light(light.key_frame, (light.radiance + p["share"] * light.radiance[:, ::-1, ::-1]).astype(np.float32))
+
+
+def _saturation_memory(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    ph.glare_loss, ph.glare_tau = p["loss"], p["tau_frames"]
+
+
+def _distant_row_leak(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    ph.kick, ph.kick_to, ph.kick_wraps = p["kick"], ((int(p["rows_away"]), 0),), True
+
+
+def _heavy_tailed_reset(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    ph.outlier_share, ph.outlier_kappa = p["share"], p["kappa"]
+
+
+def _row_bus(bits: Bits, p: Parameters, rng: Rng) -> Bits:
+    _wait_for_bus(bits, int((1.0 - p["blocked"]) * 0.75 * bits.shape[2]))
+    return bits
+
+
+@njit(cache=True)
+def _wait_for_bus(bits, most):
+    """At most `most` spikes of a row go out in a frame, from the left; the others wait, one at most in each pixel."""
+    frames, rows, columns = bits.shape
+    waiting = np.zeros(columns, np.uint8)
+    for r in range(rows):
+        waiting[:] = 0
+        for n in range(frames):
+            sent = 0
+            for c in range(columns):
+                wants = bits[n, r, c] | waiting[c]
+                waiting[c] = 0
+                if wants and sent < most:
+                    bits[n, r, c] = 1
+                    sent += 1
+                elif wants:
+                    bits[n, r, c] = 0
+                    waiting[c] = 1
+
+
+def _speckle(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    every, pixels = 8, camera.gain.size
+    kept = np.exp(-every / p["tau_frames"])
+    movie = np.empty((frames // every + 1, pixels), np.float32)
+    movie[0] = rng.standard_normal(pixels)
+    for i in range(1, len(movie)):
+        movie[i] = kept * movie[i - 1] + np.sqrt(1.0 - kept * kept) * rng.standard_normal(pixels, np.float32)
+    ph.gain_movie, ph.gain_every = np.maximum(1.0 + np.float32(p["contrast"]) * movie, 0.0), every
+
+
+def _fringes(camera: Camera, p: Parameters, rng: Rng) -> Camera:
+    y, x = np.mgrid[: camera.shape[0], : camera.shape[1]]
+    along = x * np.cos(p["angle"]) + y * np.sin(p["angle"])
+    wave = np.sin(2.0 * np.pi * (along / p["period_pixels"] + rng.random()))
+    return replace(camera, gain=camera.gain * (1.0 + p["contrast"] * wave))
+
+
+def _repeated_frames(bits: Bits, p: Parameters, rng: Rng) -> Bits:
+    for n in np.flatnonzero(rng.random(len(bits)) < p["probability"]):
+        if n:
+            bits[n] = bits[n - 1]
+    return bits
+
+
+TUNE = {
+    m.name: m
+    for m in (
+        Mechanism(
+            "ping_pong_threshold",
+            "every second threshold of a pixel is higher",
+            physics=_ping_pong,
+            describe="history: successive intervals alternate, in light and dark, static, local",
+        ),
+        Mechanism(
+            "two_component_lag",
+            "a fast and a slow part of the light come late",
+            _shape(
+                fast_share=_between(0.4, 0.6), fast_frames=_log_uniform(3.0, 8.0), slow_frames=_log_uniform(80.0, 250.0)
+            ),
+            physics=_two_component_lag,
+            describe="light that changes: a tail with two time scales, in proportion to light",
+        ),
+        Mechanism(
+            "column_clock_modulation",
+            "the reference of each column swings with a clock, each with a phase of its own",
+            _shape(period_frames=_between(5.0, 12.0), phases=_whole(0, 2**31)),
+            physics=_column_clock,
+            describe="columns: a line at a few kHz in every column, none in the whole array, light and dark",
+        ),
+        Mechanism(
+            "spike_bursts",
+            "a spike is now and then followed by several, frame by frame",
+            _shape(length=_whole(3, 5)),
+            bits=_bursts,
+            describe="history: runs of successive spikes, rare, at random, in proportion to the spikes",
+        ),
+        Mechanism(
+            "amp_glow",
+            "dark current that falls off from a corner",
+            _shape(reach_pixels=_between(6.0, 14.0)),
+            camera=_amp_glow,
+            describe="dark: one corner, static",
+        ),
+        Mechanism(
+            "duty_cycled_shutter",
+            "light shut off for a moment every period",
+            _shape(period_frames=_whole(20, 60)),
+            physics=_shutter,
+            describe="light: common, periodic, with harmonics (pulses, not a sine)",
+        ),
+        Mechanism(
+            "even_row_gain_switching",
+            "even and odd rows change gain in turns",
+            _shape(every_frames=_whole(100, 400)),
+            physics=_even_rows,
+            describe="light: even against odd rows, switching to and fro in time",
+        ),
+        Mechanism(
+            "array_sag",
+            "all thresholds follow the activity of the whole array, slowly",
+            _shape(tau_frames=_log_uniform(30.0, 150.0)),
+            physics=_array_sag,
+            describe="common: follows the mean level of the scene with a time constant, also in dark pixels",
+        ),
+        Mechanism(
+            "recovery_ramp",
+            "sensitivity comes back gradually after a reset",
+            _shape(tau_frames=_between(2.0, 6.0)),
+            physics=_recovery_ramp,
+            describe="level dependent: light lost after each reset, saturating for intervals beyond a few frames",
+        ),
+        Mechanism(
+            "light_leak_flashes",
+            "flashes of stray light at random times",
+            _shape(per_second=_between(60.0, 150.0), tau_frames=_between(8.0, 40.0)),
+            physics=_flashes,
+            describe="common, also in the dark: bursts at random times, the same charge at all levels",
+        ),
+    )
+}
+
+REPORT = {
+    m.name: m
+    for m in (
+        Mechanism(
+            "persistence",
+            "traps fill in the light, saturate, and leak over 100 ms; empty when a recording starts",
+            _shape(tau_ms=_log_uniform(40.0, 150.0), half_radiance=_between(0.03, 0.1)),
+            physics=_persistence,
+            describe="light: an additive charge that builds up slowly from the start and saturates with level",
+        ),
+        Mechanism(
+            "alternate_frame_comparator",
+            "in some pixels the comparator looks only every second frame",
+            _shape(which=_whole(0, 2**31)),
+            bits=_alternate_frames,
+            describe="some pixels: spikes only in even frames",
+        ),
+        Mechanism(
+            "moving_hot_band",
+            "a warm band moves across the chip and raises its dark current",
+            _shape(travel=_between(0.5, 1.0), width_pixels=_between(5.0, 9.0)),
+            physics=_hot_band,
+            describe="dark: columns, a place that moves during a recording",
+        ),
+        Mechanism(
+            "cosmic_streaks",
+            "charge along straight tracks in single frames",
+            _shape(charge=_between(0.3, 0.7)),
+            physics=_streaks,
+            describe="rare events in space and time: pixels on a line fire early together, dark too",
+        ),
+        Mechanism(
+            "ghost_image",
+            "a faint image turned by 180 degrees",
+            light=_ghost,
+            describe="light: non-local, textured scenes only, mirrored through the middle",
+        ),
+        Mechanism(
+            "saturation_memory",
+            "less sensitive for a while after more than one threshold a frame",
+            _shape(tau_frames=_between(15.0, 60.0)),
+            physics=_saturation_memory,
+            describe="light that changes: after bright light only, recovering over tens of frames",
+        ),
+        Mechanism(
+            "distant_row_leak",
+            "a spike gives charge to a pixel far away in its column",
+            _shape(rows_away=_whole(8, 31)),
+            physics=_distant_row_leak,
+            describe="coincidences of pixels a fixed number of rows apart, at lag 1; neighbours have none",
+        ),
+        Mechanism(
+            "heavy_tailed_reset",
+            "a reset now and then misses widely",
+            _shape(kappa=_between(0.06, 0.12)),
+            physics=_heavy_tailed_reset,
+            describe="interval noise with outliers on both sides, at all levels",
+        ),
+        Mechanism(
+            "row_bus_limit",
+            "a row's bus carries so many spikes a frame, the others wait",
+            bits=_row_bus,
+            describe="bright rows: spikes late by a frame, towards the right, beyond an activity of the row",
+        ),
+        Mechanism(
+            "speckle",
+            "the light on each pixel fluctuates by itself",
+            _shape(tau_frames=_log_uniform(30.0, 200.0)),
+            physics=_speckle,
+            describe="light: local, in proportion to light, one time constant; none in the dark",
+        ),
+        Mechanism(
+            "fringes",
+            "oblique stripes of sensitivity",
+            _shape(period_pixels=_between(6.0, 14.0), angle=_between(0.4, 1.1)),
+            camera=_fringes,
+            describe="light: a static pattern, periodic in space, oblique",
+        ),
+        Mechanism(
+            "repeated_frames",
+            "now and then the frame before is read again",
+            bits=_repeated_frames,
+            describe="single frames equal to the one before, all pixels",
+        ),
+        Mechanism(
+            "missing_slot",
+            "in some columns one frame of sixteen reports nothing, the spike comes a frame later",
+            _shape(which=_whole(0, 2**31)),
+            bits=_missing_slot,
+            describe="columns: periodic in time, sixteen frames",
+        ),
+    )
+}
+
+OUTSIDE = {**TUNE, **REPORT}

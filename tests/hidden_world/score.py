@@ -1,0 +1,333 @@
+"""What a diagnosis is worth, given its key.
+
+Rules
+- The names of a diagnosis are those of its `effects`; of a `class`, also its members (`class.members`, or where there
+  is no such list the alternatives); of a `parameter`, also the keys of `parameters`.
+- A single effect has its right name when the verdict is `named` (or `parameter`, see EQUIVALENT) and exactly
+  that effect is named, or when the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
+- Its family is right when one effect of its family (FAMILIES) is named and none of another.
+- `unknown` where something of the catalogue is hidden is a false unknown.
+- A pair: an effect counts as found when it, or an equivalent, is named; a third is spurious when it stands for neither.
+- A tricky case has its own acceptable answers (`cases.Answer`).
+- Intervals beside shares are 90 % binomial ones (Clopper-Pearson).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from scipy.stats import beta
+
+Json: TypeAlias = dict[str, Any]
+
+FAMILIES = {
+    "optics": ("vignetting", "optical_blur"),
+    "lamp": ("lamp_drift", "light_flicker"),
+    "lag": ("photodiode_lag", "incomplete_reset"),
+    "saturation": ("dead_time", "comparator_delay", "photo_response_nonlinearity", "synchronous_reset"),
+    "coupling": ("crosstalk", "blooming", "ir_drop"),
+    "dark": (
+        "dark_current", "dark_current_spread", "dark_current_tail", "dark_current_drift", "hot_pixels",
+        "random_telegraph_noise",
+    ),
+    "common noise": ("supply_ripple", "common_threshold_noise", "row_temporal_noise", "clock_jitter"),
+    "pixel noise": (
+        "shot_noise", "reset_noise", "excess_threshold_noise", "frame_threshold_noise", "threshold_flicker_noise",
+    ),
+    "pattern": (
+        "conversion_gain_spread", "capacitor_spread", "bias_voltage_spread", "row_fixed_pattern",
+        "column_fixed_pattern", "dead_pixels",
+    ),
+    "read-out": ("readout_skew", "missed_spikes", "spurious_spikes", "afterpulsing"),
+}  # fmt: skip
+"""By what an engineer would go and look at."""
+
+EQUIVALENT = (
+    {"shot_noise", "reset_noise", "excess_threshold_noise"},
+    {"conversion_gain_spread", "capacitor_spread", "bias_voltage_spread"},
+)
+"""At one V_d the data hold only the sum of the first (the slope of A_k), only the product of the others (the rate)."""
+
+INSEPARABLE = (
+    *EQUIVALENT,
+    {"photo_response_nonlinearity", "ir_drop"},
+)
+"""Sets whose `class` counts as right (DESIGN section 9)."""
+
+
+RIVAL_LESS = 0.02
+"""By how much less of the gap a wrong effect has to remove."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A case and what came of it.  answer: the label of its column in the confusion matrix."""
+
+    id: str
+    group: str
+    what: str
+    truth: tuple[str, ...]
+    times_limit: float
+    answer: str
+    right: bool
+    family: bool
+    found: tuple[str, ...]
+    spurious: tuple[str, ...]
+    removed: float | None
+    rival_removed: float | None
+    errors: tuple[Json, ...]
+    seconds: float
+    error: str = ""
+
+
+def family_of(name: str) -> str:
+    """The family of an effect's name; of a name outside the table, the name."""
+    return next((family for family, names in FAMILIES.items() if name in names), name)
+
+
+def names_of(diagnosis: Json) -> tuple[str, ...]:
+    """Effects that a diagnosis names, in its order; of a class its members, of a parameter the effect it belongs to."""
+    effects, verdict = diagnosis.get("effects") or [], diagnosis.get("verdict")
+    names = [effect["name"] for effect in effects]
+    if verdict == "class":
+        members = (diagnosis.get("class") or {}).get("members") or []
+        names += members or [other["name"] for effect in effects for other in effect.get("alternatives") or []]
+    if verdict == "parameter":
+        names += list(diagnosis.get("parameters") or {})
+    return tuple(dict.fromkeys(names))
+
+
+def stands_for(name: str, truth: str) -> bool:
+    """Whether naming `name` is as good as naming `truth`."""
+    return name == truth or any({name, truth} <= same for same in EQUIVALENT)
+
+
+def score_case(key: Json, result: Json) -> Scored:
+    """Compare one diagnosis with its key.  result: as `trial` leaves it, with `diagnosis` or with `error`."""
+    diagnosis = result.get("diagnosis") or {"verdict": "error", "effects": []}
+    verdict, names, truth = diagnosis.get("verdict", ""), names_of(diagnosis), tuple(key["truth"])
+    named = names if verdict in ("named", "class", "parameter") else ()
+    hidden = {h["name"]: h for h in key["recipe"]["hidden"]}
+    found = tuple(t for t in truth if any(stands_for(name, t) for name in named))
+    spurious = tuple(name for name in named if not any(stands_for(name, t) for t in truth))
+    right = _accepted(key["accept"], diagnosis) if key["accept"] else _named_right(verdict, named, truth)
+    removed = (diagnosis.get("gap") or {}).get("removed")
+    return Scored(
+        id=key["id"],
+        group=key["group"],
+        what=key["what"],
+        truth=truth,
+        times_limit=float(next(iter(hidden.values()))["times_limit"]) if hidden else 0.0,
+        answer=_label(verdict, names),
+        right=right,
+        family=right or (bool(named) and {family_of(n) for n in named} <= {family_of(t) for t in truth}),
+        found=found,
+        spurious=spurious,
+        removed=None if removed is None else float(removed),
+        rival_removed=_rival(diagnosis),
+        errors=tuple(_parameter_errors(diagnosis, hidden)),
+        seconds=float(result.get("seconds", 0.0)),
+        error=str(result.get("error", "")),
+    )
+
+
+def _named_right(verdict: str, named: Sequence[str], truth: Sequence[str]) -> bool:
+    if verdict == "class":
+        return any(t in named for t in truth) and any(set(named) <= same for same in INSEPARABLE)
+    return bool(named) and all(any(stands_for(n, t) for t in truth) for n in named) and _all_found(named, truth)
+
+
+def _all_found(named: Sequence[str], truth: Sequence[str]) -> bool:
+    return all(any(stands_for(n, t) for n in named) for t in truth)
+
+
+def _accepted(answers: Sequence[Json], diagnosis: Json) -> bool:
+    return any(_meets(answer, diagnosis) for answer in answers)
+
+
+def _meets(answer: Json, diagnosis: Json) -> bool:
+    if diagnosis.get("verdict") not in answer["verdicts"]:
+        return False
+    names = names_of(diagnosis)
+    if not all(any(stands_for(n, wanted) for n in names) for wanted in answer["names"]):
+        return False
+    if answer["place"] and not _says_where_or_when(diagnosis):
+        return False
+    untestable = [entry["name"] for entry in diagnosis.get("not_testable") or []]
+    return not answer["not_testable"] or answer["not_testable"] in untestable
+
+
+def _says_where_or_when(diagnosis: Json) -> bool:
+    described = [diagnosis.get("unknown") or {}, *(diagnosis.get("effects") or [])]
+    return any(d.get(key) for d in described if isinstance(d, dict) for key in ("where", "region", "when"))
+
+
+def _label(verdict: str, names: Sequence[str]) -> str:
+    if verdict == "named":
+        return " + ".join(sorted(names)) or "named nothing"
+    if verdict in ("class", "parameter") and names:
+        return f"{verdict}: " + " / ".join(sorted(names))
+    return verdict or "no verdict"
+
+
+def _rival(diagnosis: Json) -> float | None:
+    """Share of the gap that the best alternative removes, where the diagnosis states it (`removed` of alternatives)."""
+    stated = [
+        float(other["removed"])
+        for effect in diagnosis.get("effects") or []
+        for other in effect.get("alternatives") or []
+        if other.get("removed") is not None
+    ]
+    return max(stated, default=None)
+
+
+def _parameter_errors(diagnosis: Json, hidden: dict[str, Json]) -> Iterable[Json]:
+    """For each effect named by its own name: error and stated uncertainty of each parameter that it states."""
+    for effect in diagnosis.get("effects") or []:
+        truth = hidden.get(effect["name"])
+        if truth is None:
+            continue
+        for name, stated in (effect.get("parameters") or {}).items():
+            if name in truth["parameters"] and stated.get("value") is not None:
+                true, value, sd = truth["parameters"][name], float(stated["value"]), stated.get("sd")
+                yield {
+                    "effect": effect["name"], "parameter": name, "true": true, "value": value,
+                    "sd": None if sd is None else float(sd),
+                }  # fmt: skip
+
+
+# ---- figures
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the acceptance: value, what is asked, from how many.  share: with its 90 % interval."""
+
+    item: str
+    what: str
+    value: float
+    asked: str
+    cases: int
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def met(self) -> bool:
+        """Whether the value is what is asked."""
+        sign, number = self.asked.split()[0], self.asked.split()[1]
+        if "-" in number:
+            low, high = (float(part) for part in number.split("-"))
+            return low <= self.value <= high
+        return self.value >= float(number) if sign == ">=" else self.value <= float(number)
+
+
+def binomial_90(hits: int, trials: int) -> tuple[float, float]:
+    """Clopper-Pearson interval of a share."""
+    low = 0.0 if hits == 0 else float(beta.ppf(0.05, hits, trials - hits + 1))
+    high = 1.0 if hits == trials else float(beta.ppf(0.95, hits + 1, trials - hits))
+    return low, high
+
+
+def figures(scored: Sequence[Scored]) -> list[Figure]:
+    """Every figure of the acceptance that these cases bear on."""
+    made: list[Figure] = []
+
+    def share(item: str, what: str, asked: str, cases: Sequence[Scored], hits: Sequence[bool]) -> None:
+        if cases:
+            count = sum(hits)
+            made.append(Figure(item, what, count / len(cases), asked, len(cases), *binomial_90(count, len(cases))))
+
+    def group(*names: str) -> list[Scored]:
+        return [s for s in scored if s.group in names]
+
+    none, strong, weak, base = group("none"), group("strong"), group("weak"), group("base")
+    pairs, tricky, catalogue = group("pair"), group("tricky"), group("strong", "weak", "pair")
+    share("1", "false alarms, nothing hidden", "<= 0.07", none, [s.answer != "none" for s in none])
+    share("2", "strong: right name", ">= 0.90", strong, [s.right for s in strong])
+    share("2", "strong: right family", ">= 0.97", strong, [s.family for s in strong])
+    share("2", "near the limit: right name", ">= 0.70", weak, [s.right for s in weak])
+    share("2", "base effects from `ideal`: right name", ">= 0.90", base, [_base_right(s) for s in base])
+    for name, title in (("outside", "outside the catalogue"), ("left_out", "name withheld")):
+        cases = group(name)
+        share("3", f"{title}: unknown", ">= 0.80", cases, [s.right for s in cases])
+    both_kinds = group("outside", "left_out")
+    share("3", "all outside: unknown", ">= 0.80", both_kinds, [s.right for s in both_kinds])
+    share("3", "false unknown, catalogue cases", "<= 0.10", catalogue, [s.answer == "unknown" for s in catalogue])
+    share("4", "pairs: at least one right", ">= 0.95", pairs, [len(s.found) >= 1 for s in pairs])
+    share("4", "pairs: both right", ">= 0.75", pairs, [len(s.found) == len(s.truth) for s in pairs])
+    share("4", "pairs: a spurious third", "<= 0.10", pairs, [bool(s.spurious) for s in pairs])
+    made += _gap_figures([s for s in strong + weak if s.right and s.removed is not None])
+    made += _parameter_figures([e for s in strong + weak + pairs if s.right or s.found for e in s.errors])
+    share("6", "tricky: right verdict", ">= 0.80", tricky, [s.right for s in tricky])
+    if scored:
+        slowest = max(s.seconds for s in scored)
+        made.append(Figure("7", "slowest diagnosis [s]", slowest, "<= 120", len(scored)))
+    return made
+
+
+def _base_right(scored: Scored) -> bool:
+    """The ladder is right when it names something and nothing that is not there."""
+    return bool(scored.found) and not scored.spurious if scored.what == "ladder" else scored.right
+
+
+def _gap_figures(right: Sequence[Scored]) -> list[Figure]:
+    if not right:
+        return []
+    removed = np.array([s.removed for s in right], float)
+    return [
+        Figure("5", "gap removed, right names: median", float(np.median(removed)), ">= 0.95", len(right)),
+        Figure(
+            "5", "gap removed, right names: 10th percentile", float(np.quantile(removed, 0.1)), ">= 0.8", len(right)
+        ),
+    ]
+
+
+def _parameter_figures(errors: Sequence[Json]) -> list[Figure]:
+    made = []
+    stated = [e for e in errors if e["sd"]]
+    if errors:
+        close = [_is_close(e) for e in errors]
+        low, high = binomial_90(sum(close), len(close))
+        what = "parameters within 15 % or twice their sd"
+        made.append(Figure("5", what, sum(close) / len(close), ">= 0.9", len(close), low, high))
+    if stated:
+        covered = [abs(e["value"] - e["true"]) <= 1.645 * e["sd"] for e in stated]
+        low, high = binomial_90(sum(covered), len(covered))
+        what = "90 % intervals cover"
+        made.append(Figure("5", what, sum(covered) / len(covered), "in 0.80-0.97", len(covered), low, high))
+    return made
+
+
+def _is_close(e: Json) -> bool:
+    error = abs(e["value"] - e["true"])
+    return error <= 0.15 * abs(e["true"]) or (e["sd"] is not None and error <= 2.0 * e["sd"])
+
+
+def confusion(scored: Sequence[Scored]) -> dict[str, dict[str, int]]:
+    """True (rows) against answered (columns), counts; outside and withheld mechanisms are marked so."""
+    rows: dict[str, Counter[str]] = {}
+    mark = {"outside": " (outside)", "left_out": " (name withheld)", "tricky": " (tricky)"}
+    for s in scored:
+        rows.setdefault(s.what + mark.get(s.group, ""), Counter())[s.answer] += 1
+    return {row: dict(rows[row]) for row in sorted(rows)}
+
+
+def by_effect(scored: Sequence[Scored]) -> list[Json]:
+    """One row an effect: how often it was seen and named, strong and near its limit."""
+    singles = [s for s in scored if s.group in ("strong", "weak", "base", "outside")]
+    rows = []
+    for name in sorted({s.what for s in singles}):
+        cases = [s for s in singles if s.what == name]
+        row: Json = {"effect": name}
+        for group in ("strong", "weak", "base", "outside"):
+            some = [s for s in cases if s.group == group]
+            if some:
+                row[group] = f"{sum(s.right for s in some)}/{len(some)}"
+        row["strength/limit"] = ", ".join(f"{s.times_limit:.1f}" for s in cases)
+        row["answers"] = ", ".join(s.answer for s in cases)
+        rows.append(row)
+    return rows

@@ -1,0 +1,246 @@
+"""The trial: cases, seals, scores, a run that goes on where it stopped."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from spikecam_env.cli.blind_trial import BlindTrial, hidden_world
+from spikecam_env.errors import InputError
+from tests.hidden_world.cases import Case, cases
+from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
+from tests.hidden_world.keys import BrokenSealError, key_text, open_key, seal
+from tests.hidden_world.outside import REPORT, TUNE
+from tests.hidden_world.score import FAMILIES, binomial_90, confusion, family_of, figures, score_case
+from tests.hidden_world.trial import as_text, chosen, is_done, run_trial, score_trial
+
+FULL = {part: cases("full", part) for part in ("tune", "report")}
+TITLE = {"set": "full", "part": "tune"}
+
+
+def small(case: Case) -> Case:
+    return replace(case, recipe=replace(case.recipe, shape=(8, 8), frames=64))
+
+
+def key_of(case: Case) -> dict[str, Any]:
+    return json.loads(key_text(case))
+
+
+def case_of(group: str, what: str = "", part: str = "tune") -> Case:
+    return next(c for c in FULL[part] if c.group == group and what in c.what)
+
+
+def answered(case: Case, verdict: str, *names: str, **rest: Any) -> Any:
+    diagnosis = {"verdict": verdict, "effects": [{"name": n} for n in names], **rest}
+    return score_case(key_of(case), {"diagnosis": diagnosis, "seconds": 1.0})
+
+
+# ---- cases
+
+
+def test_full_set_has_the_numbers_that_are_asked():
+    for part, listed in FULL.items():
+        count = Counter(c.group for c in listed)
+        each = Counter(c.what for c in listed if c.group == "strong")
+        assert count["none"] >= 60 and count["pair"] >= 30
+        assert set(each) == set(CATALOGUE) and min(each.values()) >= 3
+        assert len({c.what for c in listed if c.group == "outside"}) >= 10, part
+        assert len({c.what for c in listed if c.group == "tricky"}) >= 11
+
+
+def test_parts_and_sets_share_no_seed_and_no_outside_mechanism():
+    every = [c for which in ("quick", "full") for part in ("tune", "report") for c in cases(which, part)]
+    assert len({c.recipe.seed for c in every}) == len(every) == len({c.id for c in every})
+    outside = [{c.what for c in FULL[part] if c.group == "outside"} for part in ("tune", "report")]
+    assert outside == [set(TUNE), set(REPORT)]
+
+
+def test_strengths_are_within_their_group():
+    for case in FULL["tune"]:
+        low, high = {"strong": (3, 10), "weak": (1, 3), "pair": (3, 10)}.get(case.group, (0, 1e9))
+        assert all(low <= h.times_limit <= high for h in case.recipe.hidden)
+
+
+def test_what_a_case_hides_is_not_in_its_id_or_withheld_names_of_others():
+    case = case_of("left_out", "photo_response_nonlinearity")
+    assert set(case.exclude) == {"photo_response_nonlinearity", "ir_drop"}
+    assert all(not c.exclude for c in FULL["tune"] if c.group != "left_out")
+    assert all(set(c.id) <= set("0123456789abcdef") for c in FULL["tune"])
+
+
+def test_only_and_limit_pick_evenly():
+    picked = chosen("full", "tune", ["strong", "none"], 5)
+    assert Counter(c.group for c in picked) == {"strong": 5, "none": 5}
+    assert len({c.what for c in picked if c.group == "strong"}) == 5
+    with pytest.raises(ValueError, match="no group 'strongest'"):
+        chosen("full", "tune", ["strongest"])
+
+
+# ---- seals
+
+
+def test_a_key_that_was_changed_is_not_opened(tmp_path):
+    manifest = seal(FULL["tune"][:3], tmp_path, TITLE)
+    case = FULL["tune"][0]
+    assert open_key(tmp_path, case.id) == key_of(case)
+    assert set(manifest["cases"][0]) == {"id", "model", "exclude", "key_sha256"}
+    path = tmp_path / "sealed" / f"{case.id}.json"
+    path.write_text(path.read_text().replace('"none"', '"strong"'))
+    with pytest.raises(BrokenSealError, match=case.id):
+        open_key(tmp_path, case.id)
+
+
+def test_a_folder_of_another_trial_is_refused(tmp_path):
+    seal(FULL["tune"][:3], tmp_path, TITLE)
+    seal(FULL["tune"][:3], tmp_path, TITLE)
+    with pytest.raises(ValueError, match="another trial"):
+        seal(FULL["tune"][:4], tmp_path, TITLE)
+
+
+# ---- scores
+
+
+def test_families_hold_every_candidate_once():
+    names = [name for family in FAMILIES.values() for name in family]
+    assert sorted(names) == sorted(set(CATALOGUE) | set(BASE_EFFECTS))
+    assert family_of("dead_time") == family_of("comparator_delay") == "saturation"
+
+
+def test_right_names_families_and_twins():
+    case = case_of("strong", "dead_time")
+    assert answered(case, "named", "dead_time").right
+    twin = answered(case, "named", "comparator_delay")
+    assert not twin.right and twin.family and twin.spurious == ("comparator_delay",)
+    assert not answered(case, "named", "dead_time", "vignetting").right
+    assert not answered(case, "named", "vignetting").family
+    assert not answered(case, "unknown").right
+    other = case_of("strong", "photo_response_nonlinearity")
+    members = {"members": ["photo_response_nonlinearity", "ir_drop"], "experiment": "a masked row"}
+    assert answered(other, "class", "ir_drop", **{"class": members}).right
+    wide = {"members": ["photo_response_nonlinearity", "dead_time"], "experiment": "more levels"}
+    assert not answered(other, "class", "dead_time", **{"class": wide}).right
+
+
+def test_excess_noise_may_be_called_a_wrong_parameter():
+    case = case_of("strong", "excess_threshold_noise")
+    assert case.model == "physical"
+    assert answered(case, "parameter", parameters={"reset_noise": {"ratio": 4.0}}).right
+    assert answered(case, "named", "reset_noise").right
+    assert not answered(case, "parameter", parameters={"dark_current": {"ratio": 4.0}}).right
+
+
+def test_tricky_cases_have_their_own_answers():
+    assert answered(case_of("tricky", "wrong_label"), "data").right
+    assert not answered(case_of("tricky", "wrong_label"), "unknown").right
+    dropped = case_of("tricky", "dropped_frames")
+    assert answered(dropped, "data").right
+    assert not answered(dropped, "unknown", unknown={"light": "lit"}).right
+    assert answered(dropped, "unknown", unknown={"when": "frames 3000 .. 5000 of bars"}).right
+    skew = case_of("tricky", "skew")
+    assert not answered(skew, "none").right
+    assert answered(skew, "none", not_testable=[{"name": "readout_skew", "needs": "motion"}]).right
+    both = case_of("tricky", "dead time against")
+    assert answered(both, "named", "dead_time", "photo_response_nonlinearity").right
+    assert not answered(both, "named", "dead_time").right
+    noise = case_of("tricky", "threshold noise")
+    assert answered(noise, "parameter", parameters={"reset_noise": {"ratio": 9.0}}).right
+
+
+def test_pairs_and_outside_are_counted_as_the_acceptance_says():
+    pair = case_of("pair")
+    first, second = pair.truth
+    some = [answered(pair, "named", first), answered(pair, "named", first, second), answered(pair, "unknown")]
+    some.append(answered(pair, "named", first, second, next(n for n in CATALOGUE if n not in pair.truth)))
+    value = {f.what: f.value for f in figures(some)}
+    assert value["pairs: at least one right"] == 0.75
+    assert value["pairs: both right"] == 0.5
+    assert value["pairs: a spurious third"] == 0.25
+    assert value["false unknown, catalogue cases"] == 0.25
+    outside = case_of("outside")
+    value = {f.what: f.value for f in figures([answered(outside, "unknown"), answered(outside, "named", "dead_time")])}
+    assert value["outside the catalogue: unknown"] == 0.5
+
+
+def test_gap_and_parameters_of_right_names():
+    case = case_of("strong", "dead_time")
+    true = case.recipe.hidden[0].parameters["tau_us"]
+    made = []
+    for removed, error, sd in ((0.99, 0.0, 0.01), (0.9, 0.1, 0.05), (0.96, 0.5, 0.1)):
+        stated = {"tau_us": {"value": true * (1 + error), "sd": true * sd}}
+        diagnosis = {
+            "verdict": "named",
+            "effects": [{"name": "dead_time", "parameters": stated}],
+            "gap": {"removed": removed},
+        }
+        made.append(score_case(key_of(case), {"diagnosis": diagnosis, "seconds": 130.0}))
+    value = {f.what: f for f in figures(made)}
+    assert value["gap removed, right names: median"].value == 0.96
+    assert value["parameters within 15 % or twice their sd"].value == pytest.approx(2 / 3)
+    assert value["90 % intervals cover"].value == pytest.approx(1 / 3)
+    assert not value["90 % intervals cover"].met and not value["slowest diagnosis [s]"].met
+
+
+def test_confusion_counts_true_against_answered():
+    none, strong = case_of("none"), case_of("strong", "dead_time")
+    some = [answered(none, "none"), answered(none, "named", "dead_time"), answered(strong, "named", "dead_time")]
+    assert confusion(some) == {"nothing": {"none": 1, "dead_time": 1}, "dead_time": {"dead_time": 1}}
+
+
+def test_binomial_interval_is_clopper_pearson():
+    low, high = binomial_90(57, 60)
+    assert low == pytest.approx(0.8761, abs=2e-3) and high == pytest.approx(0.9863, abs=2e-3)
+    assert binomial_90(0, 10)[0] == 0.0 and binomial_90(10, 10)[1] == 1.0
+
+
+# ---- a run
+
+
+def test_a_run_goes_on_where_it_stopped(tmp_path):
+    picked = [small(c) for c in chosen("full", "tune", ["none", "strong"], 2)]
+    said = "tests.hidden_world.bench:says_dead_time"
+    steps = run_trial(tmp_path, "full", "tune", said, picked=picked)
+    assert [next(steps) for _ in range(3)] == [(0, 4), (1, 4), (2, 4)]
+    steps.close()
+    assert sum(is_done(tmp_path, c.id) for c in picked) == 2
+    assert list(run_trial(tmp_path, "full", "tune", said, picked=picked))[-1] == (4, 4)
+    asked = (tmp_path / "asked.txt").read_text().splitlines()
+    assert sorted(line.split()[0] for line in asked) == sorted(c.id for c in picked)
+    assert all(line.split()[2:] == [".dat", ".json", ".npz"] for line in asked)
+    assert not any((tmp_path / "campaigns").iterdir())
+    trial = score_trial(tmp_path, picked)
+    assert trial["cases"] == 4 and trial["errors"] == 0
+    assert trial["confusion"]["nothing"] == {"dead_time": 2}
+    page = (tmp_path / "trial.md").read_text()
+    assert page == as_text(trial) and "false alarms, nothing hidden | 100 % | 22 - 100 %" in page
+
+
+def test_a_diagnosis_that_breaks_is_counted_and_tried_again(tmp_path):
+    picked = [small(case_of("none"))]
+    assert list(run_trial(tmp_path, "full", "tune", "tests.hidden_world.bench:fails", picked=picked))[-1] == (1, 1)
+    assert score_trial(tmp_path, picked)["errors"] == 1
+    assert not is_done(tmp_path, picked[0].id)
+    list(run_trial(tmp_path, "full", "tune", "tests.hidden_world.bench:says_dead_time", picked=picked))
+    assert score_trial(tmp_path, picked)["errors"] == 0
+
+
+def test_command_says_where_the_world_is_not(tmp_path):
+    with pytest.raises(InputError, match="no hidden world"):
+        hidden_world(tmp_path)
+    with pytest.raises(InputError, match="jobs = 0"):
+        BlindTrial(tmp_path, jobs=0).run()
+    with pytest.raises(InputError, match="no group"):
+        BlindTrial(tmp_path, only=["all"]).run()
+
+
+def test_command_prints_the_figures(tmp_path, monkeypatch, capsys):
+    trial = hidden_world(Path(__file__).parent)
+    monkeypatch.setattr(trial, "chosen", lambda *a: [small(c) for c in chosen(*a)])
+    said = "tests.hidden_world.bench:says_dead_time"
+    BlindTrial(tmp_path, set="quick", part="report", only=["weak"], limit=2, diagnose=said).run()
+    printed = capsys.readouterr().out
+    assert "near the limit: right name" in printed and (tmp_path / "trial.json").is_file()

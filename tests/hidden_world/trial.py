@@ -1,0 +1,175 @@
+"""Run a trial: generate, diagnose, keep what was said; then open the keys and score.
+
+A case that has a result is not run again, so that a trial can be stopped and gone on with.  Its campaign is deleted.
+
+    OUT/manifest.json, sealed/     see `keys`          OUT/results/ID.json   what was said of a case
+    OUT/trial.json, trial.md       the figures         OUT/campaigns/ID      only while it is at work, or with `keep`
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import resource
+import shutil
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from tests.hidden_world.cases import GROUPS, Case, cases
+from tests.hidden_world.keys import open_key, seal, write_whole
+from tests.hidden_world.score import Figure, Scored, by_effect, confusion, figures, score_case
+from tests.hidden_world.world import write_campaign
+
+Diagnose = Callable[[Path, str, Path, int, "tuple[str, ...]"], "dict[str, Any]"]
+"""(campaign folder, model, folder for its results, seed, names withheld) -> diagnosis.json as a dictionary."""
+
+
+def chosen(which: str, part: str, only: Sequence[str] = (), limit: int | None = None) -> list[Case]:
+    """The cases of a set and part; of these groups; of each group at most `limit`, evenly spread."""
+    for group in only:
+        if group not in GROUPS:
+            raise ValueError(f"there is no group {group!r}; choose of {', '.join(GROUPS)}")
+    all_cases = cases(which, part)
+    picked: list[Case] = []
+    for group in only or GROUPS:
+        some = [case for case in all_cases if case.group == group]
+        count = len(some) if limit is None else min(limit, len(some))
+        picked += [some[i * len(some) // count] for i in range(count)]
+    return picked
+
+
+def run_trial(
+    out: Path, which: str, part: str, diagnose: str, *, picked: Sequence[Case], jobs: int = 1, keep: bool = False
+) -> Iterator[tuple[int, int]]:
+    """Do what is not done yet; yields (done, all) as it goes on.  diagnose: `module:function`, see `Diagnose`.
+
+    Keys are sealed and their hashes published before the first diagnosis.
+    """
+    (out / "results").mkdir(parents=True, exist_ok=True)
+    seal(cases(which, part), out, {"set": which, "part": part})
+    waiting = [case for case in picked if not is_done(out, case.id)]
+    done = len(picked) - len(waiting)
+    yield done, len(picked)
+    if jobs == 1:
+        for case in waiting:
+            run_case(case, out, diagnose, keep)
+            done += 1
+            yield done, len(picked)
+        return
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        futures = [pool.submit(run_case, case, out, diagnose, keep) for case in waiting]
+        for future in as_completed(futures):
+            future.result()
+            done += 1
+            yield done, len(picked)
+
+
+def is_done(out: Path, case_id: str) -> bool:
+    """Whether a case has a diagnosis; one that ended in an error is tried again."""
+    path = out / "results" / f"{case_id}.json"
+    return path.exists() and "diagnosis" in json.loads(path.read_text(encoding="utf-8"))
+
+
+def run_case(case: Case, out: Path, diagnose: str, keep: bool) -> None:
+    """Generate one campaign, have it diagnosed, and write down what was said; an exception is a result too."""
+    campaign, work = out / "campaigns" / case.id, out / "diagnoses" / case.id
+    began = time.perf_counter()
+    write_campaign(case.recipe, campaign)
+    result: dict[str, Any] = {"id": case.id, "generate_s": round(time.perf_counter() - began, 2)}
+    began = time.perf_counter()
+    try:
+        function: Diagnose = _named(diagnose)
+        result["diagnosis"] = function(campaign, case.model, work, 1, case.exclude)
+    except ImportError:
+        raise
+    except Exception:
+        result["error"] = traceback.format_exc()
+    result["seconds"] = round(time.perf_counter() - began, 2)
+    result["peak_gib"] = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20, 2)
+    write_whole(out / "results" / f"{case.id}.json", json.dumps(result, indent=1) + "\n")
+    if not keep:
+        shutil.rmtree(campaign)
+
+
+def _named(name: str) -> Diagnose:
+    module, _, attribute = name.partition(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def score_trial(out: Path, picked: Sequence[Case]) -> dict[str, Any]:
+    """Open the keys of all cases with a result, score, and write trial.json and trial.md; returns the former."""
+    scored: list[Scored] = []
+    memory = 0.0
+    for case in picked:
+        path = out / "results" / f"{case.id}.json"
+        if path.exists():
+            result = json.loads(path.read_text(encoding="utf-8"))
+            scored.append(score_case(open_key(out, case.id), result))
+            memory = max(memory, float(result.get("peak_gib", 0.0)))
+    made = figures(scored)
+    if memory:
+        made.append(Figure("7", "largest process [GiB]", memory, "<= 4", len(scored)))
+    trial = {
+        "format": "spikecam-trial-score/1",
+        "cases": len(scored),
+        "of": len(picked),
+        "errors": sum(bool(s.error) for s in scored),
+        "figures": [{**asdict(f), "met": f.met} for f in made],
+        "effects": by_effect(scored),
+        "confusion": confusion(scored),
+        "scored": [asdict(s) for s in scored],
+    }
+    write_whole(out / "trial.json", json.dumps(trial, indent=1) + "\n")
+    write_whole(out / "trial.md", as_text(trial))
+    return trial
+
+
+def as_text(trial: dict[str, Any]) -> str:
+    """The trial as a page of Markdown."""
+    rows = [
+        {
+            "item": f["item"],
+            "figure": f["what"],
+            "value": f"{f['value']:.3g}" if f["low"] is None else f"{100 * f['value']:.0f} %",
+            "90 %": "" if f["low"] is None else f"{100 * f['low']:.0f} - {100 * f['high']:.0f} %",
+            "asked": f["asked"],
+            "cases": f["cases"],
+            "met": "yes" if f["met"] else "NO",
+        }
+        for f in trial["figures"]
+    ]
+    wrong = [s for s in trial["scored"] if not s["right"]]
+    matrix = [
+        {"true": true, "answered": ", ".join(f"{name} {n}" for name, n in sorted(row.items(), key=lambda i: -i[1]))}
+        for true, row in trial["confusion"].items()
+    ]
+    lines = [
+        f"# Blind trial: {trial['cases']} of {trial['of']} cases, {trial['errors']} ended in an error",
+        "",
+        _table(rows),
+        "## By effect: right of tried, by group",
+        "",
+        _table(trial["effects"], ("effect", "strong", "weak", "base", "outside", "strength/limit", "answers")),
+        "## Confusion: what was there, what was said",
+        "",
+        _table(matrix),
+        "## Not right",
+        "",
+        _table([{"id": s["id"], "group": s["group"], "true": s["what"], "said": s["answer"]} for s in wrong]),
+    ]
+    return "\n".join(lines)
+
+
+def _table(rows: Sequence[dict[str, Any]], columns: Sequence[str] = ()) -> str:
+    if not rows:
+        return "(none)\n"
+    columns = columns or tuple(rows[0])
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    lines += ["| " + " | ".join(str(row.get(c, "")).replace("|", "/") for c in columns) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
