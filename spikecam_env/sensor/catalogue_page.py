@@ -85,10 +85,17 @@ def _entry(effect: type[Effect]) -> str:
             *(_row(f, effect) for f in fields(effect)),
             "",
             *said,
-            f"- Engines: {'all' if effect.is_fixed() else 'reference'}",
+            f"- Engines: {engines(effect)}",
             "",
         ]
     )
+
+
+def engines(effect: type[Effect]) -> str:
+    """Which engines carry an effect, in words."""
+    if effect.is_fixed():
+        return "all"
+    return "reference, fast" if effect.is_compiled() else "reference"
 
 
 def _row(f: Field[Any], effect: type[Effect]) -> str:
@@ -127,11 +134,12 @@ Stage: optics.  Seen in: the first frames of a recording.  Twins: lamp_drift.  S
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Stage, parameter
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -141,9 +149,9 @@ class SlowShutter(Effect):
     stage = Stage.OPTICS
     strength = "tau_us"
 
-    def collect(self, light: Array, dark: Array, now: Exposure, memory: Any) -> tuple[Array, Array, Any]:
-        open_by_now = -math.expm1(-1e6 * now.middle_s / self.tau_us) if self.tau_us else 1.0
-        return light * open_by_now, dark, memory
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+        open_by_now = -np.expm1(-1e6 * now.middle_s / self.tau_us) if self.tau_us else 1.0
+        return light.scaled(open_by_now), dark, memory
 ```
 
 That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))` and `[[effect]]`
@@ -153,9 +161,15 @@ changes no bit, alone and among all others; that its hooks change nothing in pla
 cut, saved and restored; docs, bounds, twins that exist; and a test of your own, `test_slow_shutter_...`, of its law.
 
 Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
-carries them); `collect`, `compare`, `after_reset`, `spiked`, `read_out` for what happens from frame to frame. What must
-be remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator of the
-effect's own, so that no other effect's draws change. Time is `now.number`, absolute, never a count of calls.
+carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames, arrays
+of (frames, rows, columns), and the fast engine runs them as they stand. A `Charge` keeps a picture and a number a frame
+apart: `light.scaled(numbers)` costs nothing a pixel, `Charge(f(light.values))` an array. What depends on the spikes is
+written frame by frame, `react`, `after_reset`, `spiked`, for the reference, and declared in `feedback` for the fast
+engine; without a declaration the fast engine refuses the effect by name and `engine="auto"` takes the reference.
+
+What must be remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator
+of the effect's own, so that no other effect's draws change. What belongs to the unit (which pixels have a trap) is drawn
+there from `pattern`, the same in all recordings by one unit. Time is `now.number`, absolute, never a count of calls.
 '''
 
 

@@ -22,6 +22,7 @@ BAND = 1024
 """Pixels of a band, about: what is worked on frame after frame stays in the first-level cache."""
 
 _U = np.uint32
+_Q = np.uint64
 _G = float(GRAINS)
 
 
@@ -80,106 +81,130 @@ def advance(  # type: ignore[no-untyped-def]
     dark_step = 0 if dark.shape[0] == 1 else 1
     field_step = 0 if field.shape[0] == 1 else 1
     rows = bottom - top if kick != 0.0 else max(1, min(bottom - top, BAND // columns))
-    most = rows * columns
-    hit = np.zeros((most + 7) // 8 * 8, np.uint8)
+    pitch = (columns + 7) // 8 * 8
+    most = rows * pitch + 8
+    hit = np.zeros(most, np.uint8)
     eights = hit.view(np.uint64)
-    at = np.empty(most, np.int32)
+    begin = np.zeros(rows + 1, np.int64)
+    at = np.empty(most, np.uint32)
+    times = np.empty(most, np.uint32)
     draw = np.empty(most, np.float32)
-    variance = np.empty(most, np.float64)
+    rate, over, phi, electrons, shift, noise, jitter = np.empty((7, most), np.float64)
     for row0 in range(top, bottom, rows):
         row1 = min(row0 + rows, bottom)
-        p0, p1 = row0 * columns, row1 * columns
-        hit[:] = 0
         for t in range(frames):
-            lights, darks, fields = light[light_step * t], dark[dark_step * t], field[field_step * t]
-            for r in range(row0, row1):
-                a, d = light_factor[t, r], dark_factor[t, r]
-                f, m = factor[t, r], common[t, r]
-                load = 1.0 + droop * activity[r]
-                q = r * columns
-                for p in range(q, q + columns):
-                    x = max(lights[p] * a, 0.0) + max(darks[p] * d, 0.0)
-                    c = charge[p] + x * _G
-                    charge[p] = c
-                    hit[p - p0] = c >= (threshold[p] * f + grains_per_mV[p] * (m + fields[p])) * load
-
+            lights, darks, fields, bits = light[light_step * t], dark[dark_step * t], field[field_step * t], spikes[t]
             n = 0
-            for word in range((p1 - p0 + 7) // 8):
-                if eights[word]:
-                    for j in range(8 * word, 8 * word + 8):
-                        at[n] = p0 + j
-                        n += hit[j]
-            row = spikes[t]
-            for p in range(p0, p1):
-                row[p] = hit[p - p0]
-            for i in range(n):
-                p = at[i]
-                key = first_key(p, seed_low)
-                counter = _U(key + _U(fired[p] * GOLDEN))
-                draw[i] = standard(counter, second_key(key, seed_high), polynomial)
+            for r in range(row0, row1):
+                q, h = r * columns, (r - row0) * pitch
+                a, d, f, m = light_factor[t, r], dark_factor[t, r], factor[t, r], common[t, r]
+                load = 1.0 + droop * activity[r]
+                row_light, row_dark, row_field = lights[q : q + columns], darks[q : q + columns], fields[q : q + columns]
+                row_charge, row_threshold = charge[q : q + columns], threshold[q : q + columns]
+                row_scale, row_hit, row_bits = grains_per_mV[q : q + columns], hit[h : h + columns], bits[q : q + columns]
+                for j in range(columns):
+                    x = max(row_light[j] * a, 0.0) + max(row_dark[j] * d, 0.0)
+                    c = row_charge[j] + x * _G
+                    row_charge[j] = c
+                    row_hit[j] = c >= (row_threshold[j] * f + row_scale[j] * (m + row_field[j])) * load
+                for j in range(columns):
+                    row_bits[j] = row_hit[j]
+                for word in range(h // 8, (h + pitch) // 8):
+                    if eights[word]:
+                        for j in range(8 * word, 8 * word + 8):
+                            at[n] = q + (j - h)
+                            n += hit[j]
+                begin[r - row0 + 1] = n
+                for i in range(begin[r - row0], n):
+                    p = _Q(at[i])
+                    times[i] = fired[p]
+                    fired[p] = _U(fired[p] + _U(1))
+                    rate[i] = max(lights[p] * a, 0.0) + max(darks[p] * d, 0.0)
+                    shift[i] = grains_per_mV[p] * (m + fields[p])
+                    over[i] = charge[p] - (threshold[p] * f + shift[i]) * load
+                    phi[i] = (_G * f + shift[i]) * load
+                    noise[i] = per_electron[p]
+                    jitter[i] = kappa_squared[p]
 
             for i in range(n):
-                p = at[i]
-                r = p // columns
-                rate = max(lights[p] * light_factor[t, r], 0.0) + max(darks[p] * dark_factor[t, r], 0.0)
-                f, offset = factor[t, r], grains_per_mV[p] * (common[t, r] + fields[p])
-                load = 1.0 + droop * activity[r]
-                limit = (threshold[p] * f + offset) * load
-                lost = per_root_rate * math.sqrt(rate) + per_rate * rate
-                z = draw[i]
-                while True:
-                    over = (charge[p] - limit) / _G
-                    residual = ((over - math.sqrt(rate) * per_root_rate) - rate * per_rate) * kept
-                    charge[p] = residual * _G
-                    # Electrons still to come: to the reference as it stands, and what is lost; of charge thrown away in
-                    # part, the part kept is known less well than it was collected.
-                    electrons = (f + offset / _G) * load + kept * lost - kept * (1.0 - kept) * over
-                    threshold[p] = drawn_threshold(electrons, per_electron[p], kappa_squared[p], z)
-                    fired[p] = _U(fired[p] + _U(1))
-                    limit = (threshold[p] * f + offset) * load
-                    if not charge[p] >= limit:
-                        break
-                    key = first_key(p, seed_low)
-                    counter = _U(key + _U(fired[p] * GOLDEN))
-                    z = standard(counter, second_key(key, seed_high), polynomial)
-                draw[i] = z
-                variance[i] = electrons
+                draw[i] = drawn(at[i], times[i], seed_low, seed_high, polynomial)
+            for i in range(n):
+                over[i], electrons[i] = after_reset(over[i], rate[i], phi[i], per_root_rate, per_rate, kept)
+                phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
+
+            for r in range(row0, row1):
+                f, load = factor[t, r], 1.0 + droop * activity[r]
+                for i in range(begin[r - row0], begin[r - row0 + 1]):
+                    p = _Q(at[i])
+                    limit = (phi[i] * f + shift[i]) * load
+                    while over[i] >= limit:
+                        draw[i] = drawn(at[i], fired[p], seed_low, seed_high, polynomial)
+                        fired[p] = _U(fired[p] + _U(1))
+                        level = (_G * f + shift[i]) * load
+                        over[i], electrons[i] = after_reset(
+                            over[i] - limit, rate[i], level, per_root_rate, per_rate, kept
+                        )
+                        phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
+                        limit = (phi[i] * f + shift[i]) * load
+                    charge[p] = over[i]
+                    threshold[p] = phi[i]
 
             if kick != 0.0:
-                for r in range(row0, row1):
-                    for x in range(columns):
-                        p = r * columns + x
-                        j = p - p0
-                        around = 0
-                        if r > row0:
-                            around += hit[j - columns]
-                        if r < row1 - 1:
-                            around += hit[j + columns]
-                        if x > 0:
-                            around += hit[j - 1]
-                        if x < columns - 1:
-                            around += hit[j + 1]
-                        charge[p] = (charge[p] / _G + kick * around) * _G
+                kick_neighbours(kick, hit, pitch, columns, charge[row0 * columns : row1 * columns])
             if left != 0.0:
                 for i in range(n):
-                    p = at[i]
-                    r = p // columns
-                    rate = max(lights[p] * light_factor[t, r], 0.0) + max(darks[p] * dark_factor[t, r], 0.0)
-                    over = min(max(charge[p] / _G / max(rate, 1e-12), 0.0), 1.0)
-                    now = number + t + 1.0 - over
+                    p = _Q(at[i])
+                    late = min(max(charge[p] / _G / max(rate[i], 1e-12), 0.0), 1.0)
+                    now = number + t + 1.0 - late
                     stays = left * math.expm1(-(now - crossing[p]) / left_tau)
                     charge[p] = (charge[p] / _G - stays) * _G
                     crossing[p] = now
-                    threshold[p] = drawn_threshold(variance[i] + stays, per_electron[p], kappa_squared[p], draw[i])
+                    threshold[p] = needed(electrons[i] + stays, noise[i], jitter[i], draw[i])
             if droop != 0.0:
                 for r in range(row0, row1):
-                    count = 0
-                    for j in range((r - row0) * columns, (r - row0 + 1) * columns):
-                        count += hit[j]
-                    activity[r] = count / columns
+                    activity[r] = (begin[r - row0 + 1] - begin[r - row0]) / columns
 
 
 @njit(inline="always")
-def drawn_threshold(electrons, per_electron, kappa_squared, z):  # type: ignore[no-untyped-def]
-    """The charge that the next spike will need [grains], of which `electrons` thresholds must still arrive."""
-    return _G * (1.0 + math.sqrt(max(electrons, 0.0) * per_electron + kappa_squared) * z)
+def drawn(pixel, number, seed_low, seed_high, polynomial):  # type: ignore[no-untyped-def]
+    """A pixel's draw for its spike of that number: standardised."""
+    key = first_key(pixel, seed_low)
+    return standard(_U(key + _U(number * GOLDEN)), second_key(key, seed_high), polynomial)
+
+
+@njit(inline="always")
+def after_reset(over, rate, limit, per_root_rate, per_rate, kept):  # type: ignore[no-untyped-def]
+    """Charge after a reset [grains], and how many electrons the next spike still needs [thresholds].
+
+    Those up to the limit and those lost; of charge thrown away in part, the rest is known less well than it was.
+    """
+    root, over = math.sqrt(rate), over / _G
+    left = ((over - root * per_root_rate) - rate * per_rate) * kept
+    lost = kept * (root * per_root_rate + rate * per_rate)
+    return left * _G, limit * (1.0 / _G) + lost - kept * (1.0 - kept) * over
+
+
+@njit(inline="always")
+def needed(electrons, per_electron, kappa_squared, draw):  # type: ignore[no-untyped-def]
+    """The threshold [grains] whose charge is spread as that of so many electrons [thresholds] and the reset."""
+    return _G + _G * math.sqrt(max(electrons, 0.0) * per_electron + kappa_squared) * draw
+
+
+@njit(inline="always")
+def kick_neighbours(kick, hit, pitch, columns, charge):  # type: ignore[no-untyped-def]
+    """Charge of whole rows [grains] with what the neighbours that fired couple in; hit: rows of `pitch` bytes."""
+    rows = charge.size // columns
+    for r in range(rows):
+        for x in range(columns):
+            j = r * pitch + x
+            around = 0
+            if r > 0:
+                around += hit[j - pitch]
+            if r < rows - 1:
+                around += hit[j + pitch]
+            if x > 0:
+                around += hit[j - 1]
+            if x < columns - 1:
+                around += hit[j + 1]
+            p = r * columns + x
+            charge[p] = (charge[p] / _G + kick * around) * _G
