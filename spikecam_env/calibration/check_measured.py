@@ -13,22 +13,26 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from spikecam_env.calibration.flat_maps import FRAMES, read_flat_maps
 from spikecam_env.calibration.real import (
+    MAPS,
     MAPS_FRAME_RATE_HZ,
     QUANTILES,
     STEPS,
     WallStatistics,
     plausible_rates,
-    read_flat_maps,
+    read_response_and_dark,
     read_wall,
     wall_statistics,
 )
+from spikecam_env.calibration.two_levels import response_and_dark, two_levels
 from spikecam_env.calibration.wall_noise import excess_covariance
 from spikecam_env.sensor import SensorModel, SpikeSensor
 
 Array = NDArray[np.float64]
 
 MODELS = ("measured", "scsim", "physical", "ideal")
+MAP_MODELS = ("measured", "scsim", "physical")
 PERCENTILES = (10, 50, 90, 99)
 
 _JITTER = 4e-5
@@ -85,16 +89,29 @@ def record_wall(
 def flat_quantiles(model: SensorModel | str, light: Array, dark: Array, seed: int = 0) -> list[dict[str, object]]:
     """Rows of measured and modelled quantiles of dark level and response, and their ratio less one.
 
-    light, dark: (H, W) rates of the real maps.  The model's light is scaled to the same median response.
+    light, dark: (H, W) rates of the real maps.  The model's light is scaled to the same median response.  Dark levels
+    of both are counts of FRAMES frames, spread evenly within a count: a tenth of the pixels have ten or fewer.
     """
-    camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
-    unit = replace(camera, frame_rate_hz=MAPS_FRAME_RATE_HZ).draw_unit((light.shape[0], light.shape[1]), seed)
-    response = unit.gain * np.median(light) / np.median(unit.gain)
+    camera, response, counted = modelled_maps(model, light, seed)
+    rng = np.random.default_rng(seed)
     rows: list[dict[str, object]] = []
-    for name, real, simulated in (("dark", dark, unit.dark), ("response", light, response)):
+    for name, real, simulated in (("dark", dark, counted), ("response", light, response)):
+        if name == "dark":
+            real, simulated = ((FRAMES * m + rng.random(m.shape) - 0.5) / FRAMES for m in (real, simulated))
         for q, a, b in zip(QUANTILES, np.quantile(real, QUANTILES), np.quantile(simulated, QUANTILES), strict=True):
-            rows.append({"map": name, "quantile": q, "real": float(a), camera.name: float(b), "off": float(b / a - 1)})
+            rows.append({"map": name, "quantile": q, "real": float(a), camera: float(b), "off": float(b / a - 1)})
     return rows
+
+
+def modelled_maps(model: SensorModel | str, light: Array, seed: int = 0) -> tuple[str, Array, Array]:
+    """The model's name, and maps of a unit of it as the real ones: response at 335 lux, dark level in counts / FRAMES."""
+    camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
+    shape = (light.shape[0], light.shape[1])
+    unit = replace(camera, frame_rate_hz=MAPS_FRAME_RATE_HZ).draw_unit(shape, seed)
+    response = unit.gain * np.median(light) / np.median(unit.gain)
+    phase = np.random.default_rng(seed).random(unit.dark.shape)
+    dark = np.floor(FRAMES * unit.dark + phase) / FRAMES
+    return camera.name, response.reshape(shape), dark.reshape(shape)
 
 
 def main(folder: tyro.conf.Positional[Path], takes: int = 4) -> None:
@@ -120,11 +137,17 @@ def main(folder: tyro.conf.Positional[Path], takes: int = 4) -> None:
     print("real".ljust(10) + "".join(f"{v:8.3f}" for v in real) + f"{wall.variance_excess:10.4f}")
     for m in models:
         print(m.model.ljust(10) + "".join(f"{v:8.3f}" for v in m.minimum_range) + f"{m.variance_excess:10.4f}")
+    light, dark = read_response_and_dark(folder)
     print("\nflat maps at 20 kHz")
-    for name in ("measured", "scsim"):
-        print("map       quantile     real".ljust(30) + name.rjust(9) + "   off")
-        for row in flat_quantiles(name, *read_flat_maps(folder)):
-            print(f"{row['map']:9s} {row['quantile']:8.2f} {row['real']:9.5f} {row[name]:10.5f} {row['off']:+7.1%}")
+    tables = {name: flat_quantiles(name, light, dark) for name in MAP_MODELS}
+    print("map       quantile     real" + "".join(f"{name:>10}     off" for name in tables))
+    for rows in zip(*tables.values(), strict=True):
+        line = f"{rows[0]['map']:9s} {rows[0]['quantile']:8.2f} {rows[0]['real']:8.5f}"
+        print(line + "".join(f"{row[name]:10.5f} {row['off']:+7.1%}" for name, row in zip(tables, rows, strict=True)))
+    print(f"correlation of response and ln(dark): real {response_and_dark(light, dark):+.3f}", end="")
+    for name in MAP_MODELS:
+        print(f", {name} {response_and_dark(*modelled_maps(name, light)[1:]):+.3f}", end="")
+    print(f"\n{two_levels(read_flat_maps(folder / MAPS))}")
 
 
 if __name__ == "__main__":
