@@ -17,7 +17,7 @@ import tyro
 from numpy.typing import NDArray
 from scipy import optimize, special
 
-from spikecam_env.calibration.flat_maps import LUX
+from spikecam_env.calibration.flat_maps import LUX, counted, spread_counts
 from spikecam_env.calibration.real import (
     MAPS_FRAME_RATE_HZ,
     QUANTILES,
@@ -53,7 +53,7 @@ class Bowl:
 
 @dataclass(frozen=True)
 class MeasuredConstants:
-    """The preset's constants.  shading: relative spread of the smooth part, bowl: what describes it, and what it leaves.
+    """The preset's constants.  shading: relative spread of the smooth part; bowl: what describes it.
 
     response_at_flat: median rate at 335 lux [spikes/frame].  dark_median [spikes/frame], dark_sigma: of the logarithm.
     """
@@ -111,16 +111,22 @@ def fit_bowl(smooth: Array) -> Bowl:
     )
 
 
-def log_normal_through_quantiles(values: Array) -> tuple[float, float]:
-    """Median and sigma of the log-normal nearest to QUANTILES, by the largest error of their logarithms."""
-    logs = np.log(np.quantile(values, QUANTILES))
-    z = special.ndtri(QUANTILES)
+def log_normal_through_quantiles(dark: Array) -> tuple[float, float]:
+    """Median and sigma of the log-normal whose counts come nearest to QUANTILES of `dark` (counts over FRAMES).
+
+    Nearest: by the largest error of their logarithms.  Counts of ten or fewer are coarse: the log-normal is counted
+    as the recording was, and both are spread evenly within a count.
+    """
+    target = np.log(np.quantile(spread_counts(dark), QUANTILES))
+    z = special.ndtri((np.arange(dark.size) + 0.5) / dark.size)
 
     def worst(parameters: Array) -> float:
-        return float(np.abs(parameters[0] + parameters[1] * z - logs).max())
+        modelled = spread_counts(counted(np.exp(parameters[0] + parameters[1] * z)))
+        return float(np.abs(np.log(np.quantile(modelled, QUANTILES)) - target).max())
 
-    start = np.array([logs[2], (logs[3] - logs[1]) / (z[3] - z[1])])
-    best = optimize.minimize(worst, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
+    scale = special.ndtri(QUANTILES)
+    start = np.array([target[2], (target[3] - target[1]) / (scale[3] - scale[1])])
+    best = optimize.minimize(worst, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-5})
     return float(np.exp(best.x[0])), float(best.x[1])
 
 
@@ -167,12 +173,13 @@ falloff = {c.bowl.falloff:.4f}
 centre_x = {c.bowl.centre_x:.4f}
 centre_y = {c.bowl.centre_y:.4f}
 
-# Flat maps: pixel-to-pixel response about the shading (half of the 16 .. 84 % range); any mix of alpha, C_S and V_S.
+# Flat maps: pixel-to-pixel response at 335 lux about the shading (half of the 16 .. 84 % range); any mix of alpha, C_S
+# and V_S, and in part an offset that is there in light and not in the dark (docs/calibration.md).
 [[effect]]
 name = "conversion_gain_spread"
 sigma = {c.pixel_spread:.4f}
 
-# Flat maps: log-normal nearest to the 1, 10, 50, 90, 99 % quantiles, median {c.dark_median:.5f} spikes/frame at 20 kHz.
+# Flat maps: log-normal whose counts are nearest to the 1, 10, 50, 90, 99 % quantiles, median {c.dark_median:.5f} spikes/frame.
 [[effect]]
 name = "dark_current"
 mean_pA = {c.dark_median * pA:.4f}

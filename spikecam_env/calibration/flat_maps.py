@@ -1,14 +1,14 @@
 """Flat maps of a real camera, as SpikeNeRF has them: spikes of each pixel in three recordings of R = 4000 frames.
 
-    D_light   D at 335 lux, where D = (R - n) / n for n spikes in R frames: empty frames between spikes, not the interval
+    D_light   D at 335 lux, where D = (R - n) / n for n spikes in R frames: empty frames between spikes
     Nd        dark level [lux]:  Nd = 153 D_153 / (D_dark - D_153),  D_dark = 1 / (n_dark / R + 1e-5) - 1
 
 so that rates are n / R = 1 / (D + 1).  D is often taken for the mean interval, rate 1 / D; against it speaks that
 R / (D + 1) is whole for all 100 000 pixels, to 7e-5, which is float32's rounding, and that SpikeNeRF's own code has
 D = 1 / rate - 1.  Nothing that came with the maps says what Nd was made of; the second line was found from its values.
 They are only 5479 different ones, each made of two whole numbers, n_dark and n_153: to 1e-4 in all 100 000 pixels,
-where chance would give it to 0.3 %.  (In 2 of 10 000 another pair is as near.)  In maps where no pair is, the dark level
-follows from D_light as their own correction has it, D_dark = D_light (335 + Nd) / Nd, right to a few per cent.
+where chance would give it to 0.3 %.  (In 2 of 10 000 another pair is as near.)  In maps where no pair is, the dark
+level follows from D_light as their own correction has it, D_dark = D_light (335 + Nd) / Nd, right to a few per cent.
 """
 
 from __future__ import annotations
@@ -76,6 +76,16 @@ def read_flat_maps(path: Path) -> FlatMaps:
         np.where(counted, dark.reshape(between.shape) / FRAMES, corrected),
         counted,
     )
+
+
+def counted(rate: Array, seed: int = 0) -> Array:
+    """Spikes in FRAMES frames of pixels of this rate and any phase, over FRAMES."""
+    return np.floor(FRAMES * rate + np.random.default_rng(seed).random(rate.shape)) / FRAMES
+
+
+def spread_counts(rate: Array, seed: int = 1) -> Array:
+    """Counted rates spread evenly within a count, so that quantiles of small counts say something."""
+    return rate + (np.random.default_rng(seed).random(rate.shape) - 0.5) / FRAMES
 
 
 def _whole_counts(dark_lux: Array, about: Array) -> tuple[Array, Array, Array]:

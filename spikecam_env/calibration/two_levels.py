@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from spikecam_env.calibration.flat_maps import FRAMES, FlatMaps
+from spikecam_env.calibration.flat_maps import DIM_LUX, FRAMES, LUX, FlatMaps
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ class TwoLevels:
     """Relative spreads beside the shading at 335 and 153 lux; of gain; of offset [spikes in FRAMES].  Correlations.
 
     covariance_off: covariance of both levels beyond what gain and offset of no correlation give, in its share.
-    gain_dark, offset_dark, lit_dark: correlation of gain, offset and response at 335 lux with ln(dark), shading removed.
+    gain_dark, offset_dark, lit_dark: correlation of gain, offset, response at 335 lux with ln(dark), shading removed.
     ratio: median response at 335 over that at 153 lux; ratio_slope: its 1 .. 99 % range over the array, smoothed.
     common: spread of a common factor of response and dark that lit_dark would take, e.g. of the threshold.
     """
@@ -49,11 +49,12 @@ class TwoLevels:
 
     def __str__(self) -> str:
         return (
-            f"two levels: pixels spread {self.lit:.2%} at 335 lux, {self.dim:.2%} at 153; response {self.ratio:.3f} times"
-            f" as high at nominally 2.190, by {self.ratio_slope:.1%} otherwise from corner to corner\n"
-            f"  as gain {self.gain:.2%} and offset {self.offset:.1f} spikes in {FRAMES} (covariance {self.covariance_off:+.1%}"
-            f" off); correlation with ln(dark): response {self.lit_dark:+.2f}, gain {self.gain_dark:+.2f},"
-            f" offset {self.offset_dark:+.2f}\n"
+            f"two levels: pixels spread {self.lit:.2%} at {LUX:g} lux, {self.dim:.2%} at {DIM_LUX:g};"
+            f" response {self.ratio:.3f} times as high for {LUX / DIM_LUX:.3f}, differing by {self.ratio_slope:.1%}"
+            f" over the array\n"
+            f"  as gain {self.gain:.2%} and offset {self.offset:.1f} spikes in {FRAMES} (covariance"
+            f" {self.covariance_off:+.1%} off); correlation with ln(dark): response {self.lit_dark:+.2f},"
+            f" gain {self.gain_dark:+.2f}, offset {self.offset_dark:+.2f}\n"
             f"  a factor common to response and dark would have to spread by {self.common:.1%}"
         )
 

@@ -5,10 +5,10 @@ in any other unit proportional to light go through `radiance_per_unit`, the radi
 
 Rates are an npz with `rate` (H, W) [spikes/frame] and `frames` it was counted over.
 
-Flat maps (`flat_maps`) become two recordings of rates, lit and dark.  How many spikes a frame 335 lux should give is
-not known, so the lit one is labelled by the camera itself, `relative`: radiance is the median over pixels of its rate
-less the dark's.  By this label the median pixel has gain 1; only how pixels differ, and the dark, can disagree with a
-model.
+Flat maps (`calibration.flat_maps`) become two recordings of rates, lit and dark.  How many spikes a frame 335 lux
+should give is not known, so the lit one is labelled by the camera itself, `relative`: radiance is the median over
+pixels of its rate less the dark's.  By this label the median pixel has gain 1; only how pixels
+differ, and the dark, can disagree with a model.
 """
 
 from __future__ import annotations
