@@ -13,22 +13,27 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from spikecam_env.calibration.clock_locking import Locking, clock_locking
+from spikecam_env.calibration.flat_maps import counted, read_flat_maps, spread_counts
 from spikecam_env.calibration.real import (
+    MAPS,
     MAPS_FRAME_RATE_HZ,
     QUANTILES,
     STEPS,
     WallStatistics,
     plausible_rates,
-    read_flat_maps,
+    read_response_and_dark,
     read_wall,
     wall_statistics,
 )
+from spikecam_env.calibration.two_levels import response_and_dark, two_levels
 from spikecam_env.calibration.wall_noise import excess_covariance
 from spikecam_env.sensor import SensorModel, SpikeSensor
 
 Array = NDArray[np.float64]
 
 MODELS = ("measured", "scsim", "physical", "ideal")
+MAP_MODELS = ("measured", "scsim", "physical")
 PERCENTILES = (10, 50, 90, 99)
 
 _JITTER = 4e-5
@@ -48,6 +53,7 @@ class SimulatedWall:
     chi2: float
     minimum_range: Array
     variance_excess: float
+    locking: Locking
 
 
 def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[int, int], takes: int) -> SimulatedWall:
@@ -55,10 +61,12 @@ def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[
 
     shape: rows, columns of the wall.  Pixels whose dark level alone exceeds the wall's rate get no light.
     """
-    runs = []
+    runs, locking = [], []
     for take in range(takes):
         rate = plausible_rates(wall.times, _JITTER, np.random.default_rng(take))
-        runs.append(wall_statistics(record_wall(model, rate, shape, take, wall.times.frames)))
+        spikes = record_wall(model, rate, shape, take, wall.times.frames)
+        runs.append(wall_statistics(spikes))
+        locking.append(clock_locking(spikes, runs[-1].rate))
     excess = np.mean([r.excess for r in runs], axis=0)
     covariance = excess_covariance(wall)
     gap = wall.excess - excess
@@ -70,6 +78,7 @@ def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[
         float(gap @ np.linalg.solve(covariance + spread, gap)),
         np.mean([np.percentile(r.minimum_range, PERCENTILES) for r in runs], axis=0),
         float(np.mean([r.variance_excess for r in runs])),
+        Locking(*np.mean(locking, axis=0)),
     )
 
 
@@ -85,16 +94,25 @@ def record_wall(
 def flat_quantiles(model: SensorModel | str, light: Array, dark: Array, seed: int = 0) -> list[dict[str, object]]:
     """Rows of measured and modelled quantiles of dark level and response, and their ratio less one.
 
-    light, dark: (H, W) rates of the real maps.  The model's light is scaled to the same median response.
+    light, dark: (H, W) rates of the real maps.  The model's light is scaled to the same median response.  Dark levels
+    of both are counts, spread evenly within a count: a tenth of the pixels have ten spikes or fewer in the dark.
     """
-    camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
-    unit = replace(camera, frame_rate_hz=MAPS_FRAME_RATE_HZ).draw_unit((light.shape[0], light.shape[1]), seed)
-    response = unit.gain * np.median(light) / np.median(unit.gain)
+    camera, response, modelled = modelled_maps(model, light, seed)
     rows: list[dict[str, object]] = []
-    for name, real, simulated in (("dark", dark, unit.dark), ("response", light, response)):
+    maps = (("dark", spread_counts(dark), spread_counts(modelled)), ("response", light, response))
+    for name, real, simulated in maps:
         for q, a, b in zip(QUANTILES, np.quantile(real, QUANTILES), np.quantile(simulated, QUANTILES), strict=True):
-            rows.append({"map": name, "quantile": q, "real": float(a), camera.name: float(b), "off": float(b / a - 1)})
+            rows.append({"map": name, "quantile": q, "real": float(a), camera: float(b), "off": float(b / a - 1)})
     return rows
+
+
+def modelled_maps(model: SensorModel | str, light: Array, seed: int = 0) -> tuple[str, Array, Array]:
+    """The model's name, and maps of a unit of it as the real ones: response at 335 lux, dark counts over FRAMES."""
+    camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
+    shape = (light.shape[0], light.shape[1])
+    unit = replace(camera, frame_rate_hz=MAPS_FRAME_RATE_HZ).draw_unit(shape, seed)
+    response = unit.gain * np.median(light) / np.median(unit.gain)
+    return camera.name, response.reshape(shape), counted(unit.dark, seed).reshape(shape)
 
 
 def main(folder: tyro.conf.Positional[Path], takes: int = 4) -> None:
@@ -113,6 +131,8 @@ def main(folder: tyro.conf.Positional[Path], takes: int = 4) -> None:
             z = (m.excess[i] - wall.excess[i]) / np.hypot(wall.excess_sd[i], m.excess_sd[i])
             line += f"{m.excess[i] * scale:9.3f} ({z:+4.1f})"
         print(line)
+    within = [np.abs(m.excess - wall.excess) <= 2 * np.hypot(wall.excess_sd, m.excess_sd) for m in models]
+    print("within 2 of 40".ljust(19) + "".join(f"{w.sum():16d}" for w in within))
     print("chi2/40".ljust(19) + "".join(f"{m.chi2 / 40:16.2f}" for m in models))
     print("\nminimum range of N(t) - a t, percentiles; interval variance less f(1-f)")
     real = np.percentile(wall.minimum_range, PERCENTILES)
@@ -120,11 +140,20 @@ def main(folder: tyro.conf.Positional[Path], takes: int = 4) -> None:
     print("real".ljust(10) + "".join(f"{v:8.3f}" for v in real) + f"{wall.variance_excess:10.4f}")
     for m in models:
         print(m.model.ljust(10) + "".join(f"{v:8.3f}" for v in m.minimum_range) + f"{m.variance_excess:10.4f}")
+    print("\nwhole intervals: pixels within 0.005 frames; of 10 000 of their spikes, so many a frame late, early")
+    for name, seen in [("real", clock_locking(spikes, wall.rate)), *((m.model, m.locking) for m in models)]:
+        print(f"{name:10s}{seen.pixels:8.0f}{seen.late:8.1f}{seen.early:8.1f}")
+    light, dark = read_response_and_dark(folder)
     print("\nflat maps at 20 kHz")
-    for name in ("measured", "scsim"):
-        print("map       quantile     real".ljust(30) + name.rjust(9) + "   off")
-        for row in flat_quantiles(name, *read_flat_maps(folder)):
-            print(f"{row['map']:9s} {row['quantile']:8.2f} {row['real']:9.5f} {row[name]:10.5f} {row['off']:+7.1%}")
+    tables = {name: flat_quantiles(name, light, dark) for name in MAP_MODELS}
+    print("map       quantile     real" + "".join(f"{name:>10}     off" for name in tables))
+    for rows in zip(*tables.values(), strict=True):
+        line = f"{rows[0]['map']:9s} {rows[0]['quantile']:8.2f} {rows[0]['real']:8.5f}"
+        print(line + "".join(f"{row[name]:10.5f} {row['off']:+7.1%}" for name, row in zip(tables, rows, strict=True)))
+    print(f"correlation of response and ln(dark): real {response_and_dark(light, dark):+.3f}", end="")
+    for name in MAP_MODELS:
+        print(f", {name} {response_and_dark(*modelled_maps(name, light)[1:]):+.3f}", end="")
+    print(f"\n{two_levels(read_flat_maps(folder / MAPS))}")
 
 
 if __name__ == "__main__":

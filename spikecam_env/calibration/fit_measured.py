@@ -15,16 +15,17 @@ from pathlib import Path
 import numpy as np
 import tyro
 from numpy.typing import NDArray
-from scipy import ndimage, optimize, special
+from scipy import optimize, special
 
+from spikecam_env.calibration.flat_maps import LUX, counted, spread_counts
 from spikecam_env.calibration.real import (
-    FLAT_LUX,
     MAPS_FRAME_RATE_HZ,
     QUANTILES,
-    read_flat_maps,
+    read_response_and_dark,
     read_wall,
     wall_statistics,
 )
+from spikecam_env.calibration.two_levels import split_shading
 from spikecam_env.calibration.wall_noise import OCTAVES, WallNoise, fit_wall_noise
 from spikecam_env.sensor import Circuit, SensorModel
 from spikecam_env.whole import whole_file
@@ -33,24 +34,32 @@ Array = NDArray[np.float64]
 
 PRESET = Path(str(resources.files("spikecam_env.sensor"))) / "presets" / "measured.toml"
 
-_SMOOTH = 12.0
-"""Standard deviation of the window that separates shading from pixels [pixels]."""
-
 _HOT_RATES = (0.03, 0.05, 0.1)
 """Dark rates above which the hot population is counted [spikes/frame]; the crowd's log-normal ends at the first."""
 
 
 @dataclass(frozen=True)
-class MeasuredConstants:
-    """The preset's constants.  shading: spread of the smooth part; falloff: of a centred bowl of that spread.
+class Bowl:
+    """Shading 1 - falloff r^2 / r_corner^2 about a centre (shares of the array), as `vignetting` has it.
 
-    shading_explained: share of the smooth part's variance that the best centred bowl has.
-    response_at_flat: median rate at 335 lux [spikes/frame].  dark_median [spikes/frame], dark_sigma: of the logarithm.
+    left: relative spread of the smooth part beside it.
     """
 
     falloff: float
+    centre_x: float
+    centre_y: float
+    left: float
+
+
+@dataclass(frozen=True)
+class MeasuredConstants:
+    """The preset's constants.  shading: relative spread of the smooth part; bowl: what describes it.
+
+    response_at_flat: median rate at 335 lux [spikes/frame].  dark_median [spikes/frame], dark_sigma: of the logarithm.
+    """
+
     shading: float
-    shading_explained: float
+    bowl: Bowl
     pixel_spread: float
     response_at_flat: float
     dark_median: float
@@ -64,17 +73,15 @@ class MeasuredConstants:
 def fit_measured(folder: str | Path, circuit: Circuit | None = None, *, progress: bool = False) -> MeasuredConstants:
     """Fit all constants to the files in `folder`."""
     circuit = circuit or Circuit()
-    light, dark = read_flat_maps(folder)
+    light, dark = read_response_and_dark(folder)
     smooth, pixel_spread = split_shading(light)
-    falloff, explained = centred_bowl(smooth)
     dark_median, dark_sigma = log_normal_through_quantiles(dark)
     hot_fraction, hot_mean = hot_population(dark, dark_median, dark_sigma)
     noise = fit_wall_noise(wall_statistics(read_wall(folder)), progress=progress)
     beyond_shot = max(noise.white - 1 / circuit.threshold_electrons, 0.0)
     return MeasuredConstants(
-        falloff,
         float(smooth.std() / smooth.mean()),
-        explained,
+        fit_bowl(smooth),
         pixel_spread,
         float(np.median(light)),
         dark_median,
@@ -86,36 +93,40 @@ def fit_measured(folder: str | Path, circuit: Circuit | None = None, *, progress
     )
 
 
-def split_shading(light: Array) -> tuple[Array, float]:
-    """The smooth part (H, W) of a response map, and the pixels' relative spread around it (robust: dust, edges)."""
-    smooth = ndimage.gaussian_filter(ndimage.median_filter(light, 5), _SMOOTH, mode="nearest")
-    rest = light / smooth - 1.0
-    low, high = np.quantile(rest, [0.1587, 0.8413])
-    return smooth, float((high - low) / 2)
-
-
-def centred_bowl(smooth: Array) -> tuple[float, float]:
-    """Falloff v of 1 - v r^2 about the middle with the map's relative spread, and the variance the best v explains."""
+def fit_bowl(smooth: Array) -> Bowl:
+    """Least squares over a map (H, W): a - b r^2 about a free centre is linear in 1, x, y and x^2 + y^2."""
     rows, columns = smooth.shape
-    y, x = np.mgrid[:rows, :columns]
-    square = (y - (rows - 1) / 2) ** 2 + (x - (columns - 1) / 2) ** 2
-    square = square / square.max()
-    slope, middle = np.polyfit(square.ravel(), smooth.ravel(), 1)
-    explained = 1 - np.var(smooth - slope * square - middle) / np.var(smooth)
-    spread = smooth.std() / smooth.mean()
-    return float(spread / (square.std() + spread * square.mean())), float(explained)
+    y, x = (axis.ravel().astype(np.float64) for axis in np.mgrid[:rows, :columns])
+    terms = np.stack([np.ones(x.size), x, y, x**2 + y**2], axis=1)
+    (start, along_x, along_y, curve), *_ = np.linalg.lstsq(terms, smooth.ravel(), rcond=None)
+    centre_x, centre_y = -along_x / (2 * curve), -along_y / (2 * curve)
+    top = start - curve * (centre_x**2 + centre_y**2)
+    corner = max(centre_x, columns - 1 - centre_x) ** 2 + max(centre_y, rows - 1 - centre_y) ** 2
+    left = smooth.ravel() / (terms @ np.array([start, along_x, along_y, curve]))
+    return Bowl(
+        float(-curve * corner / top),
+        float(centre_x / (columns - 1)),
+        float(centre_y / (rows - 1)),
+        float(left.std() / left.mean()),
+    )
 
 
-def log_normal_through_quantiles(values: Array) -> tuple[float, float]:
-    """Median and sigma of the log-normal nearest to QUANTILES, by the largest error of their logarithms."""
-    logs = np.log(np.quantile(values, QUANTILES))
-    z = special.ndtri(QUANTILES)
+def log_normal_through_quantiles(dark: Array) -> tuple[float, float]:
+    """Median and sigma of the log-normal whose counts come nearest to QUANTILES of `dark` (counts over FRAMES).
+
+    Nearest: by the largest error of their logarithms.  Counts of ten or fewer are coarse: the log-normal is counted
+    as the recording was, and both are spread evenly within a count.
+    """
+    target = np.log(np.quantile(spread_counts(dark), QUANTILES))
+    z = special.ndtri((np.arange(dark.size) + 0.5) / dark.size)
 
     def worst(parameters: Array) -> float:
-        return float(np.abs(parameters[0] + parameters[1] * z - logs).max())
+        modelled = spread_counts(counted(np.exp(parameters[0] + parameters[1] * z)))
+        return float(np.abs(np.log(np.quantile(modelled, QUANTILES)) - target).max())
 
-    start = np.array([logs[2], (logs[3] - logs[1]) / (z[3] - z[1])])
-    best = optimize.minimize(worst, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
+    scale = special.ndtri(QUANTILES)
+    start = np.array([target[2], (target[3] - target[1]) / (scale[3] - scale[1])])
+    best = optimize.minimize(worst, start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-5})
     return float(np.exp(best.x[0])), float(best.x[1])
 
 
@@ -137,7 +148,8 @@ def preset_text(c: MeasuredConstants, circuit: Circuit | None = None) -> str:
     octave_mV = 1e3 * float(np.sqrt(n.octave)) * circuit.swing_V
     return f"""\
 # Fitted to real recordings by: python -m spikecam_env.calibration.fit_measured FOLDER
-# wall.npz: 500 frames of a wall; flat_335lux_maps.npz: response and dark level of 100 000 pixels, another unit perhaps.
+# wall.npz: 500 frames of a wall; flat_335lux_maps.npz: spikes of 100 000 pixels in light and in
+# the dark, 4000 frames each, another unit perhaps.
 # How well it does: python -m spikecam_env.calibration.check_measured FOLDER, and docs/calibration.md.
 #
 # Prior, not fitted: the circuit (published SCSim constants), hence N = C V_d / q; 20 kHz for the maps, which do not say
@@ -153,18 +165,21 @@ bias_V = {circuit.bias_V}
 capacitance_fF = {circuit.capacitance_fF}
 temperature_K = {circuit.temperature_K}
 
-# Flat maps: smooth shading, spread {100 * c.shading:.2f} %.  Their bowl is off-centre, to the upper right: the best centred bowl has
-# {100 * c.shading_explained:.0f} % of its variance.  This falloff has the same spread.
+# Flat maps at 335 lux: smooth shading, spread {100 * c.shading:.2f} %, of which this bowl leaves {100 * c.bowl.left:.2f} %.
+# Lens and lamp are one here: at 153 lux the shading is another by up to 3.5 %.
 [[effect]]
 name = "vignetting"
-falloff = {c.falloff:.4f}
+falloff = {c.bowl.falloff:.4f}
+centre_x = {c.bowl.centre_x:.4f}
+centre_y = {c.bowl.centre_y:.4f}
 
-# Flat maps: pixel-to-pixel response about the shading (half of the 16 .. 84 % range); any mix of alpha, C_S and V_S.
+# Flat maps: pixel-to-pixel response at 335 lux about the shading (half of the 16 .. 84 % range); any mix of alpha, C_S
+# and V_S, and in part an offset that is there in light and not in the dark (docs/calibration.md).
 [[effect]]
 name = "conversion_gain_spread"
 sigma = {c.pixel_spread:.4f}
 
-# Flat maps: log-normal nearest to the 1, 10, 50, 90, 99 % quantiles, median {c.dark_median:.5f} spikes/frame at 20 kHz.
+# Flat maps: log-normal whose counts are nearest to the 1, 10, 50, 90, 99 % quantiles, median {c.dark_median:.5f} spikes/frame.
 [[effect]]
 name = "dark_current"
 mean_pA = {c.dark_median * pA:.4f}
@@ -210,7 +225,7 @@ def main(
         beside.write_text(text, encoding="utf-8")
     SensorModel.from_toml(out)
     print(text)
-    print(f"335 lux: median response {constants.response_at_flat:.4f} spikes/frame (of {FLAT_LUX:g} lux); wrote {out}")
+    print(f"335 lux: median response {constants.response_at_flat:.4f} spikes/frame (of {LUX:g} lux); wrote {out}")
 
 
 if __name__ == "__main__":

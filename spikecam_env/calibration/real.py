@@ -1,8 +1,9 @@
 """The real recordings that the preset `measured` is fitted to, and what is measured on them.
 
 wall.npz: 500 frames of a wall in good light.  Only a rectangle of bare wall is used: nothing moves there; leaves and
-edges, which tremble by more than the noise, are outside.  flat_335lux_maps.npz: per pixel, mean interval at 335 lux and
-dark level.  Neither says its frame rate; the dark level agrees with the published 0.44 pA at 20 kHz, taken here.
+edges, which tremble by more than the noise, are outside.  flat_335lux_maps.npz: spikes of each pixel in light and in
+the dark (`flat_maps`).  Neither says its frame rate; the dark level agrees with the published 0.44 pA at 20 kHz, taken
+here.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from spikecam_env.calibration.flat_maps import read_flat_maps
 from spikecam_env.calibration.response import rates_from_times
 from spikecam_env.calibration.spike_times import SpikeTimes, spike_times
 from spikecam_env.errors import InputError
@@ -27,10 +29,8 @@ WALL = (slice(110, 200), slice(15, 355))
 STEPS = tuple(range(1, 41))
 """k of A_k that acceptance asks for."""
 
+MAPS = "flat_335lux_maps.npz"
 MAPS_FRAME_RATE_HZ = 20_000.0
-FLAT_LUX = 335.0
-HOT_LUX = 40.0
-"""Dark level, as light, above which a pixel counts as hot in the maps' notes."""
 
 QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99)
 
@@ -41,15 +41,10 @@ def read_wall(folder: str | Path) -> NDArray[np.uint8]:
     return np.ascontiguousarray(np.moveaxis(spikes, 2, 0)[:, WALL[0], WALL[1]])
 
 
-def read_flat_maps(folder: str | Path) -> tuple[Array, Array]:
-    """(H, W) rates at 335 lux without the dark's part, and in the dark [spikes/frame].
-
-    Nd is the dark level in lux: D_light is the interval at 335 + Nd lux in all.
-    """
-    path = Path(folder) / "flat_335lux_maps.npz"
-    interval, dark_lux = (_array(path, name).astype(np.float64) for name in ("D_light", "Nd"))
-    per_lux = 1.0 / (interval * (FLAT_LUX + dark_lux))
-    return FLAT_LUX * per_lux, dark_lux * per_lux
+def read_response_and_dark(folder: str | Path) -> tuple[Array, Array]:
+    """(H, W) rates at 335 lux less the dark's, and in the dark [spikes/frame], of the flat maps."""
+    maps = read_flat_maps(Path(folder) / MAPS)
+    return maps.lit - maps.dark, maps.dark
 
 
 def _array(path: Path, name: str) -> NDArray[np.generic]:

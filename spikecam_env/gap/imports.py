@@ -5,10 +5,10 @@ in any other unit proportional to light go through `radiance_per_unit`, the radi
 
 Rates are an npz with `rate` (H, W) [spikes/frame] and `frames` it was counted over.
 
-Flat maps (`flat_maps`) become two recordings of rates, lit and dark.  How many spikes a frame 335 lux should give is
-not known, so the lit one is labelled by the camera itself, `relative`: radiance is the median over pixels of its rate
-less the dark's.  By this label the median pixel has gain 1; only how pixels differ, and the dark, can disagree with a
-model.
+Flat maps (`calibration.flat_maps`) become two recordings of rates, lit and dark.  How many spikes a frame 335 lux
+should give is not known, so the lit one is labelled by the camera itself, `relative`: radiance is the median over
+pixels of its rate less the dark's.  By this label the median pixel has gain 1; only how pixels
+differ, and the dark, can disagree with a model.
 """
 
 from __future__ import annotations
@@ -22,12 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration import Campaign, read_campaign
+from spikecam_env.calibration import Campaign, flat_maps, read_campaign
 from spikecam_env.calibration.campaign import USES
 from spikecam_env.calibration.campaign_files import finish_campaign, save_light, save_rates, save_spikes
 from spikecam_env.calibration.flats import even_light
 from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.gap import flat_maps
 from spikecam_env.gap.labels import READING, RELATIVE, UNKNOWN, Label
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import read_recording
@@ -162,7 +161,8 @@ def _pieces(
 def _flat_maps(path: Path, label: Label, name: str, part: _Part) -> list[_Piece]:
     if label.radiance != RELATIVE:
         raise InputError(f"{label.file} holds flat maps, whose light is known to the camera alone; label it `relative`")
-    lit, dark = (part.of(rate, label.file) for rate in flat_maps.read_flat_maps(path))
+    maps = flat_maps.read_flat_maps(path)
+    lit, dark = part.of(maps.lit, label.file), part.of(maps.dark, label.file)
     radiance = float(np.median(lit - dark))
     note = f"{label.note} radiance is relative: 335 lux is the median over pixels of this unit's rate less the dark's"
     return [

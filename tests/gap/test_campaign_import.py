@@ -10,7 +10,6 @@ import pytest
 from spikecam_env.calibration import calibrate
 from spikecam_env.errors import InputError
 from spikecam_env.gap import Dark, Flat, Label, Step, import_campaign, labels_from_table, write_campaign
-from spikecam_env.gap.flat_maps import read_flat_maps
 from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
 
 REAL = Path(__file__).parents[2].parent / "shared" / "data" / "real"
@@ -170,16 +169,6 @@ def test_a_bad_table_is_refused_by_line(text: str, message: str, tmp_path: Path)
     (tmp_path / "labels.csv").write_text(text)
     with pytest.raises(InputError, match=message):
         labels_from_table(tmp_path / "labels.csv")
-
-
-@real
-def test_the_flat_maps_are_counts_of_4000_frames() -> None:
-    """What `flat_maps` says of D_light: 4000 / (D + 1) is whole, so it is not the interval but the frames between."""
-    lit, dark = read_flat_maps(REAL / "flat_335lux_maps.npz")
-    off = np.abs(4000 * lit - np.round(4000 * lit))
-    print(f"distance from whole counts: at most {off.max():.1e}; lit {np.median(lit):.4f}, dark {np.median(dark):.5f}")
-    assert off.max() < 1e-4
-    assert lit.max() <= 1.0 and np.median(dark) == pytest.approx(0.00447, rel=0.01)
 
 
 @real

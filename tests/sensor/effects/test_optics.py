@@ -64,3 +64,9 @@ def test_vignetting_is_full_in_the_middle_and_loses_its_falloff_in_the_corner() 
     rate = rates(camera("vignetting", (21, 21), falloff=0.4), 0.5, 4000)
     for name, pixel, expected in [("middle", (10, 10), 0.5), ("corner", (0, 20), 0.3), ("edge", (10, 0), 0.4)]:
         check(name, rate[pixel], expected, 1 / 4000)
+
+
+def test_vignetting_has_its_centre_where_it_is_put() -> None:
+    rate = rates(camera("vignetting", (21, 21), falloff=0.4, centre_x=1.0, centre_y=0.0), 0.5, 4000)
+    for name, pixel, expected in [("centre", (0, 20), 0.5), ("far corner", (20, 0), 0.3), ("near corner", (0, 0), 0.4)]:
+        check(name, rate[pixel], expected, 1 / 4000)

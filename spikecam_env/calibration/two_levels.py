@@ -1,0 +1,109 @@
+"""What two lit recordings and a dark one say of how pixels differ: at 335 and 153 lux, spikes above those in the dark.
+
+    (lit - dark) / its smooth part - 1 = g + o / smooth part        g: gain, o: an offset, the same at both levels
+
+Two levels, two unknowns a pixel.  Gain alone would spread both alike, and does not: see docs/calibration.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from spikecam_env.calibration.flat_maps import DIM_LUX, FRAMES, LUX, FlatMaps
+
+Array = NDArray[np.float64]
+
+_SMOOTH = 12.0
+"""Standard deviation of the window that separates shading from pixels [pixels]."""
+
+_ODD = 0.15
+"""Pixels further than this from their neighbours, at either level, are left out; so are hot ones."""
+_HOT = 0.015
+
+
+@dataclass(frozen=True)
+class TwoLevels:
+    """Relative spreads beside the shading at 335 and 153 lux; of gain; of offset [spikes in FRAMES].  Correlations.
+
+    covariance_off: covariance of both levels beyond what gain and offset of no correlation give, in its share.
+    gain_dark, offset_dark, lit_dark: correlation of gain, offset, response at 335 lux with ln(dark), shading removed.
+    ratio: median response at 335 over that at 153 lux; ratio_slope: its 1 .. 99 % range over the array, smoothed.
+    common: spread of a common factor of response and dark that lit_dark would take, e.g. of the threshold.
+    """
+
+    lit: float
+    dim: float
+    gain: float
+    offset: float
+    covariance_off: float
+    gain_dark: float
+    offset_dark: float
+    lit_dark: float
+    ratio: float
+    ratio_slope: float
+    common: float
+
+    def __str__(self) -> str:
+        return (
+            f"two levels: pixels spread {self.lit:.2%} at {LUX:g} lux, {self.dim:.2%} at {DIM_LUX:g};"
+            f" response {self.ratio:.3f} times as high for {LUX / DIM_LUX:.3f}, differing by {self.ratio_slope:.1%}"
+            f" over the array\n"
+            f"  as gain {self.gain:.2%} and offset {self.offset:.1f} spikes in {FRAMES} (covariance"
+            f" {self.covariance_off:+.1%} off); correlation with ln(dark): response {self.lit_dark:+.2f},"
+            f" gain {self.gain_dark:+.2f}, offset {self.offset_dark:+.2f}\n"
+            f"  a factor common to response and dark would have to spread by {self.common:.1%}"
+        )
+
+
+def two_levels(maps: FlatMaps) -> TwoLevels:
+    """Gain and offset of the pixels of maps whose counts are known."""
+    lit, dim = (FRAMES * (level - maps.dark) for level in (maps.lit, maps.dim))
+    dim = np.where(maps.counted, dim, np.median(dim[maps.counted]))
+    smooth_lit, smooth_dim = split_shading(lit)[0], split_shading(dim)[0]
+    r, s = lit / smooth_lit - 1.0, dim / smooth_dim - 1.0
+    logs = np.log(np.maximum(maps.dark, 0.5 / FRAMES))
+    logs = logs - ndimage.gaussian_filter(logs, _SMOOTH)
+    good = maps.counted & (maps.dark < _HOT) & (np.abs(r) < _ODD) & (np.abs(s) < _ODD)
+    a, b = 1.0 / smooth_lit[good], 1.0 / smooth_dim[good]
+    r, s, logs = r[good], s[good], logs[good]
+    offset = (s - r) / (b - a)
+    gain = r - a * offset
+    # As if gain and offset had no correlation: the two variances give both, the covariance is then foretold.
+    ab, aa, bb = np.mean(a) * np.mean(b), np.mean(a) ** 2, np.mean(b) ** 2
+    of_offset = (s.var() - r.var()) / (bb - aa)
+    foretold = r.var() + (ab - aa) * of_offset
+    ratio = smooth_lit / smooth_dim
+    return TwoLevels(
+        float(r.std()),
+        float(s.std()),
+        float(gain.std()),
+        float(offset.std()),
+        float(np.mean((r - r.mean()) * (s - s.mean())) / foretold - 1),
+        _correlation(gain, logs),
+        _correlation(offset, logs),
+        _correlation(r, logs),
+        float(np.median(lit) / np.median(dim)),
+        float(np.subtract(*np.quantile(ratio, [0.99, 0.01])) / np.median(ratio)),
+        float(np.sqrt(max(np.mean((r - r.mean()) * (logs - logs.mean())), 0.0))),
+    )
+
+
+def response_and_dark(response: Array, dark: Array) -> float:
+    """Correlation over pixels of response and ln(dark), shading included; a dark count of 0 is taken for half a one."""
+    return _correlation(response.ravel(), np.log(np.maximum(dark, 0.5 / FRAMES)).ravel())
+
+
+def _correlation(a: Array, b: Array) -> float:
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def split_shading(light: Array) -> tuple[Array, float]:
+    """The smooth part (H, W) of a response map, and the pixels' relative spread around it (robust: dust, edges)."""
+    smooth = ndimage.gaussian_filter(ndimage.median_filter(light, 5), _SMOOTH, mode="nearest")
+    rest = light / smooth - 1.0
+    low, high = np.quantile(rest, [0.1587, 0.8413])
+    return smooth, float((high - low) / 2)
