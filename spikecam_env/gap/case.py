@@ -30,6 +30,7 @@ class Case:
     bank: dict[Key, float]
     seed: int
     jobs: int = 1
+    frame_rate_hz: float = 40_000.0
 
 
 @dataclass(frozen=True)
@@ -46,13 +47,15 @@ def case_of(
     observations: Sequence[Observation],
     seed: int = 0,
     jobs: int = 1,
+    frame_rate_hz: float = 40_000.0,
 ) -> Case:
     """Refit and statistics of a measurement."""
     moving = films(conditions, shape)
     base = measured_base(list(observations), list(conditions))
     reading = Reading(observations, conditions, base, moving)
     statistics = {**bank(reading), **pattern_bank(reading)}
-    return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs)
+    return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs,
+                frame_rate_hz)
 
 
 def twins(

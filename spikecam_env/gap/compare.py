@@ -55,7 +55,12 @@ def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
 
 def deviates(null: Null, values: Array) -> Array:
     """(S,) normal deviates: Student's t of few twins, made normal; 0 where unknown."""
-    t = np.nan_to_num((values - null.mean) / null.noise)
+    return normal(null, np.nan_to_num((values - null.mean) / null.noise))
+
+
+def normal(null: Null, t: Array) -> Array:
+    """(S,) normal deviates of distances in noise: the noise was learnt from few twins, and is the surer the more of it
+    is floor."""
     known = null.sd**2 * (1.0 + 1.0 / null.twins)
     freedom = (null.twins - 1) * np.minimum((1.0 + null.floor**2 / np.maximum(known, 1e-300)) ** 2, 1e4)
     log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)

@@ -21,14 +21,18 @@ from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.audit import Contradiction, audit
 from spikecam_env.gap.candidates import candidate, chosen, testable
-from spikecam_env.gap.case import Case, case_of, twins
-from spikecam_env.gap.compare import HEAVY, Null, adjusted, deviates, misfit, residual, values_of
+from spikecam_env.gap.case import Case, case_of
+from spikecam_env.gap.compare import Null, adjusted, deviates, misfit, normal, residual, values_of
 from spikecam_env.gap.fit import Fit, confirmed, fit
+from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.parameters import off_nominal
+from spikecam_env.gap.place import when, where
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.result import Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
-from spikecam_env.gap.templates import Templates, load, model_null, screen
-from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.statistics.spectrum import spectrum, strongest_line
+from spikecam_env.gap.structure import structure
+from spikecam_env.gap.templates import Screened, Templates, load, model_null, screen
+from spikecam_env.gap.words import sentence
 from spikecam_env.gap.world import observed, shown
 from spikecam_env.sensor import SensorModel
 
@@ -37,14 +41,23 @@ Array = NDArray[np.float64]
 ALARM = 0.02
 """Adjusted p-value below which there is a discrepancy at all."""
 
-TRIED = 4
+TRIED = 5
 """Candidates fitted a round, the best by their templates."""
 
 MOST = 3
 """Effects that one diagnosis names together."""
 
-GATE = 4.5
-"""Largest residual, in noise, that a named effect may leave: adjusted p of 0.01 for 600 statistics is 4.3."""
+GATE = 0.005
+"""Adjusted p-value of what a named effect leaves, below which something is left."""
+
+GAIN = 25.0
+"""Misfit that a further effect has to remove to be added."""
+
+UNEXPLAINED = 0.08
+"""Share of the evidence that may stay unexplained when something is named."""
+
+CLOSE = 40.0
+"""Difference of misfits, one twin each, up to which candidates are simulated anew to compare them."""
 
 SEPARATED = 9.0
 """Difference of misfits from which one candidate is told from another (likelihood ratio of 90)."""
@@ -94,15 +107,26 @@ def diagnose(
     with timed("twins"):
         null = model_null(case, assumed, twin_count)
     values = values_of(case.bank, null.keys)
-    z = deviates(null, values)
-    p = adjusted(z)
     rounds: list[Round] = []
-    if p.min() < ALARM:
+    if adjusted(deviates(null, values)).min() < ALARM:
         with timed("candidates"):
             rounds = search(case, assumed, null, values, names, templates or load())
-    return concluded(
-        measured, case, assumed, null, values, z, p, rounds, untestable, stages, seed, contradictions
+    with timed("verdict"):
+        found = concluded(case, assumed, null, values, rounds, contradictions, untestable)
+    with timed("evidence"):
+        base = within(assumed, case.base)
+        last = rounds[-1] if rounds and rounds[-1].model is not assumed else None
+        evidence = evidence_of(case, assumed, base, last.model, last.base) if last else evidence_of(case, assumed, base)
+    found = replace(
+        found,
+        campaign=str(measured.folder),
+        model_name=assumed.name if isinstance(model, SensorModel) else str(model),
+        candidates=None if candidates is None else tuple(candidates),
+        exclude=tuple(exclude),
+        evidence=evidence,
+        stages=stages,
     )
+    return replace(found, sentence=sentence(found))
 
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
@@ -117,7 +141,7 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
     if sum(c.kind in ("dark", "flat", "picture") and c.use == "fit" for c in conditions) < 2:
         raise InputError(f"{campaign.folder} has fewer than two static recordings of known light to refit the unit by")
     seen = observed(part, conditions)
-    return case_of(campaign.shape, conditions, [o for o in seen if o is not None], seed, jobs)
+    return case_of(campaign.shape, conditions, [o for o in seen if o is not None], seed, jobs, campaign.frame_rate_hz)
 
 
 def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
@@ -128,7 +152,8 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     if not bad or enough < 2:
         return case
     return case_of(
-        case.shape, [case.conditions[i] for i in keep], [case.observations[i] for i in keep], case.seed, case.jobs
+        case.shape, [case.conditions[i] for i in keep], [case.observations[i] for i in keep], case.seed, case.jobs,
+        case.frame_rate_hz,
     )
 
 
@@ -140,19 +165,19 @@ def search(
     now, base, predicted, count = model, within(model, case.base), null.mean, null.twins
     while len(rounds) < MOST:
         rho = residual(null, values, predicted, count)
-        if rounds and not alarmed(rho):
+        if rounds and not alarmed(null, rho):
             break
         here = replace(null, mean=predicted)
         left = [n for n in names if n not in {e.name for e in now.effects}]
-        screened = screen(templates, case.conditions, here, values, left)
-        tried = screened[:TRIED]
+        screened = screen(templates, case.conditions, here, values, left, line_of(case))
+        tried = worth_fitting(screened, misfit(rho))
         fits = [fit(case, now, here, values, s.name, s.start, s.expected) for s in tried]
         fits.sort(key=lambda f: f.misfit)
-        finalists = [f for f in fits if f.misfit < fits[0].misfit + 60][:2] if fits else []
+        finalists = [f for f in fits if f.misfit < fits[0].misfit + CLOSE][:3]
         sure = [confirmed(case, now, here, values, f) for f in finalists]
         sure.sort(key=lambda f: f.misfit)
         rounds.append(Round(now, base, predicted, count, rho, (*sure, *(f for f in fits if f not in finalists))))
-        if not sure or sure[0].misfit > misfit(rho) - SEPARATED:
+        if not sure or sure[0].misfit > misfit(rho) - (GAIN if now is not model else SEPARATED):
             break
         best = sure[0]
         now, base, predicted, count = best.model, best.base, best.predicted, best.count
@@ -160,39 +185,69 @@ def search(
     return rounds
 
 
-def alarmed(rho: Array) -> bool:
+def line_of(case: Case) -> float | None:
+    """Frequency [Hz] of the strongest line in steady light; None where no line stands out."""
+    lines = [
+        (*strongest_line(spectrum(o.frame))[::-1], o.frames)
+        for c, o in zip(case.conditions, case.observations, strict=True)
+        if not c.moves and o.frame.sum() > 1000
+    ]
+    ratio, at, frames = max(lines, default=(0.0, 0, 1))
+    return at / frames * case.frame_rate_hz if ratio > 30 else None
+
+
+def worth_fitting(screened: Sequence[Screened], before: float) -> list[Screened]:
+    """The best by their templates, as long as they explain half of what the best explains."""
+    if not screened:
+        return []
+    best = before - screened[0].misfit
+    return [s for s in screened if before - s.misfit > 0.5 * best][:TRIED]
+
+
+def alarmed(null: Null, rho: Array) -> bool:
     """Whether residuals say that something is left."""
-    return bool(np.abs(rho).max() > GATE)
+    return bool(adjusted(normal(null, rho)).min() < GATE)
 
 
-def concluded(measured, case, model, null, values, z, p, rounds, untestable, stages, seed, contradictions) -> Diagnosis:  # type: ignore[no-untyped-def]
+def concluded(
+    case: Case,
+    model: SensorModel,
+    null: Null,
+    values: Array,
+    rounds: Sequence[Round],
+    contradictions: Sequence[Contradiction],
+    untestable: Sequence[tuple[str, str]],
+) -> Diagnosis:
     """From the search to a verdict."""
+    z = deviates(null, values)
+    p = adjusted(z)
+    before = residual(null, values, null.mean, null.twins)
     found = [r.fits[0] for r, after in zip(rounds, rounds[1:], strict=False) if after.model is not r.model]
     last = rounds[-1] if rounds else None
-    rho = last.rho if last else residual(null, values, null.mean, null.twins)
-    excess = misfit(residual(null, values, null.mean, null.twins)) - len(values)
+    rho = last.rho if last else before
+    predicted = last.predicted if last else null.mean
+    excess = misfit(before) - len(values)
     left = (misfit(rho) - len(values)) / max(excess, 1.0)
-    patched = last.model if last else model
-    effects = tuple(named(f, r, null, values) for f, r in zip(found, rounds, strict=False))
-    alternatives = [f.name for r in rounds[:1] for f in r.fits[1:] if f.misfit < r.fits[0].misfit + SEPARATED]
+    explained = not alarmed(null, rho) or left < UNEXPLAINED
+    place, time_ = where(case), when(case)
+    effects = tuple(
+        replace(named(f, r, null, values), where=place, when=time_) for f, r in zip(found, rounds, strict=False)
+    )
+    rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.misfit < r.fits[0].misfit + SEPARATED]
     parameters = off_nominal(case, model)
-    verdict, unknown, class_ = "none", None, None
-    if rounds and not found:
-        verdict, unknown = "unknown", structure(null, rho)
-    elif found and alarmed(rho) and left > 0.1:
-        verdict, unknown = "unknown", structure(null, rho)
-    elif found and alternatives and len(found) == 1:
-        verdict = "class"
-        class_ = {"members": [found[0].name, *alternatives], "experiment": candidate(found[0].name).experiment}
-    elif found:
-        verdict = "named"
-    elif parameters:
-        verdict = "parameter"
+    unknown, class_ = None, None
     if contradictions:
         verdict = "data"
-    if verdict == "unknown":
-        effects = ()
-    after = last.predicted if last else null.mean
+    elif rounds and not (found and explained):
+        verdict, effects = "unknown", ()
+        unknown = {**structure(case, null, before), "best_candidate": found[0].name if found else None}
+    elif found and rivals and len(found) == 1:
+        verdict = "class"
+        class_ = {"members": [found[0].name, *rivals], "experiment": candidate(found[0].name).experiment}
+    elif found:
+        verdict = "named"
+    else:
+        verdict = "parameter" if parameters else "none"
     return Diagnosis(
         verdict=verdict,
         sentence="",
@@ -201,22 +256,22 @@ def concluded(measured, case, model, null, values, z, p, rounds, untestable, sta
         class_=class_,
         parameters=parameters,
         data=tuple(c.text for c in contradictions),
-        gap=gap_of(case, null, values, after),
-        statistics=table(case, null, values, z, p, after, rho),
-        ranking=tuple(ranked(r) for r in _each(rounds, null, values)),
+        gap=gap_of(case, null, values, predicted),
+        statistics=table(case, null, values, z, p, predicted, rho),
+        ranking=tuple(ranked(f, r, f in found) for r in rounds for f in r.fits),
         not_testable=tuple(untestable),
         bounds=(),
-        patched=patched,
+        patched=last.model if last else model,
         model_name=model.name,
-        campaign=str(measured.folder),
-        seed=seed,
-        stages=stages,
-        evidence=None,
+        campaign="",
+        seed=case.seed,
+        stages={},
     )
 
 
 def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
-    rivals = [(f.name, float(np.exp(-max(f.misfit - found.misfit, 0.0) / 2))) for f in turn.fits if f is not found]
+    """A candidate as the diagnosis names it, with its rivals and the share of the gap that each would remove."""
+    rivals = [(f, float(np.exp(-max(f.misfit - found.misfit, 0.0) / 2))) for f in turn.fits if f is not found]
     total = 1.0 + sum(w for _, w in rivals)
     parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
     return NamedEffect(
@@ -224,20 +279,17 @@ def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
         candidate(found.name).family,
         min(1.0 / total, 0.99),
         parameters,
-        tuple((n, w / total) for n, w in rivals),
+        tuple((f.name, w / total) for f, w in rivals),
     )
 
 
-def _each(rounds: Sequence[Round], null: Null, values: Array) -> Iterator[tuple[Fit, float]]:
-    for r in rounds:
-        for f in r.fits:
-            yield f, misfit(r.rho)
-
-
-def ranked(pair: tuple[Fit, float]) -> Ranked:
-    f, before = pair
-    parameters = {k: Estimate(v, f.sd.get(k, np.nan)) for k, v in f.parameters.items()}
-    return Ranked(f.name, candidate(f.name).family, before, f.misfit, parameters, False, "")
+def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
+    """A row of the ranking."""
+    before = misfit(turn.rho)
+    parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
+    worst = float(np.abs(found.rho).max())
+    reason = f"leaves {worst:.1f} noises at worst" if found.misfit < before else "explains nothing"
+    return Ranked(found.name, candidate(found.name).family, before, found.misfit, parameters, accepted, reason)
 
 
 def gap_of(case: Case, null: Null, values: Array, after: Array) -> Gap:
@@ -264,16 +316,6 @@ def table(case: Case, null: Null, values: Array, z: Array, p: Array, after: Arra
                   _use(case, k.recording) == "holdout")
         for j, k in enumerate(null.keys)
     )  # fmt: skip
-
-
-def structure(null: Null, rho: Array) -> dict[str, object]:
-    """What an unexplained discrepancy looks like: groups and recordings by their share."""
-    weight = np.log1p(rho**2 / HEAVY)
-    groups: dict[str, float] = {}
-    for k, w in zip(null.keys, weight, strict=True):
-        groups[k.group] = groups.get(k.group, 0.0) + float(w)
-    order = sorted(groups, key=lambda g: -groups[g])
-    return {"groups": {g: groups[g] for g in order[:4]}}
 
 
 def _use(case: Case, recording: str) -> str:

@@ -43,7 +43,8 @@ class Observation:
     above 1.5 T + 1 of the mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.  blocks: (BLOCKS, P) counts.
     frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (LAGS, 2) spikes of one pixel with its neighbour's,
     lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
-    late: (F,) sum over spikes of a frame of their interval less the pixel's mean [frames].
+    late: (F,) sum over spikes of a frame of their interval less the pixel's mean [frames].  odd: (F,) short and long
+    intervals that end in a frame.
     """
 
     shape: tuple[int, int]
@@ -60,6 +61,7 @@ class Observation:
     coincidences: Array
     film: NDArray[np.uint8] | None
     late: Array
+    odd: NDArray[np.int32]
 
     @property
     def frames(self) -> int:
@@ -79,8 +81,8 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
     moments = np.full((pixels, 4), np.nan)
     blocks = np.zeros((BLOCKS, pixels), np.int32)
     lengths = np.zeros(LENGTHS + 1, np.int64)
-    late = np.zeros(len(packed))
-    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths, late)
+    late, odd = np.zeros(len(packed)), np.zeros(len(packed), np.int32)
+    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths, late, odd)
     spikes = unpack_frames(packed, shape)
     row = np.zeros((len(packed), shape[0]), np.int32)
     coincidences = np.zeros((LAGS, 2))
@@ -101,6 +103,7 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
         coincidences,
         _film(spikes) if film else None,
         late,
+        odd,
     )
 
 
@@ -123,7 +126,7 @@ def _film(spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _pixels(words, ends, square, terms, moments, blocks, lengths, late):  # type: ignore[no-untyped-def]
+def _pixels(words, ends, square, terms, moments, blocks, lengths, late, odd):  # type: ignore[no-untyped-def]
     frames = words.shape[0]
     bits = np.empty((64, (frames + 63) // 64), np.uint64)
     t = np.empty(frames + 1, np.int32)
@@ -165,6 +168,8 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late):  # type
                 squares += np.int64(d[i]) * d[i]
                 short += d[i] < least
                 long += d[i] > most
+                if d[i] < least or d[i] > most:
+                    odd[t[i + 1]] += 1
             for i in range(n - 1):
                 late[t[i + 1]] += d[i] - mean
             for i in range(n - 2):

@@ -30,13 +30,18 @@ class Estimate:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect found.  confidence: 0 to 1.  alternatives: (name, confidence), best first."""
+    """An effect found.  confidence: 0 to 1.  alternatives: (name, confidence), best first.
+
+    where, when: the part of the array or of the time that it acts in; empty for everywhere and always.
+    """
 
     name: str
     family: str
     confidence: float
     parameters: dict[str, Estimate]
     alternatives: tuple[tuple[str, float], ...] = ()
+    where: str = ""
+    when: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,7 @@ class Statistic:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate that was tried.  misfit: root mean square of what it leaves, in noise; parameters at the best fit."""
+    """A candidate that was tried.  misfit: heavy-tailed sum of squares of what it leaves; parameters at the best fit."""
 
     name: str
     family: str

@@ -84,9 +84,17 @@ def load() -> Templates:
 
 
 def screen(
-    templates: Templates, conditions: Sequence[Shown], null: Null, measured: Array, names: Sequence[str]
+    templates: Templates,
+    conditions: Sequence[Shown],
+    null: Null,
+    measured: Array,
+    names: Sequence[str],
+    line_hz: float | None = None,
 ) -> list[Screened]:
-    """Candidates by what their best template, scaled, would leave unexplained; least first."""
+    """Candidates by what their best template, scaled, would leave unexplained; least first.
+
+    line_hz: frequency of the strongest line of the measured spectra, to start periodic candidates from.
+    """
     at = _places(templates, conditions, null.keys)
     d = np.nan_to_num((measured - null.mean) / null.noise)
     best: dict[str, Screened] = {}
@@ -100,7 +108,8 @@ def screen(
         if scale <= 0 and not _signed(entry.name):
             continue
         rho = (d - scale * shift) / np.sqrt(1.0 + (2 * TOLERANCE * scale * shift) ** 2)
-        start = {**entry.parameters, strength: entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)}
+        measured_line = {"frequency_hz": line_hz} if line_hz and "frequency_hz" in entry.parameters else {}
+        start = {**entry.parameters, **measured_line, strength: entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)}
         now = Screened(entry.name, bounded(entry.name, start), misfit(rho), scale * shift * null.noise)
         if entry.name not in best or now.misfit < best[entry.name].misfit:
             best[entry.name] = now

@@ -18,7 +18,7 @@ GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
 
 
 FLOORS: dict[tuple[str, str], float] = {
-    ("rates", ""): 1e-4,
+    ("rates", ""): 2e-5,
     ("rates", "scatter"): 0.05,
     ("noise", "variance"): 1e-3,
     ("noise", "lag-1"): 2e-3,
@@ -31,12 +31,12 @@ FLOORS: dict[tuple[str, str], float] = {
     ("rows", ""): 0.02,
     ("neighbours", ""): 2e-3,
     ("step", ""): 2e-3,
-    ("moving", ""): 5e-4,
+    ("moving", ""): 2e-4,
     ("moving", "left"): 5e-3,
     ("pattern", ""): 0.02,
 }
 """How exactly labels and laws can be known at all, whatever the number of spikes, by group and start of the name:
-light labels to 1e-4, the first-order laws of noise to 1 %."""
+light labels to 2e-5, the first-order laws of noise to 1 %."""
 
 
 def floor_of(key: Key) -> float:
