@@ -13,6 +13,8 @@ from spikecam_env.sensor.sensor import checked_frames, checked_shape
 
 FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
 HOLDOUT_LEVELS = (0.05, 0.15, 0.5)
+BRIGHT = 1.4
+"""Of the bars: above one spike a frame, so that what flows over shows."""
 
 
 def write_campaign(
@@ -46,7 +48,7 @@ def standard_design() -> tuple[Planned, ...]:
         Dark(),
         *(Flat(radiance=level) for level in FIT_LEVELS),
         Step(),
-        Bars(),
+        Bars(high=BRIGHT),
         *(Flat(radiance=level, use="holdout") for level in HOLDOUT_LEVELS),
         Disk(use="holdout"),
     )

@@ -8,12 +8,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.statistics import drift, intervals, moving, neighbours, noise, pattern, rates, rows, spectrum, step
+from spikecam_env.gap.statistics import (
+    drift,
+    intervals,
+    moving,
+    neighbours,
+    noise,
+    pattern,
+    rates,
+    rows,
+    spectrum,
+    step,
+    timing,
+)
 from spikecam_env.gap.statistics.reading import Reading
 
 GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
     module.__name__.rsplit(".", 1)[1]: module.statistics
-    for module in (rates, noise, intervals, drift, spectrum, rows, neighbours, step, moving)
+    for module in (rates, noise, intervals, drift, spectrum, timing, rows, neighbours, step, moving)
 }
 
 
@@ -34,9 +46,12 @@ FLOORS: dict[tuple[str, str], float] = {
     ("moving", ""): 2e-4,
     ("moving", "left"): 5e-3,
     ("pattern", ""): 0.02,
+    ("pattern", "silent"): 1.0,
+    ("intervals", ""): 1.0,
+    ("timing", ""): 0.01,
 }
 """How exactly labels and laws can be known at all, whatever the number of spikes, by group and start of the name:
-light labels to 2e-5, the first-order laws of noise to 1 %."""
+light labels to 2e-5, the first-order laws of noise to 1 %; counts, on the scale of their root, to 1."""
 
 
 def floor_of(key: Key) -> float:

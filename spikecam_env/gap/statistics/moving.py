@@ -1,6 +1,6 @@
 """Moving light: what the refit leaves of the film, projected on what each kind of effect would do to it.
 
-The expected film x is the integral of gain L(t) + dark.  Features are made orthogonal in this order, so that each
+The expected film x is the integral of gain L(t) + dark, at most a spike a frame.  Features are made orthogonal in this order, so that each
 says what those before it cannot: level, square, delay, skew, lag 16 / 64 / 256 / 2000 frames, blur, row, column, bloom.
 """
 
@@ -56,7 +56,8 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     if film is None or counts is None:
         return {}
     base = reading.base
-    left = counts - (film.light * base.gain.astype(np.float32) + np.float32(BIN) * base.dark.astype(np.float32))
+    expected = film.light * base.gain.astype(np.float32) + np.float32(BIN) * base.dark.astype(np.float32)
+    left = counts - np.minimum(expected, np.float32(BIN))
     flat = left.reshape(-1)
     share = film.basis @ flat
     rest = flat - share @ film.basis
@@ -88,7 +89,8 @@ def light_film(light: Keyframes, frames: int) -> Pictures:
 
 def features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray[np.float64]]:
     """Orthonormal features (n, bins P) of the nominal camera's film, and how large each was before that."""
-    x = light / BIN
+    bright = light / BIN
+    x = np.minimum(bright, np.float32(1.0))
     bins = len(x)
     change = np.gradient(x, axis=0) / BIN
     row = np.linspace(-0.5, 0.5, shape[0], dtype=np.float32).repeat(shape[1])
@@ -103,7 +105,7 @@ def features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray
     kinds.append((around - film).reshape(bins, -1))
     kinds.append((film * (film.mean(axis=2, keepdims=True) - film.mean())).reshape(bins, -1))
     kinds.append((film * (film.mean(axis=1, keepdims=True) - film.mean())).reshape(bins, -1))
-    over = np.pad(np.maximum(film - 1.0, 0.0), ((0, 0), (1, 1), (1, 1)))
+    over = np.pad(np.maximum(bright.reshape(bins, *shape) - 1.0, 0.0), ((0, 0), (1, 1), (1, 1)))
     spill = (over[:, :-2, 1:-1] + over[:, 2:, 1:-1] + over[:, 1:-1, :-2] + over[:, 1:-1, 2:]) / 4
     kinds.append((spill - over[:, 1:-1, 1:-1]).reshape(bins, -1))
     basis = np.zeros((len(kinds), x.size), np.float32)

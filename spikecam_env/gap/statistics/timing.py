@@ -1,0 +1,31 @@
+"""How late the array's spikes come, frame by frame, against each pixel's own mean interval.
+
+Many spikes tell the time of a frame better than their number: pixels count regularly, whatever their phases.
+Reveals common_threshold_noise and clock_jitter, which move all spikes of a frame together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spikecam_env.gap.statistics.reading import STILL, Reading, log
+
+
+def statistics(reading: Reading, i: int) -> dict[str, float]:
+    """late: log variance over frames of the mean lateness of their spikes, over that of spikes on their own.
+
+    next: correlation of one frame's lateness with the next one's.
+    """
+    if reading.conditions[i].kind not in STILL:
+        return {}
+    o = reading.observations[i]
+    enough = o.frame >= 10
+    if enough.sum() < 500:
+        return {}
+    alone = float(np.nanmean(o.variance[reading.base.live]))
+    late = np.where(enough, o.late / np.maximum(o.frame, 1), 0.0)
+    own = alone / np.maximum(o.frame, 1)
+    ratio = float((late[enough] ** 2).sum() / max(own[enough].sum(), 1e-12))
+    both = enough[1:] & enough[:-1]
+    product = float((late[1:] * late[:-1])[both].mean()) if both.any() else 0.0
+    return {"late": log(ratio), "next": product / max(float((late[enough] ** 2).mean()), 1e-12)}
