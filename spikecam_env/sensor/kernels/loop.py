@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from spikecam_env.sensor.kernels.wide import use_widest_vectors
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
 
 TILE = 256
@@ -152,6 +153,7 @@ def advance(  # type: ignore[no-untyped-def]
     polynomial: 8 float32.  seed_low, seed_high: uint32.  packed: uint8 (count, ceil(P/8)), overwritten: pixel p is bit
     p % 8 of byte p // 8.
     """
+    use_widest_vectors()
     pixels = radiance0.shape[0]
     stop = _I(first + count)
     twice = _I(2 * length)
