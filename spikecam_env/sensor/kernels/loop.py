@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from spikecam_env.sensor.kernels.wide import use_widest_vectors
+from spikecam_env.sensor.kernels.intrinsics import take_ticket, use_widest_vectors
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
 
 TILE = 256
@@ -43,8 +43,10 @@ _LONGEST = _F(MAX_SEGMENT)
 _GOLDEN = _U(0x9E3779B9)  # 2^32 / golden ratio: the counter's step from spike to spike
 
 # Rows of a tile's scratch array: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
-_LEVEL, _CURVE, _REST, _X, _END, _COUNTER, _KEY, _SPIKES, _LOW, _HIGH, _FRAME, _DRAW = (r * TILE for r in range(12))
-_SCRATCH = 12 * TILE
+_LEVEL, _CURVE, _REST, _X, _END, _COUNTER, _KEY, _SPIKES, _LOW, _HIGH, _FRAME, _DRAW, _H1, _H2, _SPREAD = (r * TILE for r in range(15))
+_SCRATCH = 15 * TILE
+_INSIDE = TILE - 1
+_WIDTH = BAND * TILE
 
 
 @njit(inline="always")
@@ -84,7 +86,11 @@ def bell(counter: Any, key: Any) -> Any:
     The bytes are those of h2 and h1 + h2, independent words: h1 is uniform whatever h2, keyed apart, is.
     """
     h1 = scramble(counter)
-    h2 = scramble(_U(h1 ^ key))
+    return bell_of(h1, scramble(_U(h1 ^ key)))
+
+
+@njit(inline="always")
+def bell_of(h1: Any, h2: Any) -> Any:
     fine = _I(_U(_U(byte_sum(h2, _U(h1 + h2)) << _U(8)) | _U(h1 >> _U(24))))
     return _F(fine) * _F(1 / 65536) + _F(0.5 / 65536 + 3.5 / 256 - 4.0)
 
@@ -130,7 +136,7 @@ def transpose_bits(words: Any) -> None:
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def advance(  # type: ignore[no-untyped-def]
     worker,
-    workers,
+    tickets,
     radiance0,
     radiance1,
     length,
@@ -144,14 +150,20 @@ def advance(  # type: ignore[no-untyped-def]
     seed_high,
     remaining,
     fired,
+    dense,
     packed,
+    spikes,
 ):
-    """Frames first .. first + count of a key interval, for every `workers`-th band of tiles from `worker` on.
+    """Frames first .. first + count of a key interval, for the bands of tiles that this thread gets hold of.
 
+    worker: which of the threads at work this is.  tickets: int64 (threads, 8), shared: the next band of each one's share
+    of them in [:, 0]; who is through with his own takes others'.
     radiance0, radiance1: (P,) float32.  length, first, count: int32.  gain, dark: float32 [grains/frame]; spread:
     float32 [grains]; remaining: int32 [grains] and fired: uint32, updated; these five are padded to whole tiles.
-    polynomial: 8 float32.  seed_low, seed_high: uint32.  packed: uint8 (count, ceil(P/8)), overwritten: pixel p is bit
-    p % 8 of byte p // 8.
+    polynomial: 8 float32.  seed_low, seed_high: uint32.  dense: expected spikes a frame from which a tile is served
+    frame by frame.
+    packed: uint8 (count, ceil(P/8)), overwritten: pixel p is bit p % 8 of byte p // 8; or empty, and then
+    spikes: uint64 (count, ceil(P/8)), overwritten: pixel p is byte p % 8 of word p // 8, 0 or 1.
     """
     use_widest_vectors()
     pixels = radiance0.shape[0]
@@ -159,109 +171,170 @@ def advance(  # type: ignore[no-untyped-def]
     twice = _I(2 * length)
     per_twice = _F(1.0 / twice)
     per = _I(((1 << 18) + twice - 1) // twice)
-    flat = packed.reshape(-1)
-    row = _Q(packed.shape[1])
+    c0, c1, c2, c3, c4, c5, c6, c7 = polynomial
     s = np.zeros(_SCRATCH, np.int32)
-    planes = np.zeros(8 * TILE, np.uint8)
+    f = s.view(np.float32)
+    live = np.zeros(TILE // _LANES + 1, np.int64)
+    lit = np.zeros(TILE // _LANES + 1, np.int64)
+    planes = np.zeros(8 * _WIDTH, np.uint8)
     eights = planes.view(np.uint64)
-    for tile in range((pixels + TILE - 1) // TILE):
-        if (tile // BAND) % workers != worker:
-            continue
-        p0 = tile * TILE
-        n = min(TILE, pixels - p0)
-        light0 = radiance0[p0 : p0 + n]
-        light1 = radiance1[p0 : p0 + n]
-        g = gain[p0 : p0 + TILE]
-        d = dark[p0 : p0 + TILE]
-        sd = spread[p0 : p0 + TILE]
-        left = remaining[p0 : p0 + TILE]
-        number = fired[p0 : p0 + TILE]
+    tiles = (pixels + TILE - 1) // TILE
+    bands = (tiles + BAND - 1) // BAND
+    workers = tickets.shape[0]
+    share = worker
+    band = take_ticket(tickets, share)
+    while True:
+        while band >= bands * (share + 1) // workers:
+            share = (share + 1) % workers
+            if share == worker:
+                return
+            band = take_ticket(tickets, share)
+        for tile in range(band * BAND, min(tiles, (band + 1) * BAND)):
+            p0 = tile * TILE
+            n = min(TILE, pixels - p0)
+            light0 = radiance0[p0 : p0 + n]
+            light1 = radiance1[p0 : p0 + n]
+            g = gain[p0 : p0 + TILE]
+            d = dark[p0 : p0 + TILE]
+            sd = spread[p0 : p0 + TILE]
+            left = remaining[p0 : p0 + TILE]
+            number = fired[p0 : p0 + TILE]
 
-        for j in range(n, TILE):
-            s[_LEVEL + j] = 0
-            s[_CURVE + j] = 0
-            s[_REST + j] = 0
-        for j in range(n):
-            i0 = _I(min(light0[j] * g[j] + d[j], _CAP) + _F(0.5))
-            rise = _I(_I(min(light1[j] * g[j] + d[j], _CAP) + _F(0.5)) - i0)
-            curve = _I(np.floor(_F(rise) * per_twice))
-            s[_LEVEL + j] = i0
-            s[_CURVE + j] = curve
-            s[_REST + j] = _I(_I(rise - _I(curve * twice)) * per)
-        for j in range(TILE):
-            s[_X + j] = _I(left[j] + collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], first))
-            s[_END + j] = collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], stop)
-            s[_LOW + j] = 0
-            s[_HIGH + j] = 0
-
-        if count == 1:
+            for j in range(n, TILE):
+                s[_LEVEL + j] = 0
+                s[_CURVE + j] = 0
+                s[_REST + j] = 0
+            for j in range(n):
+                i0 = _I(min(light0[j] * g[j] + d[j], _CAP) + _F(0.5))
+                rise = _I(_I(min(light1[j] * g[j] + d[j], _CAP) + _F(0.5)) - i0)
+                curve = _I(np.floor(_F(rise) * per_twice))
+                s[_LEVEL + j] = i0
+                s[_CURVE + j] = curve
+                s[_REST + j] = _I(_I(rise - _I(curve * twice)) * per)
             for j in range(TILE):
-                if s[_X + j] <= s[_END + j]:
-                    s[_LOW + j] = 1
-                    key = first_key(p0 + j, seed_low)
-                    while s[_X + j] <= s[_END + j]:
-                        counter = _U(key + _U(number[j] * _GOLDEN))
-                        s[_X + j] += drawn(counter, second_key(key, seed_high), sd[j], polynomial)
-                        number[j] = _U(number[j] + _U(1))
-        for q in range(0, TILE, _LANES):
-            go = _I(0)
-            for j in range(q, q + _LANES):
-                go = _I(go | _I(s[_X + j] <= s[_END + j]))
-            if not go:
-                continue
-            for j in range(q, q + _LANES):
-                key = first_key(p0 + j, seed_low)
-                s[_COUNTER + j] = _I(_U(key + _U(number[j] * _GOLDEN)))
-                s[_KEY + j] = _I(second_key(key, seed_high))
-                s[_SPIKES + j] = 0
-            # Three short loops, each of independent lanes: the processor overlaps them; one long one it cannot.
-            step = _U(0)
-            while go:
-                for j in range(q, q + _LANES):
-                    s[_DRAW + j] = drawn(_U(_U(s[_COUNTER + j]) + step), _U(s[_KEY + j]), sd[j], polynomial)
-                for j in range(q, q + _LANES):
-                    s[_FRAME + j] = nearest_frame(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], s[_X + j])
-                go = _I(0)
-                for j in range(q, q + _LANES):
-                    x = s[_X + j]
-                    active = _I(-_I(x <= s[_END + j]))
-                    k = s[_FRAME + j]
-                    before = _I(collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], k) >= x)
-                    at = _I(_I(k - first) - before)
-                    late = _I(-_I(at >= _I(32)))
-                    bit = _I(_I(1) << _I(at & _I(31)))
-                    s[_LOW + j] |= _I(bit & _I(active & _I(~late)))
-                    s[_HIGH + j] |= _I(bit & _I(active & late))
-                    s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
-                    x = _I(x + _I(s[_DRAW + j] & active))
-                    s[_X + j] = x
-                    go = _I(go | _I(x <= s[_END + j]))
-                step = _U(step + _GOLDEN)
-            for j in range(q, q + _LANES):
-                number[j] = _U(number[j] + _U(s[_SPIKES + j]))
-        for j in range(TILE):
-            left[j] = _I(s[_X + j] - s[_END + j])
+                s[_X + j] = _I(left[j] + collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], first))
+                s[_LOW + j] = 0
+                s[_HIGH + j] = 0
 
-        start = _Q(p0 // 8)
+            span = count
+            for begin in range(first, stop, span):
+                end = _I(begin + span)
+                for j in range(TILE):
+                    s[_END + j] = collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], end)
+                groups = 0
+                for q in range(0, TILE, _LANES):
+                    go = _I(0)
+                    for j in range(q, q + _LANES):
+                        go = _I(go | _I(s[_X + j] <= s[_END + j]))
+                    live[groups] = q
+                    lit[groups] = q
+                    groups += go
+                fired_groups = groups
+                for i in range(groups):
+                    q = live[i] & _INSIDE
+                    for j in range(q, q + _LANES):
+                        key = first_key(p0 + j, seed_low)
+                        s[_COUNTER + j] = _I(_U(key + _U(number[j] * _GOLDEN)))
+                        s[_KEY + j] = _I(second_key(key, seed_high))
+                for i in range(groups):
+                    q = live[i] & _INSIDE
+                    for j in range(q, q + _LANES):
+                        s[_SPIKES + j] = 0
+                        f[_SPREAD + j] = sd[j]
+                step = _U(0)
+                while groups:
+                    for i in range(groups):
+                        q = live[i] & _INSIDE
+                        for j in range(q, q + _LANES):
+                            s[_H1 + j] = _I(scramble(_U(_U(s[_COUNTER + j]) + step)))
+                    for i in range(groups):
+                        q = live[i] & _INSIDE
+                        for j in range(q, q + _LANES):
+                            s[_H2 + j] = _I(scramble(_U(_U(s[_H1 + j]) ^ _U(s[_KEY + j]))))
+                    for i in range(groups):
+                        q = live[i] & _INSIDE
+                        for j in range(q, q + _LANES):
+                            f[_H2 + j] = bell_of(_U(s[_H1 + j]), _U(s[_H2 + j]))
+                    for i in range(groups):
+                        q = live[i] & _INSIDE
+                        for j in range(q, q + _LANES):
+                            x = f[_H2 + j]
+                            z = ((((((c7 * x + c6) * x + c5) * x + c4) * x + c3) * x + c2) * x + c1) * x + c0
+                            s[_DRAW + j] = _I(_GRAINS + f[_SPREAD + j] * z)
+                    still = 0
+                    if span == 1:
+                        at1 = _I(begin - first)
+                        lo = _I(_I(at1 < 32) << (at1 & 31))
+                        hi = _I(_I(at1 >= 32) << (at1 & 31))
+                        for i in range(groups):
+                            q = live[i] & _INSIDE
+                            go = _I(0)
+                            for j in range(q, q + _LANES):
+                                x = s[_X + j]
+                                active = _I(-_I(x <= s[_END + j]))
+                                s[_LOW + j] |= _I(active & lo)
+                                s[_HIGH + j] |= _I(active & hi)
+                                s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
+                                x = _I(x + _I(s[_DRAW + j] & active))
+                                s[_X + j] = x
+                                go = _I(go | _I(x <= s[_END + j]))
+                            live[still] = q
+                            still += go
+                    else:
+                        for i in range(groups):
+                            q = live[i] & _INSIDE
+                            for j in range(q, q + _LANES):
+                                s[_FRAME + j] = nearest_frame(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], s[_X + j])
+                        for i in range(groups):
+                            q = live[i] & _INSIDE
+                            go = _I(0)
+                            for j in range(q, q + _LANES):
+                                x = s[_X + j]
+                                active = _I(-_I(x <= s[_END + j]))
+                                k = s[_FRAME + j]
+                                before = _I(collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], k) >= x)
+                                at = _I(_I(k - first) - before)
+                                late = _I(-_I(at >= _I(32)))
+                                bit = _I(_I(1) << _I(at & _I(31)))
+                                s[_LOW + j] |= _I(bit & _I(active & _I(~late)))
+                                s[_HIGH + j] |= _I(bit & _I(active & late))
+                                s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
+                                x = _I(x + _I(s[_DRAW + j] & active))
+                                s[_X + j] = x
+                                go = _I(go | _I(x <= s[_END + j]))
+                            live[still] = q
+                            still += go
+                    groups = still
+                    step = _U(step + _GOLDEN)
+                for i in range(fired_groups):
+                    q = lit[i] & _INSIDE
+                    for j in range(q, q + _LANES):
+                        number[j] = _U(number[j] + _U(s[_SPIKES + j]))
+            for j in range(TILE):
+                left[j] = _I(s[_X + j] - s[_END + j])
+
+            at_plane = (tile - band * BAND) * TILE
+            for plane in range((count + 7) // 8):
+                word = _HIGH if plane >= 4 else _LOW
+                shift = _U(8 * (plane & 3))
+                of_plane = planes[plane * _WIDTH + at_plane : plane * _WIDTH + at_plane + TILE]
+                for j in range(TILE):
+                    of_plane[j] = _B(_U(s[word + j]) >> shift)
+        start = band * (_WIDTH // 8)
+        words = min(_WIDTH // 8, (pixels + 7) // 8 - start)
         for plane in range((count + 7) // 8):
-            word = _HIGH if plane >= 4 else _LOW
-            shift = _U(8 * (plane & 3))
-            for j in range(TILE):
-                planes[plane * TILE + j] = _B(_U(s[word + j]) >> shift)
-            words = eights[plane * (TILE // 8) : (plane + 1) * (TILE // 8)]
-            transpose_bits(words)
+            of_plane8 = eights[plane * (_WIDTH // 8) : plane * (_WIDTH // 8) + words]
+            if packed.size:
+                transpose_bits(of_plane8)
             for k in range(8 * plane, min(8 * plane + 8, count)):
-                at_byte = start + row * _Q(k)
-                byte = _Q(8 * (k & 7))
-                for j in range((n + 7) // 8):
-                    flat[at_byte + _Q(j)] = _B(words[j] >> byte)
-
-
-@njit(cache=True, nogil=True, boundscheck=False)
-def unpack(packed, spikes):  # type: ignore[no-untyped-def]
-    """Bytes (n,) of bits, least significant first, to 0/1 in bytes: `spikes` is (n,) uint64, eight pixels to a word."""
-    for i in range(packed.size):
-        w = _Q(packed[i])
-        w = (w | (w << _Q(28))) & _Q(0x0000000F0000000F)
-        w = (w | (w << _Q(14))) & _Q(0x0003000300030003)
-        spikes[i] = (w | (w << _Q(7))) & _Q(0x0101010101010101)
+                if packed.size:
+                    row = packed[k, start : start + words]
+                    byte = _Q(8 * (k & 7))
+                    for j in range(words):
+                        row[j] = _B(of_plane8[j] >> byte)
+                else:
+                    row8 = spikes[k, start : start + words]
+                    bit8 = _Q(k & 7)
+                    for j in range(words):
+                        row8[j] = (of_plane8[j] >> bit8) & _Q(0x0101010101010101)
+        band = take_ticket(tickets, share)
