@@ -38,6 +38,9 @@ _LIBC = ctypes.PyDLL(None) if sys.platform == "linux" else None
 _NO_BITS = np.empty((0, 0), dtype=np.uint8)
 _NO_WORDS = np.empty((0, 0), dtype=np.uint64)
 
+DENSE = 0.7
+"""Spikes a pixel and frame from which on streaming frame by frame is faster than jumping."""
+
 _WORTH_A_THREAD = 400_000
 """Pixel-steps below which handing work to another thread costs more than it saves (0.1 ms)."""
 
@@ -133,7 +136,7 @@ def run_packed(state: FastState, segment: Segment, *, threads: int | None = None
 def _advance(
     state: FastState, segment: Segment, packed: NDArray[np.uint8], spikes: NDArray[np.uint64], threads: int | None
 ) -> None:
-    bands = -(-state.remaining.size // (loop.TILE * loop.BAND))
+    bands = -(-state.remaining.size // loop.WIDTH)
     threads = _worth(threads, bands, segment.radiance0.size * segment.count)
     tickets = np.zeros((threads, 8), dtype=np.int64)
     tickets[:, 0] = bands * np.arange(threads) // threads
@@ -151,7 +154,7 @@ def _advance(
         *state.seeds,
         state.remaining,
         state.fired,
-        np.float32(0.0),
+        np.float32(DENSE),
         packed,
         spikes,
     )
