@@ -56,6 +56,19 @@ def test_cutting_a_stream_changes_no_bit(pixels: int, cuts: list[int]) -> None:
     assert np.array_equal(whole.remaining, cut.remaining) and np.array_equal(whole.fired, cut.fired)
 
 
+@pytest.mark.parametrize("dense", [0.0, 0.2, np.inf])
+def test_streaming_and_jumping_give_the_same_bits(dense: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every tile streamed, some, none."""
+    light, lit = wild_light(3000), np.sort(wild_light(3000), axis=1)
+    for picture in (light, lit):
+        usual, other = started(3000), started(3000)
+        bits = film(usual, picture, [64])
+        with monkeypatch.context() as patch:
+            patch.setattr(fast, "DENSE", dense)
+            assert np.array_equal(film(other, picture, [64]), bits)
+        assert np.array_equal(usual.remaining, other.remaining) and np.array_equal(usual.fired, other.fired)
+
+
 @pytest.mark.parametrize("threads", [2, 3])
 def test_threads_change_no_bit(threads: int) -> None:
     light = wild_light(40_000)
