@@ -105,7 +105,9 @@ def main() -> None:
         error, deviation = rate_error(electrons, interval, moving, options.pixels, options.seed)
         good &= abs(error) < 1e-3
         kind = "moving" if moving else "steady"
-        print(f"N={electrons:g} T={interval:g} {kind}: mean rate {error:+.1e} +- {deviation:.1e} of its value (limit 1e-3)")
+        print(
+            f"N={electrons:g} T={interval:g} {kind}: mean rate {error:+.1e} +- {deviation:.1e} of its value (limit 1e-3)"
+        )
     print("PASS" if good else "FAIL")
     if options.out is not None:
         options.out.write_text(json.dumps(results, indent=1), encoding="utf-8")

@@ -88,7 +88,8 @@ class SpikeSensor:
         spikes = np.empty((frames, self.shape[0] * self.shape[1]), dtype=np.uint8)
         done = 0
         for segment in segments(light, self.frame, frames):
-            self._run(imaged(segment, self._optics, self.shape), spikes[done : done + segment.count])
+            at = self.frame + done - segment.first
+            self._run(self._imaged(segment, light, at), spikes[done : done + segment.count])
             done += segment.count
         self.frame += frames
         return spikes.reshape(frames, *self.shape)
@@ -120,6 +121,7 @@ class SpikeSensor:
         return twin
 
     _pixels: Any
+    _seen: tuple[Keyframes, int, int, Segment] | None = None
 
     def _start(self, seed: int, phase: NDArray[np.float64] | None) -> None:
         self.seed = seed
@@ -145,6 +147,15 @@ class SpikeSensor:
             out[:] = cuda.run(self._pixels, batch)[0].cpu().numpy()
         else:
             out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
+
+    def _imaged(self, segment: Segment, light: Keyframes | NDArray[np.float32], begin: int) -> Segment:
+        """Optics act once a key interval, not once a step; `begin` is the interval's first frame."""
+        if not self._optics or not isinstance(light, Keyframes):
+            return imaged(segment, self._optics, self.shape)
+        if self._seen is None or self._seen[0] is not light or self._seen[1:3] != (begin, segment.length):
+            self._seen = (light, begin, segment.length, imaged(segment, self._optics, self.shape))
+        ends = self._seen[3]
+        return replace(segment, radiance0=ends.radiance0, radiance1=ends.radiance1)
 
     def _names_of_effects(self) -> tuple[str, ...]:
         return tuple(e.name for e in self._frame_effects)

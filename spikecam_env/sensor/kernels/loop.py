@@ -56,6 +56,7 @@ _SPIKES, _LOW, _HIGH, _FRAME, _DRAW, _WORD1, _WORD2 = (r * TILE for r in range(8
 _SCRATCH = 15 * TILE
 _INSIDE = TILE - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
 
+
 @njit(inline="always")
 def scramble(x: Any) -> Any:
     """32-bit integer hash, a bijection: xor-shift-multiply with the `lowbias32` constants 21f0aaad, 735a2d97."""
@@ -175,7 +176,7 @@ def find_live(s: Any, end: Any, live: Any) -> Any:
     """Fill row END with F(end); list the groups in which a pixel fires before: their number."""
     for j in range(TILE):
         s[_END + j] = collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], end)
-    groups = 0
+    groups: Any = 0
     for q in range(0, TILE, _GROUP):
         go = _I(0)
         for j in range(q, q + _GROUP):
@@ -186,7 +187,9 @@ def find_live(s: Any, end: Any, live: Any) -> Any:
 
 
 @njit(inline="always")
-def wake(s: Any, f: Any, live: Any, groups: Any, p0: Any, number: Any, spread: Any, seed_low: Any, seed_high: Any) -> None:
+def wake(
+    s: Any, f: Any, live: Any, groups: Any, p0: Any, number: Any, spread: Any, seed_low: Any, seed_high: Any
+) -> None:
     """Rows COUNTER, KEY, SPREAD, SPIKES of the live groups."""
     for i in range(groups):
         q = live[i] & _INSIDE
@@ -223,13 +226,24 @@ def draw(s: Any, f: Any, live: Any, groups: Any, step: Any, polynomial: Any) -> 
 
 
 @njit(inline="always")
+def reset(s: Any, j: Any, active: Any, low: Any, high: Any) -> Any:
+    """Note an active pixel's spike (active: -1, else 0) in the frame of this bit; whether it fires again."""
+    s[_LOW + j] |= _I(low & active)
+    s[_HIGH + j] |= _I(high & active)
+    s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
+    x = _I(s[_X + j] + _I(s[_DRAW + j] & active))
+    s[_X + j] = x
+    return _I(x <= s[_END + j])
+
+
+@njit(inline="always")
 def jump(s: Any, live: Any, groups: Any, first: Any) -> Any:
     """Note in LOW and HIGH the frame in which each live pixel fires; returns how many groups stay live."""
     for i in range(groups):
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
             s[_FRAME + j] = nearest_frame(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], s[_X + j])
-    still = 0
+    still: Any = 0
     for i in range(groups):
         q = live[i] & _INSIDE
         go = _I(0)
@@ -241,12 +255,7 @@ def jump(s: Any, live: Any, groups: Any, first: Any) -> Any:
             at = _I(_I(k - first) - before)
             late = _I(-_I(at >= _I(32)))
             bit = _I(_I(1) << _I(at & _I(31)))
-            s[_LOW + j] |= _I(bit & _I(active & _I(~late)))
-            s[_HIGH + j] |= _I(bit & _I(active & late))
-            s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
-            x = _I(x + _I(s[_DRAW + j] & active))
-            s[_X + j] = x
-            go = _I(go | _I(x <= s[_END + j]))
+            go = _I(go | reset(s, j, active, _I(bit & _I(~late)), _I(bit & late)))
         live[still] = q
         still += go
     return still
@@ -258,19 +267,13 @@ def stream(s: Any, live: Any, groups: Any, at: Any) -> Any:
     bit = _I(_I(1) << _I(at & _I(31)))
     low = _I(bit * _I(at < _I(32)))
     high = _I(bit * _I(at >= _I(32)))
-    still = 0
+    still: Any = 0
     for i in range(groups):
         q = live[i] & _INSIDE
         go = _I(0)
         for j in range(q, q + _GROUP):
-            x = s[_X + j]
-            active = _I(-_I(x <= s[_END + j]))
-            s[_LOW + j] |= _I(low & active)
-            s[_HIGH + j] |= _I(high & active)
-            s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
-            x = _I(x + _I(s[_DRAW + j] & active))
-            s[_X + j] = x
-            go = _I(go | _I(x <= s[_END + j]))
+            active = _I(-_I(s[_X + j] <= s[_END + j]))
+            go = _I(go | reset(s, j, active, low, high))
         live[still] = q
         still += go
     return still
@@ -278,7 +281,7 @@ def stream(s: Any, live: Any, groups: Any, at: Any) -> Any:
 
 @njit(inline="always")
 def write(eights: Any, start: Any, words: Any, count: Any, packed: Any, spikes: Any) -> None:
-    """A band's planes, each a byte a pixel that holds its eight frames, to frames: bits in `packed` or bytes in `spikes`."""
+    """A band's planes, each a byte a pixel that holds its eight frames, to frames: bits or bytes."""
     for plane in range((count + 7) // 8):
         of_plane = eights[plane * (WIDTH // 8) : plane * (WIDTH // 8) + words]
         if packed.size:
@@ -329,7 +332,7 @@ def advance(  # type: ignore[no-untyped-def]
     packed: uint8 (count, ceil(P/8)), overwritten: pixel p is bit p % 8 of byte p // 8; or empty, and then
     spikes: uint64 (count, ceil(P/8)), overwritten: pixel p is byte p % 8 of word p // 8, 0 or 1.
     """
-    use_widest_vectors()
+    use_widest_vectors()  # type: ignore[call-arg]
     pixels = radiance0.shape[0]
     stop = _I(first + count)
     s = np.empty(_SCRATCH, np.int32)
@@ -374,10 +377,8 @@ def advance(  # type: ignore[no-untyped-def]
                 step = _U(0)
                 while groups:
                     draw(s, f, live, groups, step, polynomial)
-                    if span == 1:
-                        groups = stream(s, live, groups, _I(begin - first))
-                    else:
-                        groups = jump(s, live, groups, first)
+                    at = _I(begin - first)
+                    groups = stream(s, live, groups, at) if span == 1 else jump(s, live, groups, first)
                     step = _U(step + _GOLDEN)
                 for i in range(awake):
                     q = woken[i] & _INSIDE
@@ -388,8 +389,8 @@ def advance(  # type: ignore[no-untyped-def]
             for plane in range((count + 7) // 8):
                 word = _HIGH if plane >= 4 else _LOW
                 shift = _U(8 * (plane & 3))
-                at = plane * WIDTH + (p0 - band * WIDTH)
-                of_tile = planes[at : at + TILE]
+                column = plane * WIDTH + (p0 - band * WIDTH)
+                of_tile = planes[column : column + TILE]
                 for j in range(TILE):
                     of_tile[j] = _B(_U(s[word + j]) >> shift)
         start = band * (WIDTH // 8)
