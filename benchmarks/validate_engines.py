@@ -106,7 +106,7 @@ def main() -> None:
         good &= abs(error) < 1e-3
         kind = "moving" if moving else "steady"
         print(
-            f"N={electrons:g} T={interval:g} {kind}: mean rate {error:+.1e} +- {deviation:.1e} of its value (limit 1e-3)"
+            f"N={electrons:g} T={interval:g} {kind}: mean rate {error:+.1e} +- {deviation:.1e} (relative, limit 1e-3)"
         )
     print("PASS" if good else "FAIL")
     if options.out is not None:

@@ -52,8 +52,8 @@ def bench_sensor(
 
     scenes: mean intervals [frames] of steady light, and SMOOTH.  seconds: time spent on each measurement.  Compiling is
     not timed.
-    Columns: scene, engine, threads, frames (in one call), Gpx-steps/s (median of the repeats), from and to (quartiles of
-    the repeats), x numpy (same scene), x real time (Vidar).
+    Columns: scene, engine, threads, frames (in one call), Gpx-steps/s (median of the repeats), from and to (their
+    quartiles), x numpy (same scene), x real time (Vidar).
     Engine "fast" gives one byte a pixel, "fast, packed" one bit.  "bytes written, no more" fills the same frames with a
     constant: what memory alone allows.
     """
