@@ -48,11 +48,12 @@ _Q = np.uint64
 _GRAINS = _F(GRAINS)
 _CAP = _F(MAX_GRAINS_PER_FRAME)
 _LONGEST = _F(MAX_SEGMENT)
+_GOLDEN_SIGNED = _I(0x9E3779B9 - (1 << 32))
 _GOLDEN = _U(0x9E3779B9)  # 2^32 / golden ratio: the counter's step from spike to spike
 
 # Rows of a tile's scratch array: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
 _LEVEL, _CURVE, _REST, _X, _END, _COUNTER, _KEY, _SPREAD = (r * TILE for r in range(8))
-_SPIKES, _LOW, _HIGH, _FRAME, _DRAW, _WORD1, _WORD2 = (r * TILE for r in range(8, 15))
+_SPIKES, _LOW, _HIGH, _FRAME, _DRAW, _WORD, _BELL = (r * TILE for r in range(8, 15))
 _SCRATCH = 15 * TILE
 _INSIDE = TILE - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
 
@@ -172,73 +173,70 @@ def expected(s: Any, first: Any, stop: Any) -> Any:
 
 
 @njit(inline="always")
-def find_live(s: Any, end: Any, live: Any) -> Any:
-    """Fill row END with F(end); list the groups in which a pixel fires before: their number."""
+def find_live(s: Any, flags: Any, end: Any, live: Any) -> Any:
+    """Fill row END with F(end); list the groups in which a pixel fires before; returns their number."""
     for j in range(TILE):
         s[_END + j] = collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], end)
+        flags[j] = _B(s[_X + j] <= s[_END + j])
+    eights = flags.view(np.uint64)
     groups: Any = 0
-    for q in range(0, TILE, _GROUP):
-        go = _I(0)
-        for j in range(q, q + _GROUP):
-            go = _I(go | _I(s[_X + j] <= s[_END + j]))
-        live[groups] = q
-        groups += go
+    for i in range(TILE // _GROUP):
+        go = _Q(0)
+        for word in range(i * (_GROUP // 8), (i + 1) * (_GROUP // 8)):
+            go |= eights[word]
+        live[groups] = i * _GROUP
+        groups += _I(go != _Q(0))
     return groups
 
 
 @njit(inline="always")
-def wake(
-    s: Any, f: Any, live: Any, groups: Any, p0: Any, number: Any, spread: Any, seed_low: Any, seed_high: Any
-) -> None:
-    """Rows COUNTER, KEY, SPREAD, SPIKES of the live groups."""
+def wake(s: Any, f: Any, live: Any, groups: Any, p0: Any, number: Any, spread: Any, low: Any, high: Any) -> None:
+    """Rows COUNTER, KEY, SPREAD of the live groups; low, high: the seed."""
     for i in range(groups):
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
-            key = first_key(p0 + j, seed_low)
+            key = first_key(p0 + j, low)
             s[_COUNTER + j] = _I(_U(key + _U(number[j] * _GOLDEN)))
-            s[_KEY + j] = _I(second_key(key, seed_high))
-    for i in range(groups):
-        q = live[i] & _INSIDE
-        for j in range(q, q + _GROUP):
-            s[_SPIKES + j] = 0
+            s[_KEY + j] = _I(second_key(key, high))
             f[_SPREAD + j] = spread[j]
 
 
 @njit(inline="always")
-def draw(s: Any, f: Any, live: Any, groups: Any, step: Any, polynomial: Any) -> None:
-    """Row DRAW of the live groups: the charge of each pixel's next spike."""
+def draw(s: Any, f: Any, live: Any, groups: Any) -> None:
+    """Row BELL of the live groups: the draw of each pixel's next spike."""
     for i in range(groups):
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
-            s[_WORD1 + j] = _I(scramble(_U(_U(s[_COUNTER + j]) + step)))
+            s[_WORD + j] = _I(scramble(_U(s[_COUNTER + j])))
     for i in range(groups):
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
-            s[_WORD2 + j] = _I(scramble(_U(_U(s[_WORD1 + j]) ^ _U(s[_KEY + j]))))
+            s[_BELL + j] = _I(scramble(_U(_U(s[_WORD + j]) ^ _U(s[_KEY + j]))))
     for i in range(groups):
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
-            f[_WORD2 + j] = bell_of(_U(s[_WORD1 + j]), _U(s[_WORD2 + j]))
-    for i in range(groups):
-        q = live[i] & _INSIDE
-        for j in range(q, q + _GROUP):
-            s[_DRAW + j] = charge_of(f[_WORD2 + j], f[_SPREAD + j], polynomial)
+            f[_BELL + j] = bell_of(_U(s[_WORD + j]), _U(s[_BELL + j]))
 
 
 @njit(inline="always")
-def reset(s: Any, j: Any, active: Any, low: Any, high: Any) -> Any:
+def reset(s: Any, j: Any, active: Any, charge: Any, low: Any, high: Any) -> Any:
     """Note an active pixel's spike (active: -1, else 0) in the frame of this bit; whether it fires again."""
     s[_LOW + j] |= _I(low & active)
     s[_HIGH + j] |= _I(high & active)
     s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
-    x = _I(s[_X + j] + _I(s[_DRAW + j] & active))
+    s[_COUNTER + j] = _I(s[_COUNTER + j] + _I(_GOLDEN_SIGNED & active))
+    x = _I(s[_X + j] + _I(charge & active))
     s[_X + j] = x
     return _I(x <= s[_END + j])
 
 
 @njit(inline="always")
-def jump(s: Any, live: Any, groups: Any, first: Any) -> Any:
-    """Note in LOW and HIGH the frame in which each live pixel fires; returns how many groups stay live."""
+def jump(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, first: Any) -> Any:
+    """Let each live pixel fire in the frame that its light says; returns how many groups stay live."""
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        for j in range(q, q + _GROUP):
+            s[_DRAW + j] = charge_of(f[_BELL + j], f[_SPREAD + j], polynomial)
     for i in range(groups):
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
@@ -255,14 +253,14 @@ def jump(s: Any, live: Any, groups: Any, first: Any) -> Any:
             at = _I(_I(k - first) - before)
             late = _I(-_I(at >= _I(32)))
             bit = _I(_I(1) << _I(at & _I(31)))
-            go = _I(go | reset(s, j, active, _I(bit & _I(~late)), _I(bit & late)))
+            go = _I(go | reset(s, j, active, s[_DRAW + j], _I(bit & _I(~late)), _I(bit & late)))
         live[still] = q
         still += go
     return still
 
 
 @njit(inline="always")
-def stream(s: Any, live: Any, groups: Any, at: Any) -> Any:
+def stream(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, at: Any) -> Any:
     """As `jump`, where every live pixel fires in frame `at` of the segment."""
     bit = _I(_I(1) << _I(at & _I(31)))
     low = _I(bit * _I(at < _I(32)))
@@ -273,7 +271,8 @@ def stream(s: Any, live: Any, groups: Any, at: Any) -> Any:
         go = _I(0)
         for j in range(q, q + _GROUP):
             active = _I(-_I(s[_X + j] <= s[_END + j]))
-            go = _I(go | reset(s, j, active, low, high))
+            charge = charge_of(f[_BELL + j], f[_SPREAD + j], polynomial)
+            go = _I(go | reset(s, j, active, charge, low, high))
         live[still] = q
         still += go
     return still
@@ -338,7 +337,7 @@ def advance(  # type: ignore[no-untyped-def]
     s = np.empty(_SCRATCH, np.int32)
     f = s.view(np.float32)
     live = np.empty(TILE // _GROUP + 1, np.int64)
-    woken = np.empty(TILE // _GROUP + 1, np.int64)
+    flags = np.empty(TILE, np.uint8)
     planes = np.empty(8 * WIDTH, np.uint8)
     eights = planes.view(np.uint64)
     bands = (pixels + WIDTH - 1) // WIDTH
@@ -366,26 +365,28 @@ def advance(  # type: ignore[no-untyped-def]
             )
             for j in range(TILE):
                 s[_X + j] = _I(left[j] + collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], first))
+                s[_SPIKES + j] = 0
                 s[_LOW + j] = 0
                 s[_HIGH + j] = 0
-            span = _I(1) if expected(s, first, stop) >= dense * count * TILE else count
-            for begin in range(first, stop, span):
-                groups = find_live(s, _I(begin + span), live)
-                wake(s, f, live, groups, p0, number, spread[p0 : p0 + TILE], seed_low, seed_high)
-                awake = groups
-                woken[:] = live
-                step = _U(0)
+            groups = find_live(s, flags, stop, live)
+            awake = groups
+            wake(s, f, live, groups, p0, number, spread[p0 : p0 + TILE], seed_low, seed_high)
+            if count == 1 or expected(s, first, stop) >= dense * count * TILE:
+                for at in range(count):
+                    if count > 1:
+                        groups = find_live(s, flags, _I(first + at + 1), live)
+                    while groups:
+                        draw(s, f, live, groups)
+                        groups = stream(s, f, live, groups, polynomial, _I(at))
+            else:
                 while groups:
-                    draw(s, f, live, groups, step, polynomial)
-                    at = _I(begin - first)
-                    groups = stream(s, live, groups, at) if span == 1 else jump(s, live, groups, first)
-                    step = _U(step + _GOLDEN)
-                for i in range(awake):
-                    q = woken[i] & _INSIDE
-                    for j in range(q, q + _GROUP):
-                        number[j] = _U(number[j] + _U(s[_SPIKES + j]))
+                    draw(s, f, live, groups)
+                    groups = jump(s, f, live, groups, polynomial, first)
             for j in range(TILE):
                 left[j] = _I(s[_X + j] - s[_END + j])
+            if awake:
+                for j in range(TILE):
+                    number[j] = _U(number[j] + _U(s[_SPIKES + j]))
             for plane in range((count + 7) // 8):
                 word = _HIGH if plane >= 4 else _LOW
                 shift = _U(8 * (plane & 3))
