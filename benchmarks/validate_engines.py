@@ -68,7 +68,7 @@ def rate_error(electrons: float, interval: float, moving: bool, pixels: int, see
         frame = light.frame[start // 64 : start // 64 + 2]
         keys = np.broadcast_to(light.radiance[start // 64 : start // 64 + 2], (2, *shape))
         spikes = sensor.step(Keyframes(frame, keys), min(64, stop - start))
-        count += spikes[max(0, settle - start) :].sum(axis=0)
+        count += spikes[max(0, settle - start) :].sum(axis=0, dtype=np.uint8)  # 64 frames at most
     middle = np.arange(settle, stop) + 0.5
     expected = float(np.interp(middle, light.frame, light.radiance[:, 0, 0].astype(np.float64)).sum())
     return count.mean() / expected - 1.0, count.std() / np.sqrt(count.size) / expected
