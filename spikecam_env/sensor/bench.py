@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Exposure
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.kernels import ahead, fast
 from spikecam_env.sensor.light import GRAINS, Keyframes, Segment, ramp, segments
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import Unit
@@ -55,14 +55,15 @@ def bench_sensor(
     Columns: scene, engine, threads, frames (in one call), Gpx-steps/s (median of the repeats), from and to (their
     quartiles), x numpy (same scene), x real time (Vidar).
     Engine "fast" gives one byte a pixel, "fast, packed" one bit.  "bytes written, no more" fills the same frames with a
-    constant: what memory alone allows.
+    constant: what memory alone allows.  One frame at a time, "fast" is what `SpikeSensor.step` does on keys 64 frames
+    apart; with light that is new in every frame nothing can be looked ahead (`kernels.ahead`).
     """
     unit = SensorModel.preset("scsim").draw_unit(SHAPE, seed)
     phase = generator(seed, "phase").random(SHAPE).reshape(-1)
     rows: list[dict[str, Any]] = []
     for scene in tqdm(list(scenes), desc="bench", unit="scene", leave=False):
         blocks = list(segments(scene_light(scene), 0, 8 * BLOCK))
-        frames = [_one_frame(blocks[i // BLOCK], i % BLOCK) for i in range(8)]
+        frames = [_one_frame(blocks[i // BLOCK], i % BLOCK) for i in range(8 * BLOCK)]
         base = 0.0
         for name, count, parts, run in _contestants(unit, phase, seed, blocks, frames, tuple(threads)):
             rates = _rates(run, parts, seconds)
@@ -121,7 +122,9 @@ def _contestants(
     for count in threads:
         yield "fast", count, blocks, partial(bytes_out, threads=count)
         yield "fast, packed", count, blocks, partial(fast.run_packed, pixels, threads=count)
-        yield "fast", count, frames, partial(bytes_out, threads=count)
+        yield "fast, light new in every frame", count, frames[:8], partial(bytes_out, threads=count)
+        looking = ahead.start(unit, phase, seed)
+        yield "fast", count, frames, partial(ahead.run, looking, out=out[:1], threads=count)
     yield "bytes written, no more", 1, blocks, lambda part: out[: part.count].fill(1)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Effect, Exposure
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.kernels import ahead, fast
 from spikecam_env.sensor.light import Keyframes, Segment, as_light, segments
 from spikecam_env.sensor.model import SensorModel, generator
 
@@ -77,15 +77,19 @@ class SpikeSensor:
         """Back to frame 0; with a seed, as another unit."""
         self._start(self.seed if seed is None else checked_seed(seed), phase=None)
 
-    def step(self, radiance: Keyframes | ArrayLike, frames: int = 1) -> NDArray[np.uint8]:
+    def step(
+        self, radiance: Keyframes | ArrayLike, frames: int = 1, *, out: NDArray[np.uint8] | None = None
+    ) -> NDArray[np.uint8]:
         """Expose the next frames; returns spikes (frames, H, W) uint8, 0 or 1.
+
+        out: an array of that kind, C-contiguous, to be overwritten: fresh memory costs as much as the simulation.
 
         radiance: (H, W) held throughout, or Keyframes on the stream's absolute frame numbers; 1.0 makes the nominal
         pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light or frames < 1.
         """
         frames = checked_frames(frames)
         light = as_light(radiance, self.shape)
-        spikes = np.empty((frames, self.shape[0] * self.shape[1]), dtype=np.uint8)
+        spikes = _recycled(out, (frames, *self.shape)).reshape(frames, -1)
         done = 0
         for segment in segments(light, self.frame, frames):
             at = self.frame + done - segment.first
@@ -131,7 +135,7 @@ class SpikeSensor:
         self.phase = generator(noise_seed, "phase").random(self.shape) if phase is None else phase
         flat = self.phase.reshape(-1)
         if self.engine == "fast":
-            self._pixels = fast.start(self.unit, flat, noise_seed)
+            self._pixels = ahead.start(self.unit, flat, noise_seed)
         elif self.engine == "cuda":
             cuda = _cuda()
             self._pixels = cuda.start([self.unit], [flat], [noise_seed], cuda.checked_device("cuda"))
@@ -140,7 +144,7 @@ class SpikeSensor:
 
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
         if self.engine == "fast":
-            fast.run(self._pixels, segment, out)
+            ahead.run(self._pixels, segment, out)
         elif self.engine == "cuda":
             cuda = _cuda()
             batch = cuda.BatchSegment.of([segment], self._pixels.device)
@@ -172,6 +176,14 @@ def imaged(segment: Segment, optics: Sequence[Effect], shape: tuple[int, int]) -
         end = start if held else effect.image(segment.radiance1.reshape(shape)).reshape(-1)
         segment = replace(segment, radiance0=start, radiance1=end)
     return segment
+
+
+def _recycled(out: NDArray[np.uint8] | None, shape: tuple[int, int, int]) -> NDArray[np.uint8]:
+    if out is None:
+        return np.empty(shape, dtype=np.uint8)
+    if out.shape != shape or out.dtype != np.uint8 or not (out.flags.c_contiguous and out.flags.writeable):
+        raise InputError(f"out is {out.dtype} {out.shape}; it must be uint8 {shape}, C-contiguous and writeable")
+    return out
 
 
 def checked_shape(shape: Any) -> tuple[int, int]:

@@ -161,6 +161,18 @@ def _advance(
     _together([partial(loop.advance, i, *work) for i in range(threads)])
 
 
+def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+    """Bits (count, ceil(pixels/8)) to spikes (count, pixels) uint8, in `out` where that is given."""
+    if out is None:
+        out = np.empty((len(packed), pixels), dtype=np.uint8)
+    padded = 8 * packed.shape[1]
+    spikes = out if pixels == padded else np.empty((len(packed), padded), dtype=np.uint8)
+    loop.unpack(packed.reshape(-1), spikes.reshape(-1).view(np.uint64))
+    if spikes is not out:
+        out[:] = spikes[:, :pixels]
+    return out
+
+
 def _worth(threads: int | None, most: int, pixel_steps: int) -> int:
     """How many threads to share work among: as many as asked for (default NUMBA_NUM_THREADS) and as pay."""
     asked = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]

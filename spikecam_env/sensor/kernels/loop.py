@@ -397,3 +397,14 @@ def advance(  # type: ignore[no-untyped-def]
         start = band * (WIDTH // 8)
         write(eights, start, min(WIDTH // 8, (pixels + 7) // 8 - start), count, packed, spikes)
         band = take_ticket(tickets, share)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def unpack(packed, spikes):  # type: ignore[no-untyped-def]
+    """Bytes (n,) of bits, least significant first, to 0/1 in bytes: `spikes` is (n,) uint64, eight pixels to a word."""
+    use_widest_vectors()  # type: ignore[call-arg]
+    for i in range(packed.size):
+        w = _Q(packed[i])
+        w = (w | (w << _Q(28))) & _Q(0x0000000F0000000F)
+        w = (w | (w << _Q(14))) & _Q(0x0003000300030003)
+        spikes[i] = (w | (w << _Q(7))) & _Q(0x0101010101010101)
