@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Exposure
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.kernels import ahead, fast
 from spikecam_env.sensor.light import GRAINS, Keyframes, Segment, ramp, segments
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import Unit
@@ -50,20 +50,24 @@ def bench_sensor(
 ) -> list[dict[str, Any]]:
     """Measure every engine; returns one row a measurement, numpy with exact Poisson first in each scene.
 
-    scenes: mean intervals [frames] of steady light, and SMOOTH.  seconds: time spent on each measurement, of which the
-    best repeat counts.  Compiling is not timed.
-    Columns: scene, engine, threads, frames (in one call), Gpx-steps/s, x numpy (same scene), x real time (Vidar).
-    Engine "fast" gives one byte a pixel, "fast, packed" one bit.
+    scenes: mean intervals [frames] of steady light, and SMOOTH.  seconds: time spent on each measurement.  Compiling is
+    not timed.
+    Columns: scene, engine, threads, frames (in one call), Gpx-steps/s (median of the repeats), from and to (their
+    quartiles), x numpy (same scene), x real time (Vidar).
+    Engine "fast" gives one byte a pixel, "fast, packed" one bit.  "bytes written, no more" fills the same frames with a
+    constant: what memory alone allows.  One frame at a time, "fast" is what `SpikeSensor.step` does on keys 64 frames
+    apart; with light that is new in every frame nothing can be looked ahead (`kernels.ahead`).
     """
     unit = SensorModel.preset("scsim").draw_unit(SHAPE, seed)
     phase = generator(seed, "phase").random(SHAPE).reshape(-1)
     rows: list[dict[str, Any]] = []
     for scene in tqdm(list(scenes), desc="bench", unit="scene", leave=False):
         blocks = list(segments(scene_light(scene), 0, 8 * BLOCK))
-        frames = [_one_frame(blocks[i // BLOCK], i % BLOCK) for i in range(8)]
+        frames = [_one_frame(blocks[i // BLOCK], i % BLOCK) for i in range(8 * BLOCK)]
         base = 0.0
         for name, count, parts, run in _contestants(unit, phase, seed, blocks, frames, tuple(threads)):
-            rate = _best_rate(run, parts, seconds)
+            rates = _rates(run, parts, seconds)
+            low, rate, high = (float(q) for q in np.percentile(rates, (25, 50, 75)))
             base = base or rate
             rows.append(
                 {
@@ -72,6 +76,8 @@ def bench_sensor(
                     "threads": count,
                     "frames": parts[0].count,
                     "Gpx-steps/s": rate / 1e9,
+                    "from": low / 1e9,
+                    "to": high / 1e9,
                     "x numpy": rate / base,
                     "x real time": rate / REAL_TIME,
                 }
@@ -116,7 +122,10 @@ def _contestants(
     for count in threads:
         yield "fast", count, blocks, partial(bytes_out, threads=count)
         yield "fast, packed", count, blocks, partial(fast.run_packed, pixels, threads=count)
-    yield "fast", 1, frames, partial(bytes_out, threads=1)
+        yield "fast, light new in every frame", count, frames[:8], partial(bytes_out, threads=count)
+        looking = ahead.start(unit, phase, seed)
+        yield "fast", count, frames, partial(ahead.run, looking, out=out[:1], threads=count)
+    yield "bytes written, no more", 1, blocks, lambda part: out[: part.count].fill(1)
 
 
 def numpy_step(unit: Unit, charge: Array, segment: Segment, rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -140,18 +149,19 @@ def _one_frame(block: Segment, first: int) -> Segment:
     return Segment(block.radiance0, block.radiance1, block.length, first, 1)
 
 
-def _best_rate(run: Callable[[Segment], object], parts: list[Segment], seconds: float) -> float:
-    """Pixel-steps a second of the best repeat over `parts`; slow engines get one repeat after a short warm-up."""
+def _rates(run: Callable[[Segment], object], parts: list[Segment], seconds: float) -> list[float]:
+    """Pixel-steps a second of every repeat over `parts`; slow engines get one repeat after a short warm-up."""
     first = parts[0]
     run(_one_frame(first, 0))
     run(first)
     work = sum(part.count for part in parts) * first.radiance0.size
-    best, until = np.inf, time.perf_counter() + seconds
+    rates = []
+    until = time.perf_counter() + seconds
     while True:
         begin = time.perf_counter()
         for part in parts:
             run(part)
         end = time.perf_counter()
-        best = min(best, end - begin)
+        rates.append(work / (end - begin))
         if end >= until:
-            return work / best
+            return rates

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Effect, Exposure
-from spikecam_env.sensor.kernels import block, fast
+from spikecam_env.sensor.kernels import ahead, block, fast
 from spikecam_env.sensor.light import Keyframes, Segment, as_light, segments
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import Unit
@@ -83,18 +83,23 @@ class SpikeSensor:
         """Back to frame 0; with a seed, as another unit, or as another recording of the unit that was given."""
         self._start(self.seed if seed is None else checked_seed(seed), phase=None)
 
-    def step(self, radiance: Keyframes | ArrayLike, frames: int = 1) -> NDArray[np.uint8]:
+    def step(
+        self, radiance: Keyframes | ArrayLike, frames: int = 1, *, out: NDArray[np.uint8] | None = None
+    ) -> NDArray[np.uint8]:
         """Expose the next frames; returns spikes (frames, H, W) uint8, 0 or 1.
+
+        out: an array of that kind, C-contiguous, to be overwritten: fresh memory costs as much as the simulation.
 
         radiance: (H, W) held throughout, or Keyframes on the stream's absolute frame numbers; 1.0 makes the nominal
         pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light or frames < 1.
         """
         frames = checked_frames(frames)
         light = as_light(radiance, self.shape)
-        spikes = np.empty((frames, self.shape[0] * self.shape[1]), dtype=np.uint8)
+        spikes = _recycled(out, (frames, *self.shape)).reshape(frames, -1)
         done = 0
         for segment in segments(light, self.frame, frames):
-            self._run(imaged(segment, self._optics, self.shape), spikes[done : done + segment.count])
+            at = self.frame + done - segment.first
+            self._run(self._imaged(segment, light, at), spikes[done : done + segment.count])
             done += segment.count
         self.frame += frames
         return spikes.reshape(frames, *self.shape)
@@ -126,6 +131,7 @@ class SpikeSensor:
         return twin
 
     _pixels: Any
+    _seen: tuple[Keyframes, int, int, Segment] | None = None
 
     def _start(self, seed: int, phase: NDArray[np.float64] | None) -> None:
         self.seed = seed
@@ -135,7 +141,7 @@ class SpikeSensor:
         self.phase = generator(noise_seed, "phase").random(self.shape) if phase is None else phase
         flat = self.phase.reshape(-1)
         if self.engine == "fast" and not self._frame_effects:
-            self._pixels = fast.start(self.unit, flat, noise_seed)
+            self._pixels = ahead.start(self.unit, flat, noise_seed)
         elif self.engine == "fast":
             self._pixels = block.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
         elif self.engine == "cuda":
@@ -146,7 +152,7 @@ class SpikeSensor:
 
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
         if self.engine == "fast" and not self._frame_effects:
-            fast.run(self._pixels, segment, out)
+            ahead.run(self._pixels, segment, out)
         elif self.engine == "fast":
             block.run(self._first_exposure(), self._frame_effects, self._pixels, segment, out)
         elif self.engine == "cuda":
@@ -155,6 +161,15 @@ class SpikeSensor:
             out[:] = cuda.run(self._pixels, batch)[0].cpu().numpy()
         else:
             out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
+
+    def _imaged(self, segment: Segment, light: Keyframes | NDArray[np.float32], begin: int) -> Segment:
+        """Optics act once a key interval, not once a step; `begin` is the interval's first frame."""
+        if not self._optics or not isinstance(light, Keyframes):
+            return imaged(segment, self._optics, self.shape)
+        if self._seen is None or self._seen[0] is not light or self._seen[1:3] != (begin, segment.length):
+            self._seen = (light, begin, segment.length, imaged(segment, self._optics, self.shape))
+        ends = self._seen[3]
+        return replace(segment, radiance0=ends.radiance0, radiance1=ends.radiance1)
 
     def _names_of_effects(self) -> tuple[str, ...]:
         return tuple(e.name for e in self._frame_effects)
@@ -171,6 +186,14 @@ def imaged(segment: Segment, optics: Sequence[Effect], shape: tuple[int, int]) -
         end = start if held else effect.image(segment.radiance1.reshape(shape)).reshape(-1)
         segment = replace(segment, radiance0=start, radiance1=end)
     return segment
+
+
+def _recycled(out: NDArray[np.uint8] | None, shape: tuple[int, int, int]) -> NDArray[np.uint8]:
+    if out is None:
+        return np.empty(shape, dtype=np.uint8)
+    if out.shape != shape or out.dtype != np.uint8 or not (out.flags.c_contiguous and out.flags.writeable):
+        raise InputError(f"out is {out.dtype} {out.shape}; it must be uint8 {shape}, C-contiguous and writeable")
+    return out
 
 
 def checked_shape(shape: Any) -> tuple[int, int]:

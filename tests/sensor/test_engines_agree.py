@@ -63,17 +63,19 @@ def test_dim_light_gives_its_mean_rate(interval: float) -> None:
     assert abs(spikes / pixels - 0.5) < 4.5 * 0.5 / np.sqrt(pixels)
 
 
-def light_of(interval: float, moving: bool, frames: int) -> Keyframes:
+def light_of(interval: float, moving: bool, frames: int, shape: tuple[int, int] = SHAPE) -> Keyframes:
     frame = np.arange(0, frames + 65, 64)
     level = (1.0 + 0.6 * np.sin(1.7 * np.arange(frame.size)) * moving) / interval
-    return Keyframes(frame, np.broadcast_to(level[:, None, None], (frame.size, *SHAPE)).astype(np.float32))
+    return Keyframes(frame, np.broadcast_to(level[:, None, None], (frame.size, *shape)).astype(np.float32))
 
 
-def p_values(model: SensorModel, interval: float, moving: bool, seed: int) -> NDArray[np.float64]:
+def p_values(
+    model: SensorModel, interval: float, moving: bool, seed: int, shape: tuple[int, int] = SHAPE
+) -> NDArray[np.float64]:
     frames = int(8 * interval) + 64
-    light = light_of(interval, moving, frames)
-    fast = observe(SpikeSensor(model, SHAPE, 2 * seed, "fast"), light, frames)
-    reference = observe(SpikeSensor(model, SHAPE, 2 * seed + 1, "reference"), light, frames)
+    light = light_of(interval, moving, frames, shape)
+    fast = observe(SpikeSensor(model, shape, 2 * seed, "fast"), light, frames)
+    reference = observe(SpikeSensor(model, shape, 2 * seed + 1, "reference"), light, frames)
     return np.array(list((compare(fast, reference) | neighbours(fast)).values()))
 
 
@@ -90,6 +92,29 @@ def test_with_noise_engines_agree_in_distribution(electrons: int) -> None:
     grid = product((1.3, 5.0, 20.0, 100.0), (False, True))
     p = [p_values(model, interval, moving, electrons + i) for i, (interval, moving) in enumerate(grid)]
     check(f"N = {electrons}", np.concatenate(p))
+
+
+def test_with_noise_engines_agree_in_dim_light() -> None:
+    """Mean interval 1000: fewer pixels, longer streams."""
+    cells = [(50, True), (29_650, False)]
+    models = {n: jittered(n, kappa=np.sqrt(0.026 / n)) for n, _ in cells}
+    p = [p_values(models[n], 1000.0, moving, n, shape=(4, 400)) for n, moving in cells]
+    check("T = 1000", np.concatenate(p))
+
+
+@pytest.mark.parametrize("electrons", [50, 29_650])
+@pytest.mark.parametrize("interval", [1000, 10_000])
+def test_dim_light_gives_its_mean_rate_with_noise(electrons: int, interval: int) -> None:
+    """Over four intervals after the first: a pixel's count has variance 1/6 + 4/N at most; 4.5 standard errors."""
+    shape = (100, 500)
+    sensor = SpikeSensor(jittered(electrons, kappa=np.sqrt(0.026 / electrons)), shape, 11, "fast")
+    light = np.full(shape, 1 / interval, dtype=np.float32)
+    sensor.step(light, interval)
+    spikes = sum(int(sensor.step(light, 500).sum()) for _ in range(0, 4 * interval, 500))
+    count = spikes / (shape[0] * shape[1])
+    error = np.sqrt((1 / 6 + 4 / electrons) / (shape[0] * shape[1]))
+    print(f"N = {electrons}, T = {interval}: {count / 4 - 1:+.1e} of the rate, standard error {error / 4:.1e}")
+    assert abs(count / 4 - 1) < 1e-3 + 4.5 * error / 4
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.kernels import ahead, fast
 from spikecam_env.sensor.light import GRAINS, Segment, ramp
 from spikecam_env.sensor.model import generator
 
@@ -54,6 +54,52 @@ def test_cutting_a_stream_changes_no_bit(pixels: int, cuts: list[int]) -> None:
     whole, cut = started(pixels), started(pixels)
     assert np.array_equal(film(whole, light, [64]), film(cut, light, cuts))
     assert np.array_equal(whole.remaining, cut.remaining) and np.array_equal(whole.fired, cut.fired)
+
+
+@pytest.mark.parametrize("dense", [0.0, 0.2, np.inf])
+def test_streaming_and_jumping_give_the_same_bits(dense: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every tile streamed, some, none."""
+    light, lit = wild_light(3000), np.sort(wild_light(3000), axis=1)
+    for picture in (light, lit):
+        usual, other = started(3000), started(3000)
+        bits = film(usual, picture, [64])
+        with monkeypatch.context() as patch:
+            patch.setattr(fast, "DENSE", dense)
+            assert np.array_equal(film(other, picture, [64]), bits)
+        assert np.array_equal(usual.remaining, other.remaining) and np.array_equal(usual.fired, other.fired)
+
+
+@pytest.mark.parametrize("stays", [1, 2, 3, 7, 30, 200])
+def test_looking_ahead_changes_no_bit(stays: int) -> None:
+    """Pictures that change every so many frames, in place; asked for by ones and, now and then, by twos and tens."""
+    pixels, rng = 1009, np.random.default_rng(stays)
+    plain, looking = started(pixels), ahead.AheadState(started(pixels))
+    light = wild_light(pixels)[0]
+    for frame in range(300):
+        if frame % stays == 0:
+            light[:] = wild_light(pixels, frame)[0]
+        segment = Segment(light, light, 64, 0, int(rng.choice([1, 1, 1, 1, 1, 1, 1, 2, 10])))
+        assert np.array_equal(ahead.run(looking, segment), fast.run(plain, segment))
+    ahead.take_back(looking)
+    assert np.array_equal(looking.pixels.remaining, plain.remaining)
+    assert np.array_equal(looking.pixels.fired, plain.fired)
+
+
+def test_looking_ahead_in_a_film_changes_no_bit() -> None:
+    """Key intervals served by ones, the last of a change of mind half-way; and a copy taken half-way goes on alike."""
+    light = wild_light(2000)
+    plain, looking = started(2000), ahead.AheadState(started(2000))
+    for start, stop in [*pairwise(light), *pairwise(light)]:
+        for first in range(64):
+            part = Segment(start, stop, 64, first, 1)
+            assert np.array_equal(ahead.run(looking, part), fast.run(plain, part))
+            if first == 40:
+                other = pickle.loads(pickle.dumps(looking))
+    assert looking.reach == 64
+    for first in range(41, 64):
+        ahead.run(other, Segment(start, stop, 64, first, 1))
+    ahead.take_back(other)
+    assert np.array_equal(other.pixels.remaining, plain.remaining)
 
 
 @pytest.mark.parametrize("threads", [2, 3])

@@ -139,3 +139,13 @@ def test_bad_arguments_are_named() -> None:
     for frame, radiance in (([1, 0], np.ones((2, 2, 2))), ([0], np.ones((2, 2))), ([0, np.nan], np.ones((2, 2, 2)))):
         with pytest.raises(InputError, match="Keyframes"):
             Keyframes(np.array(frame), radiance)
+
+
+def test_frames_can_be_written_to_given_memory() -> None:
+    light = np.full((5, 7), 0.3, dtype=np.float32)
+    fresh, recycled = SpikeSensor("scsim", (5, 7), 3), SpikeSensor("scsim", (5, 7), 3)
+    out = np.full((9, 5, 7), 7, dtype=np.uint8)
+    assert np.shares_memory(out, recycled.step(light, 9, out=out))
+    assert np.array_equal(out, fresh.step(light, 9))
+    with pytest.raises(InputError, match=r"it must be uint8 \(8, 5, 7\)"):
+        fresh.step(light, 8, out=out)

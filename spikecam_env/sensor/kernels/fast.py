@@ -10,7 +10,9 @@ how vector environments start.  Their number is NUMBA_NUM_THREADS, by default th
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -30,6 +32,14 @@ from spikecam_env.sensor.unit import Unit
 
 CARRIES: frozenset[str] = frozenset(name for name, effect in CATALOGUE.items() if effect.is_fixed())
 """Every effect that does nothing from frame to frame: fixed patterns, static optics, noise drawn at a reset."""
+
+_LIBC = ctypes.PyDLL(None) if sys.platform == "linux" else None
+
+_NO_BITS = np.empty((0, 0), dtype=np.uint8)
+_NO_WORDS = np.empty((0, 0), dtype=np.uint64)
+
+DENSE = 0.7
+"""Spikes a pixel and frame from which on streaming frame by frame is faster than jumping."""
 
 _WORTH_A_THREAD = 400_000
 """Pixel-steps below which handing work to another thread costs more than it saves (0.1 ms)."""
@@ -105,14 +115,33 @@ def run(
 
     out: (count, P) uint8, C-contiguous.  threads: default NUMBA_NUM_THREADS.
     """
-    return unpack(run_packed(state, segment, threads=threads), segment.radiance0.size, out, threads=threads)
+    pixels = segment.radiance0.size
+    if out is None:
+        out = np.empty((segment.count, pixels), dtype=np.uint8)
+    padded = pixels + -pixels % 8
+    spikes = out if pixels == padded else np.empty((segment.count, padded), dtype=np.uint8)
+    _advance(state, segment, _NO_BITS, spikes.view(np.uint64), threads)
+    if spikes is not out:
+        out[:] = spikes[:, :pixels]
+    return out
 
 
 def run_packed(state: FastState, segment: Segment, *, threads: int | None = None) -> NDArray[np.uint8]:
     """Advance `state` over a segment; returns spikes (count, ceil(P/8)) uint8: pixel p is bit p % 8 of byte p // 8."""
-    pixels = segment.radiance0.size
-    packed = np.empty((segment.count, (pixels + 7) // 8), dtype=np.uint8)
+    packed = np.empty((segment.count, (segment.radiance0.size + 7) // 8), dtype=np.uint8)
+    _advance(state, segment, packed, _NO_WORDS, threads)
+    return packed
+
+
+def _advance(
+    state: FastState, segment: Segment, packed: NDArray[np.uint8], spikes: NDArray[np.uint64], threads: int | None
+) -> None:
+    bands = -(-state.remaining.size // loop.WIDTH)
+    threads = _worth(threads, bands, segment.radiance0.size * segment.count)
+    tickets = np.zeros((threads, 8), dtype=np.int64)
+    tickets[:, 0] = bands * np.arange(threads) // threads
     work = (
+        tickets,
         _compilable(segment.radiance0),
         _compilable(segment.radiance1),
         np.int32(segment.length),
@@ -125,25 +154,20 @@ def run_packed(state: FastState, segment: Segment, *, threads: int | None = None
         *state.seeds,
         state.remaining,
         state.fired,
+        np.float32(DENSE),
         packed,
+        spikes,
     )
-    bands = -(-state.remaining.size // (loop.TILE * loop.BAND))
-    threads = _worth(threads, bands, pixels * segment.count)
-    _together([partial(loop.advance, i, threads, *work) for i in range(threads)])
-    return packed
+    _together([partial(loop.advance, i, *work) for i in range(threads)])
 
 
-def unpack(
-    packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None, *, threads: int | None = None
-) -> NDArray[np.uint8]:
+def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
     """Bits (count, ceil(pixels/8)) to spikes (count, pixels) uint8, in `out` where that is given."""
-    whole = packed.shape[1] * 8
     if out is None:
         out = np.empty((len(packed), pixels), dtype=np.uint8)
-    spikes = out if pixels == whole else np.empty((len(packed), whole), dtype=np.uint8)
-    threads = _worth(threads, len(packed), spikes.size)
-    parts = zip(np.array_split(packed, threads), np.array_split(spikes, threads), strict=True)
-    _together([partial(loop.unpack, bits.reshape(-1), frames.reshape(-1).view(np.uint64)) for bits, frames in parts])
+    padded = 8 * packed.shape[1]
+    spikes = out if pixels == padded else np.empty((len(packed), padded), dtype=np.uint8)
+    loop.unpack(packed.reshape(-1), spikes.reshape(-1).view(np.uint64))
     if spikes is not out:
         out[:] = spikes[:, :pixels]
     return out
@@ -156,11 +180,30 @@ def _worth(threads: int | None, most: int, pixel_steps: int) -> int:
 
 
 def _together(parts: list[Callable[[], None]]) -> None:
-    """Run parts at once, the first on this thread."""
-    others = [_pool(os.getpid()).submit(part) for part in parts[1:]]
+    """Run parts of shared work at once, the first on this thread; one that has not begun when none is left need not."""
+    others = []
+    if len(parts) > 1:
+        here = _processor()
+        others = [_pool(os.getpid()).submit(_elsewhere, here, part) for part in parts[1:]]
     parts[0]()
     for other in others:
-        other.result()
+        if not other.cancel():
+            other.result()
+
+
+def _elsewhere(taken: int, work: Callable[[], None]) -> None:
+    """Run work on another processor than the one taken: with few processors Linux wakes a thread on its waker's."""
+    if taken >= 0 and _processor() == taken:
+        allowed = os.sched_getaffinity(0)
+        if len(allowed) > 1:
+            os.sched_setaffinity(0, allowed - {taken})
+            os.sched_setaffinity(0, allowed)
+    work()
+
+
+def _processor() -> int:
+    """Which processor this thread is on; -1 where that cannot be told."""
+    return _LIBC.sched_getcpu() if _LIBC is not None else -1
 
 
 def _shape_of_law(unit: Unit) -> tuple[np.float32, ...]:

@@ -1,15 +1,21 @@
-"""The compiled loop of the fast engine: from spike to spike, 32 pixels at a time.
+"""The compiled loops of the fast engine: a tile of pixels at a time, from spike to spike or frame by frame.
 
     F(k) = i0 k + B k^2 + r k^2 / 2n                    grains collected before frame k (`light`, exact integers)
     next spike: smallest k with F(k) >= x               x: grains at which the pixel fires, counted from the key
     x <- x + GRAINS (1 + s z)                           s: relative spread of the threshold, z: standardised draw
 
-k is the root of the quadratic in float32, rounded; the integers then decide on which side of it the crossing lies, so
-the bits are those of the frame-by-frame sum.  z is a polynomial (`quantile`) of a sum of eight bytes hashed from
-(seed, pixel, spike number): no generator has a state, so neither chunks nor threads change a draw.
+Jumping, k is the root of the quadratic in float32, rounded; the integers then decide on which side of it the crossing
+lies, so the bits are those of the frame-by-frame sum.  Streaming (`dense`), one frame at a time is compared: cheaper
+where most pixels fire in most frames, and where one frame is all that is asked for.  z is a polynomial (`quantile`) of
+a sum of eight bytes hashed from (seed, pixel, spike number): no generator has a state, so neither chunks nor threads,
+nor the choice between the two, change a draw.
+
+Spikes are served in rounds, one for each pixel that still has one to come, and a round in short stages over the groups
+of pixels that are live, with results in a tile's scratch: a processor looks some hundred instructions ahead, and finds
+more to do at once in many short chains than in a few long ones (a third faster).
 
 Numba widens uint32 * uint32 to uint64: every operation is cast back.  No fastmath: bits must not depend on the machine.
-All of it is in one file, because numba's cache looks only at the file of the function it compiles.
+The law is in one file, because numba's cache looks only at the file of the function it compiles.
 """
 
 from __future__ import annotations
@@ -19,16 +25,19 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from spikecam_env.sensor.kernels.intrinsics import take_ticket, use_widest_vectors
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
 
 TILE = 256
 """Pixels worked on between reading and writing memory; state arrays are padded to whole tiles."""
 
 BAND = 8
-"""Tiles that one thread takes at a time: 256 bytes of a packed frame, so threads do not write one cache line."""
+"""Tiles that one thread takes at a time; 2 kilobytes of a frame are then written in one go."""
 
-_LANES = 32
-"""Pixels that go from spike to spike together: LLVM makes vector instructions of it (8 it would unroll to scalars)."""
+WIDTH = BAND * TILE
+
+_GROUP = 32
+"""Pixels that are live or idle together: LLVM makes vector instructions of it (16 it would unroll to scalars)."""
 
 _U = np.uint32
 _I = np.int32
@@ -39,11 +48,14 @@ _Q = np.uint64
 _GRAINS = _F(GRAINS)
 _CAP = _F(MAX_GRAINS_PER_FRAME)
 _LONGEST = _F(MAX_SEGMENT)
+_GOLDEN_SIGNED = _I(0x9E3779B9 - (1 << 32))
 _GOLDEN = _U(0x9E3779B9)  # 2^32 / golden ratio: the counter's step from spike to spike
 
 # Rows of a tile's scratch array: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
-_LEVEL, _CURVE, _REST, _X, _END, _COUNTER, _KEY, _SPIKES, _LOW, _HIGH, _FRAME, _DRAW = (r * TILE for r in range(12))
-_SCRATCH = 12 * TILE
+_LEVEL, _CURVE, _REST, _X, _END, _COUNTER, _KEY, _SPREAD = (r * TILE for r in range(8))
+_SPIKES, _LOW, _HIGH, _FRAME, _DRAW, _WORD, _BELL = (r * TILE for r in range(8, 15))
+_SCRATCH = 15 * TILE
+_INSIDE = TILE - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
 
 
 @njit(inline="always")
@@ -78,20 +90,24 @@ def byte_sum(a: Any, b: Any) -> Any:
 
 @njit(inline="always")
 def bell(counter: Any, key: Any) -> Any:
-    """A draw in (-4, 4): eight uniform bytes, summed, over 256; a ninth byte fills the step between two sums.
+    """A draw in (-4, 4) from a counter and a key of the pixel's own."""
+    word1 = scramble(counter)
+    return bell_of(word1, scramble(_U(word1 ^ key)))
 
-    The bytes are those of h2 and h1 + h2, independent words: h1 is uniform whatever h2, keyed apart, is.
+
+@njit(inline="always")
+def bell_of(word1: Any, word2: Any) -> Any:
+    """Eight uniform bytes, summed, over 256, less 4; a ninth byte fills the step between two sums.
+
+    The bytes are those of word2 and word1 + word2, independent: word1 is uniform whatever word2, keyed apart, is.
     """
-    h1 = scramble(counter)
-    h2 = scramble(_U(h1 ^ key))
-    fine = _I(_U(_U(byte_sum(h2, _U(h1 + h2)) << _U(8)) | _U(h1 >> _U(24))))
+    fine = _I(_U(_U(byte_sum(word2, _U(word1 + word2)) << _U(8)) | _U(word1 >> _U(24))))
     return _F(fine) * _F(1 / 65536) + _F(0.5 / 65536 + 3.5 / 256 - 4.0)
 
 
 @njit(inline="always")
-def drawn(counter: Any, key: Any, spread: Any, c: Any) -> Any:
-    """Grains to the next spike."""
-    x = bell(counter, key)
+def charge_of(x: Any, spread: Any, c: Any) -> Any:
+    """Grains to the next spike, of a draw of `bell`."""
     z = ((((((c[7] * x + c[6]) * x + c[5]) * x + c[4]) * x + c[3]) * x + c[2]) * x + c[1]) * x + c[0]
     return _I(_GRAINS + spread * z)
 
@@ -126,10 +142,166 @@ def transpose_bits(words: Any) -> None:
         words[j] = w ^ t ^ (t << _Q(28))
 
 
+@njit(inline="always")
+def integrate(s: Any, light0: Any, light1: Any, gain: Any, dark: Any, n: Any, length: Any) -> None:
+    """Rows LEVEL, CURVE, REST of a tile of n pixels: `light.ramp`.  Pixels beyond the array get no light."""
+    twice = _I(2 * length)
+    per_twice = _F(1.0 / twice)
+    per = _I(((1 << 18) + twice - 1) // twice)
+    for j in range(n, TILE):
+        s[_LEVEL + j] = 0
+        s[_CURVE + j] = 0
+        s[_REST + j] = 0
+    for j in range(n):
+        i0 = _I(min(light0[j] * gain[j] + dark[j], _CAP) + _F(0.5))
+        rise = _I(_I(min(light1[j] * gain[j] + dark[j], _CAP) + _F(0.5)) - i0)
+        curve = _I(np.floor(_F(rise) * per_twice))
+        s[_LEVEL + j] = i0
+        s[_CURVE + j] = curve
+        s[_REST + j] = _I(_I(rise - _I(curve * twice)) * per)
+
+
+@njit(inline="always")
+def expected(s: Any, first: Any, stop: Any) -> Any:
+    """Spikes that a tile's light will bring, all pixels together."""
+    total = _F(0.0)
+    for q in range(0, TILE, _GROUP):
+        j = q + _GROUP // 2
+        a, b, c = s[_LEVEL + j], s[_CURVE + j], s[_REST + j]
+        total += _F(_I(collected(a, b, c, stop) - collected(a, b, c, first)))
+    return total * (_F(_GROUP) / _GRAINS)
+
+
+@njit(inline="always")
+def find_live(s: Any, flags: Any, end: Any, live: Any) -> Any:
+    """Fill row END with F(end); list the groups in which a pixel fires before; returns their number."""
+    for j in range(TILE):
+        s[_END + j] = collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], end)
+        flags[j] = _B(s[_X + j] <= s[_END + j])
+    eights = flags.view(np.uint64)
+    groups: Any = 0
+    for i in range(TILE // _GROUP):
+        go = _Q(0)
+        for word in range(i * (_GROUP // 8), (i + 1) * (_GROUP // 8)):
+            go |= eights[word]
+        live[groups] = i * _GROUP
+        groups += _I(go != _Q(0))
+    return groups
+
+
+@njit(inline="always")
+def wake(s: Any, f: Any, live: Any, groups: Any, p0: Any, number: Any, spread: Any, low: Any, high: Any) -> None:
+    """Rows COUNTER, KEY, SPREAD of the live groups; low, high: the seed."""
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        for j in range(q, q + _GROUP):
+            key = first_key(p0 + j, low)
+            s[_COUNTER + j] = _I(_U(key + _U(number[j] * _GOLDEN)))
+            s[_KEY + j] = _I(second_key(key, high))
+            f[_SPREAD + j] = spread[j]
+
+
+@njit(inline="always")
+def draw(s: Any, f: Any, live: Any, groups: Any) -> None:
+    """Row BELL of the live groups: the draw of each pixel's next spike."""
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        for j in range(q, q + _GROUP):
+            s[_WORD + j] = _I(scramble(_U(s[_COUNTER + j])))
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        for j in range(q, q + _GROUP):
+            s[_BELL + j] = _I(scramble(_U(_U(s[_WORD + j]) ^ _U(s[_KEY + j]))))
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        for j in range(q, q + _GROUP):
+            f[_BELL + j] = bell_of(_U(s[_WORD + j]), _U(s[_BELL + j]))
+
+
+@njit(inline="always")
+def reset(s: Any, j: Any, active: Any, charge: Any, low: Any, high: Any) -> Any:
+    """Note an active pixel's spike (active: -1, else 0) in the frame of this bit; whether it fires again."""
+    s[_LOW + j] |= _I(low & active)
+    s[_HIGH + j] |= _I(high & active)
+    s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
+    s[_COUNTER + j] = _I(s[_COUNTER + j] + _I(_GOLDEN_SIGNED & active))
+    x = _I(s[_X + j] + _I(charge & active))
+    s[_X + j] = x
+    return _I(x <= s[_END + j])
+
+
+@njit(inline="always")
+def jump(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, first: Any) -> Any:
+    """Let each live pixel fire in the frame that its light says; returns how many groups stay live."""
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        for j in range(q, q + _GROUP):
+            s[_DRAW + j] = charge_of(f[_BELL + j], f[_SPREAD + j], polynomial)
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        for j in range(q, q + _GROUP):
+            s[_FRAME + j] = nearest_frame(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], s[_X + j])
+    still: Any = 0
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        go = _I(0)
+        for j in range(q, q + _GROUP):
+            x = s[_X + j]
+            active = _I(-_I(x <= s[_END + j]))
+            k = s[_FRAME + j]
+            before = _I(collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], k) >= x)
+            at = _I(_I(k - first) - before)
+            late = _I(-_I(at >= _I(32)))
+            bit = _I(_I(1) << _I(at & _I(31)))
+            go = _I(go | reset(s, j, active, s[_DRAW + j], _I(bit & _I(~late)), _I(bit & late)))
+        live[still] = q
+        still += go
+    return still
+
+
+@njit(inline="always")
+def stream(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, at: Any) -> Any:
+    """As `jump`, where every live pixel fires in frame `at` of the segment."""
+    bit = _I(_I(1) << _I(at & _I(31)))
+    low = _I(bit * _I(at < _I(32)))
+    high = _I(bit * _I(at >= _I(32)))
+    still: Any = 0
+    for i in range(groups):
+        q = live[i] & _INSIDE
+        go = _I(0)
+        for j in range(q, q + _GROUP):
+            active = _I(-_I(s[_X + j] <= s[_END + j]))
+            charge = charge_of(f[_BELL + j], f[_SPREAD + j], polynomial)
+            go = _I(go | reset(s, j, active, charge, low, high))
+        live[still] = q
+        still += go
+    return still
+
+
+@njit(inline="always")
+def write(eights: Any, start: Any, words: Any, count: Any, packed: Any, spikes: Any) -> None:
+    """A band's planes, each a byte a pixel that holds its eight frames, to frames: bits or bytes."""
+    for plane in range((count + 7) // 8):
+        of_plane = eights[plane * (WIDTH // 8) : plane * (WIDTH // 8) + words]
+        if packed.size:
+            transpose_bits(of_plane)
+        for k in range(8 * plane, min(8 * plane + 8, count)):
+            if packed.size:
+                bits = packed[k, start : start + words]
+                byte = _Q(8 * (k & 7))
+                for j in range(words):
+                    bits[j] = _B(of_plane[j] >> byte)
+            else:
+                pixels = spikes[k, start : start + words]
+                bit = _Q(k & 7)
+                for j in range(words):
+                    pixels[j] = (of_plane[j] >> bit) & _Q(0x0101010101010101)
+
+
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def advance(  # type: ignore[no-untyped-def]
     worker,
-    workers,
+    tickets,
     radiance0,
     radiance1,
     length,
@@ -143,121 +315,94 @@ def advance(  # type: ignore[no-untyped-def]
     seed_high,
     remaining,
     fired,
+    dense,
     packed,
+    spikes,
 ):
-    """Frames first .. first + count of a key interval, for every `workers`-th band of tiles from `worker` on.
+    """Frames first .. first + count of a key interval, for the bands of tiles that this thread gets hold of.
 
-    radiance0, radiance1: (P,) float32.  length, first, count: int32.  gain, dark: float32 [grains/frame]; spread:
-    float32 [grains]; remaining: int32 [grains] and fired: uint32, updated; these five are padded to whole tiles.
-    polynomial: 8 float32.  seed_low, seed_high: uint32.  packed: uint8 (count, ceil(P/8)), overwritten: pixel p is bit
-    p % 8 of byte p // 8.
+    worker: which of the threads at work this is.  tickets: int64 (threads, 8), shared: in [:, 0] the next band of each
+        one's share.  Who is through with his own takes others'.
+    radiance0, radiance1: (P,) float32.  length, first, count: int32.
+    gain, dark: float32 [grains/frame]; spread: float32 [grains]; remaining: int32 [grains] and fired: uint32, updated;
+        these five are padded to whole tiles.
+    polynomial: 8 float32.  seed_low, seed_high: uint32.
+    dense: expected spikes a pixel and frame from which on a tile is streamed.
+    packed: uint8 (count, ceil(P/8)), overwritten: pixel p is bit p % 8 of byte p // 8; or empty, and then
+    spikes: uint64 (count, ceil(P/8)), overwritten: pixel p is byte p % 8 of word p // 8, 0 or 1.
     """
+    use_widest_vectors()  # type: ignore[call-arg]
     pixels = radiance0.shape[0]
     stop = _I(first + count)
-    twice = _I(2 * length)
-    per_twice = _F(1.0 / twice)
-    per = _I(((1 << 18) + twice - 1) // twice)
-    flat = packed.reshape(-1)
-    row = _Q(packed.shape[1])
-    s = np.zeros(_SCRATCH, np.int32)
-    planes = np.zeros(8 * TILE, np.uint8)
+    s = np.empty(_SCRATCH, np.int32)
+    f = s.view(np.float32)
+    live = np.empty(TILE // _GROUP + 1, np.int64)
+    flags = np.empty(TILE, np.uint8)
+    planes = np.empty(8 * WIDTH, np.uint8)
     eights = planes.view(np.uint64)
-    for tile in range((pixels + TILE - 1) // TILE):
-        if (tile // BAND) % workers != worker:
-            continue
-        p0 = tile * TILE
-        n = min(TILE, pixels - p0)
-        light0 = radiance0[p0 : p0 + n]
-        light1 = radiance1[p0 : p0 + n]
-        g = gain[p0 : p0 + TILE]
-        d = dark[p0 : p0 + TILE]
-        sd = spread[p0 : p0 + TILE]
-        left = remaining[p0 : p0 + TILE]
-        number = fired[p0 : p0 + TILE]
-
-        for j in range(n, TILE):
-            s[_LEVEL + j] = 0
-            s[_CURVE + j] = 0
-            s[_REST + j] = 0
-        for j in range(n):
-            i0 = _I(min(light0[j] * g[j] + d[j], _CAP) + _F(0.5))
-            rise = _I(_I(min(light1[j] * g[j] + d[j], _CAP) + _F(0.5)) - i0)
-            curve = _I(np.floor(_F(rise) * per_twice))
-            s[_LEVEL + j] = i0
-            s[_CURVE + j] = curve
-            s[_REST + j] = _I(_I(rise - _I(curve * twice)) * per)
-        for j in range(TILE):
-            s[_X + j] = _I(left[j] + collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], first))
-            s[_END + j] = collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], stop)
-            s[_LOW + j] = 0
-            s[_HIGH + j] = 0
-
-        if count == 1:
+    bands = (pixels + WIDTH - 1) // WIDTH
+    workers = tickets.shape[0]
+    share = worker
+    band = take_ticket(tickets, share)
+    while True:
+        while band >= bands * (share + 1) // workers:
+            share = (share + 1) % workers
+            if share == worker:
+                return
+            band = take_ticket(tickets, share)
+        for p0 in range(band * WIDTH, min(pixels, (band + 1) * WIDTH), TILE):
+            n = min(TILE, pixels - p0)
+            left = remaining[p0 : p0 + TILE]
+            number = fired[p0 : p0 + TILE]
+            integrate(
+                s,
+                radiance0[p0 : p0 + n],
+                radiance1[p0 : p0 + n],
+                gain[p0 : p0 + TILE],
+                dark[p0 : p0 + TILE],
+                n,
+                length,
+            )
             for j in range(TILE):
-                if s[_X + j] <= s[_END + j]:
-                    s[_LOW + j] = 1
-                    key = first_key(p0 + j, seed_low)
-                    while s[_X + j] <= s[_END + j]:
-                        counter = _U(key + _U(number[j] * _GOLDEN))
-                        s[_X + j] += drawn(counter, second_key(key, seed_high), sd[j], polynomial)
-                        number[j] = _U(number[j] + _U(1))
-        for q in range(0, TILE, _LANES):
-            go = _I(0)
-            for j in range(q, q + _LANES):
-                go = _I(go | _I(s[_X + j] <= s[_END + j]))
-            if not go:
-                continue
-            for j in range(q, q + _LANES):
-                key = first_key(p0 + j, seed_low)
-                s[_COUNTER + j] = _I(_U(key + _U(number[j] * _GOLDEN)))
-                s[_KEY + j] = _I(second_key(key, seed_high))
+                s[_X + j] = _I(left[j] + collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], first))
                 s[_SPIKES + j] = 0
-            # Three short loops, each of independent lanes: the processor overlaps them; one long one it cannot.
-            step = _U(0)
-            while go:
-                for j in range(q, q + _LANES):
-                    s[_DRAW + j] = drawn(_U(_U(s[_COUNTER + j]) + step), _U(s[_KEY + j]), sd[j], polynomial)
-                for j in range(q, q + _LANES):
-                    s[_FRAME + j] = nearest_frame(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], s[_X + j])
-                go = _I(0)
-                for j in range(q, q + _LANES):
-                    x = s[_X + j]
-                    active = _I(-_I(x <= s[_END + j]))
-                    k = s[_FRAME + j]
-                    before = _I(collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], k) >= x)
-                    at = _I(_I(k - first) - before)
-                    late = _I(-_I(at >= _I(32)))
-                    bit = _I(_I(1) << _I(at & _I(31)))
-                    s[_LOW + j] |= _I(bit & _I(active & _I(~late)))
-                    s[_HIGH + j] |= _I(bit & _I(active & late))
-                    s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
-                    x = _I(x + _I(s[_DRAW + j] & active))
-                    s[_X + j] = x
-                    go = _I(go | _I(x <= s[_END + j]))
-                step = _U(step + _GOLDEN)
-            for j in range(q, q + _LANES):
-                number[j] = _U(number[j] + _U(s[_SPIKES + j]))
-        for j in range(TILE):
-            left[j] = _I(s[_X + j] - s[_END + j])
-
-        start = _Q(p0 // 8)
-        for plane in range((count + 7) // 8):
-            word = _HIGH if plane >= 4 else _LOW
-            shift = _U(8 * (plane & 3))
+                s[_LOW + j] = 0
+                s[_HIGH + j] = 0
+            groups = find_live(s, flags, stop, live)
+            awake = groups
+            wake(s, f, live, groups, p0, number, spread[p0 : p0 + TILE], seed_low, seed_high)
+            if count == 1 or expected(s, first, stop) >= dense * count * TILE:
+                for at in range(count):
+                    if count > 1:
+                        groups = find_live(s, flags, _I(first + at + 1), live)
+                    while groups:
+                        draw(s, f, live, groups)
+                        groups = stream(s, f, live, groups, polynomial, _I(at))
+            else:
+                while groups:
+                    draw(s, f, live, groups)
+                    groups = jump(s, f, live, groups, polynomial, first)
             for j in range(TILE):
-                planes[plane * TILE + j] = _B(_U(s[word + j]) >> shift)
-            words = eights[plane * (TILE // 8) : (plane + 1) * (TILE // 8)]
-            transpose_bits(words)
-            for k in range(8 * plane, min(8 * plane + 8, count)):
-                at_byte = start + row * _Q(k)
-                byte = _Q(8 * (k & 7))
-                for j in range((n + 7) // 8):
-                    flat[at_byte + _Q(j)] = _B(words[j] >> byte)
+                left[j] = _I(s[_X + j] - s[_END + j])
+            if awake:
+                for j in range(TILE):
+                    number[j] = _U(number[j] + _U(s[_SPIKES + j]))
+            for plane in range((count + 7) // 8):
+                word = _HIGH if plane >= 4 else _LOW
+                shift = _U(8 * (plane & 3))
+                column = plane * WIDTH + (p0 - band * WIDTH)
+                of_tile = planes[column : column + TILE]
+                for j in range(TILE):
+                    of_tile[j] = _B(_U(s[word + j]) >> shift)
+        start = band * (WIDTH // 8)
+        write(eights, start, min(WIDTH // 8, (pixels + 7) // 8 - start), count, packed, spikes)
+        band = take_ticket(tickets, share)
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
 def unpack(packed, spikes):  # type: ignore[no-untyped-def]
     """Bytes (n,) of bits, least significant first, to 0/1 in bytes: `spikes` is (n,) uint64, eight pixels to a word."""
+    use_widest_vectors()  # type: ignore[call-arg]
     for i in range(packed.size):
         w = _Q(packed[i])
         w = (w | (w << _Q(28))) & _Q(0x0000000F0000000F)

@@ -1,0 +1,146 @@
+"""A frame at a time at the price of many: under light that stays, frames are worked out before they are asked for.
+
+A call for one frame must touch every pixel's state; a call for sixty-four touches it as often.  Where calls for single
+frames follow each other under one light, or one film, the next frames are therefore worked out together and kept as
+bits.  Each later call first compares its light, every pixel, with the light they were worked out from.  Where that has
+changed, the pixels go back to where they were, and the frames that were handed out are worked out again: no bit can
+depend on it.  How far ahead grows with success, so that light that often changes costs little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
+from spikecam_env.sensor.light import MAX_SEGMENT, Segment
+from spikecam_env.sensor.unit import Unit
+
+FEW = 4
+"""Frames a call for which looking ahead can pay."""
+
+_SAMPLED = 61
+"""Pixels that tell, before the work is done, whether light is likely to stay."""
+
+
+@dataclass
+class Ready:
+    """Frames worked out: the segment they are of, with light of its own, their bits, and how many were handed out.
+
+    remaining, fired: the pixels before them.
+    """
+
+    segment: Segment
+    packed: NDArray[np.uint8]
+    served: int
+    remaining: NDArray[np.int32]
+    fired: NDArray[np.uint32]
+
+
+@dataclass
+class AheadState:
+    """pixels: after the frames that are ready, if any are.  reach: how many frames to look ahead next time.
+
+    sample: some of the light of the last call.
+    """
+
+    pixels: fast.FastState
+    ready: Ready | None = None
+    reach: int = 0
+    sample: bytes = b""
+
+
+def start(unit: Unit, phase: NDArray[np.float64], seed: int) -> AheadState:
+    """As `fast.start`."""
+    return AheadState(fast.start(unit, phase, seed))
+
+
+def run(
+    state: AheadState, segment: Segment, out: NDArray[np.uint8] | None = None, *, threads: int | None = None
+) -> NDArray[np.uint8]:
+    """As `fast.run`, with the same bits."""
+    if state.ready is not None and not _goes_on(state.ready, segment):
+        take_back(state)
+    if state.ready is None and segment.count <= FEW:
+        look_ahead(state, segment, threads)
+    ready = state.ready
+    if ready is None:
+        return fast.run(state.pixels, segment, out, threads=threads)
+    bits = ready.packed[ready.served : ready.served + segment.count]
+    ready.served += segment.count
+    if ready.served == len(ready.packed):
+        state.ready = None
+        state.reach = min(2 * state.reach, MAX_SEGMENT)
+    return fast.unpack(bits, segment.radiance0.size, out)
+
+
+def look_ahead(state: AheadState, segment: Segment, threads: int | None) -> None:
+    """Work out as many frames as have lately been of use, from this segment's first on."""
+    sample = _sample(segment)
+    if sample == state.sample:
+        state.reach = max(state.reach, 2 * segment.count)
+    elif segment.first > 0:
+        state.reach = 0
+    state.sample = sample
+    rest = MAX_SEGMENT if _is_steady(segment) else segment.length - segment.first
+    count = min(state.reach, rest)
+    if count <= segment.count:
+        return
+    light0 = segment.radiance0.copy()
+    light1 = light0 if _is_steady(segment) else segment.radiance1.copy()
+    ours = replace(segment, radiance0=light0, radiance1=light1, count=count)
+    if _is_steady(segment):
+        ours = replace(ours, first=0)
+    before = state.pixels.remaining.copy(), state.pixels.fired.copy()
+    state.ready = Ready(ours, fast.run_packed(state.pixels, ours, threads=threads), 0, *before)
+
+
+def take_back(state: AheadState) -> None:
+    """Pixels as they are after the frames that were handed out, and none ready."""
+    ready = state.ready
+    if ready is None:
+        return
+    state.pixels.remaining[:] = ready.remaining
+    state.pixels.fired[:] = ready.fired
+    if ready.served:
+        fast.run_packed(state.pixels, replace(ready.segment, count=ready.served))
+    state.ready, state.reach = None, 0
+
+
+def _goes_on(ready: Ready, segment: Segment) -> bool:
+    """Whether the frames asked for are among those that are ready, and every pixel's light is what it was."""
+    ours = ready.segment
+    steady = _is_steady(segment)
+    if steady != _is_steady(ours) or ready.served + segment.count > ours.count:
+        return False
+    if not steady and (segment.length, segment.first) != (ours.length, ours.first + ready.served):
+        return False
+    return _equal(segment.radiance0, ours.radiance0) and (steady or _equal(segment.radiance1, ours.radiance1))
+
+
+def _is_steady(segment: Segment) -> bool:
+    return segment.radiance0 is segment.radiance1
+
+
+def _sample(segment: Segment) -> bytes:
+    every = max(1, segment.radiance0.size // _SAMPLED)
+    return segment.radiance0[::every].tobytes() + segment.radiance1[::every].tobytes()
+
+
+def _equal(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
+    if a.flags.c_contiguous and a.flags.writeable:
+        return bool(_same_words(a.view(np.uint32), b.view(np.uint32)))
+    return np.array_equal(a, b)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _same_words(a, b):  # type: ignore[no-untyped-def]
+    use_widest_vectors()  # type: ignore[call-arg]
+    different = np.uint32(0)
+    for i in range(a.size):
+        different |= np.uint32(a[i] ^ b[i])
+    return different == 0
