@@ -72,9 +72,9 @@ class SpikeSensor:
     ) -> None:
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
         self.shape = checked_shape(shape)
-        self.engine = _chosen_engine(engine, self.model, unit)
         self.take = checked_seed(take, "take")
         self._given = None if unit is None else (checked_unit(unit, self.shape), checked_seed(seed))
+        self.engine = _chosen_engine(engine, self.model, unit)
         self._optics = tuple(e for e in self.model.effects if e.overrides("image"))
         self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
         self._start(checked_seed(seed), phase=None)

@@ -21,6 +21,9 @@ from spikecam_env.sensor.light import GRAINS
 BAND = 1024
 """Pixels of a band, about: what is worked on frame after frame stays in the first-level cache."""
 
+DRAWS = 0x77091f21
+"""Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
+
 _U = np.uint32
 _Q = np.uint64
 _G = float(GRAINS)
