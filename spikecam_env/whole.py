@@ -1,8 +1,9 @@
-"""Files that appear whole: written beside their place, then renamed; nothing is left if writing fails."""
+"""Files and folders that appear whole: written beside their place, then renamed; nothing is left if writing fails."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +24,26 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         os.replace(beside, target)
     finally:
         beside.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """A new folder to fill; on leaving without an exception it becomes `path`.
+
+    Errors: InputError if `path` is there and not an empty folder, or the folder it is to be in does not exist.
+    """
+    target = Path(path)
+    if target.exists() and not (target.is_dir() and not any(target.iterdir())):
+        raise InputError(f"{target} is there already, and is not an empty folder; remove it or choose another name")
+    beside = beside_path(target)
+    try:
+        beside.mkdir()
+        yield beside
+        if target.exists():
+            target.rmdir()
+        os.replace(beside, target)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
 
 
 def beside_path(target: Path) -> Path:

@@ -182,8 +182,13 @@ def _file(root: Path, name: str, key: str, value: Any) -> Path | None:
 def _read_rates(path: Path, name: str, shape: tuple[int, int]) -> tuple[NDArray[np.float64], int]:
     arrays = _read_npz(path, ("rate", "frames"), name)
     rate = arrays["rate"].astype(np.float64)
-    if rate.shape != shape or not np.all((rate >= 0) & (rate <= 1)):
-        raise InputError(f"recording {name!r}: rate in {path.name} must be {shape}, within 0 .. 1; it is {rate.shape}")
+    if rate.shape != shape:
+        raise InputError(f"recording {name!r}: rate in {path.name} is {rate.shape}, the camera {shape}")
+    if not np.all((rate >= 0) & (rate <= 1)):
+        raise InputError(
+            f"recording {name!r}: rate in {path.name} runs from {rate.min():g} to {rate.max():g}; a pixel has 0 to 1 "
+            "spikes a frame"
+        )
     return rate, int(_positive(arrays["frames"].item(), f"recording {name!r}: frames", whole=True))
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Literal
+
+from spikecam_env.cli.camera import Camera
 
 
 @dataclass
@@ -22,8 +24,7 @@ class Demo:
     """Spike frames to stream; 1200 are one turn at 2000 rpm."""
     mode: Literal["best", "paper"] = "best"
     """Which DnSS denoises the film."""
-    model: str = "scsim"
-    """Sensor model: a preset (ideal, scsim, physical) or a model TOML."""
+    camera: Camera = field(default_factory=Camera)
     height: int = 250
     width: int = 400
     seed: int = 0
@@ -40,7 +41,7 @@ class Demo:
             rpm=self.rpm,
             frames=self.frames,
             mode=self.mode,
-            model=self.model,
+            model=self.camera.load(),
             shape=(self.height, self.width),
             seed=self.seed,
         )
@@ -55,9 +56,8 @@ class Demo:
         }
         write_film(folder / "demo.mp4", frames, fps=15.0)
         write_picture(folder / "demo.png", frames[len(frames) // 2])
-        write_json(
-            folder / "demo.json", {"options": {**vars(self), "out": str(self.out)}, "speed": speed, "table": rows}
-        )
+        options = {**asdict(self), "out": str(self.out)}
+        write_json(folder / "demo.json", {"options": options, "speed": speed, "table": rows})
         print(table(rows))
         print()
         print(table([speed]))

@@ -11,8 +11,10 @@ import tyro
 
 from spikecam_env.cli.bench import Bench
 from spikecam_env.cli.calibrate import Calibrate
+from spikecam_env.cli.campaign import Campaign
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
+from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.train import Train
@@ -34,6 +36,8 @@ COMMANDS: dict[str, Any] = {
     "train": Train,
     "evaluate": Evaluate,
     "calibrate": Calibrate,
+    "campaign": Campaign,
+    "effects": Effects,
     "bench": Bench,
 }
 

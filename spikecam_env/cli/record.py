@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from spikecam_env.cli.camera import Camera
 from spikecam_env.errors import InputError
 
 
@@ -13,7 +14,7 @@ from spikecam_env.errors import InputError
 class Record:
     """Record a simulated scene: spikes to .h5, .dat or .npz.
 
-    example:  spikecam record --rpm 2000 --frames 4000 --out disk.h5
+    example:  spikecam record --rpm 2000 --frames 4000 --effect readout_skew --out disk.h5
     """
 
     out: Path
@@ -22,8 +23,7 @@ class Record:
     """What the camera looks at: the rotating disk, or textured shapes in random motion."""
     frames: int = 4000
     """Spike frames to record; 40 000 are a second."""
-    model: str = "scsim"
-    """Sensor model: a preset (ideal, scsim, physical) or a model TOML."""
+    camera: Camera = field(default_factory=Camera)
     rpm: float = 2000.0
     """Speed of the disk."""
     height: int = 250
@@ -37,7 +37,7 @@ class Record:
 
         from scenes import Collage, RotatingDisk, Scene
         from spikecam_env.cli.table import table
-        from spikecam_env.sensor import SensorModel, SpikeSensor
+        from spikecam_env.sensor import SpikeSensor
         from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
 
         suffix = self.out.suffix.lower()
@@ -47,7 +47,7 @@ class Record:
             raise InputError(f"--out {self.out}: there is no folder {self.out.parent}; make it first")
         if self.frames < 1:
             raise InputError(f"--frames {self.frames}; record at least 1")
-        model = SensorModel.load(self.model)
+        model = self.camera.load()
         sensor = SpikeSensor(model, (self.height, self.width), self.seed, engine="auto")
         scene: Scene
         if self.scene == "disk":

@@ -16,6 +16,7 @@ from denoiser.metrics import psnr_db
 from scenes.protocol import Gaze
 from spikecam_env.cli.film import Panel, compose
 from spikecam_env.errors import InputError
+from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import middleTFI, middleTFP
 
 BLOCK = 25
@@ -58,7 +59,9 @@ class Streamed:
         return range(FIRST_SHOWN, len(self.truths) - LAST_SHOWN)
 
 
-def stream_disk(*, rpm: float, frames: int, mode: str, model: str, shape: tuple[int, int], seed: int) -> Streamed:
+def stream_disk(
+    *, rpm: float, frames: int, mode: str, model: SensorModel | str, shape: tuple[int, int], seed: int
+) -> Streamed:
     """Stream the disk through environment and denoiser; raises InputError for fewer than 500 frames."""
     if frames < 500:
         raise InputError(f"{frames} frames are too few to show; ask for 500 or more (1200 are a turn at 2000 rpm)")

@@ -35,17 +35,26 @@ def read_recording(path: str | Path, **options: Any) -> Recording:
 
     Errors: InputError for another ending, an option the format does not have, and all that its loader refuses.
     """
+    allowed = reading_options(path)
+    for name in options:
+        if name not in allowed:
+            ending = Path(path).suffix.lower()
+            raise InputError(f"option {name} does not apply to {ending} files; they take {', '.join(allowed)}")
+    loaded = _loader(path)(path, **options)
+    spikes, attributes = loaded if isinstance(loaded, tuple) else (loaded, {})
+    return Recording(spikes, attributes.get("frame_rate_hz"), attributes)
+
+
+def reading_options(path: str | Path) -> tuple[str, ...]:
+    """Names of the options that apply to a recording, by the ending of its name; InputError for another ending."""
+    return tuple(name for name in inspect.signature(_loader(path)).parameters if name != "path")
+
+
+def _loader(path: str | Path) -> Callable[..., Any]:
     ending = Path(path).suffix.lower()
     if ending not in _LOADERS:
         raise InputError(f"{path} ends in {ending!r}; a recording is one of {', '.join(_LOADERS)}")
-    loader = _LOADERS[ending]
-    allowed = [name for name in inspect.signature(loader).parameters if name != "path"]
-    for name in options:
-        if name not in allowed:
-            raise InputError(f"option {name} does not apply to {ending} files; they take {', '.join(allowed)}")
-    loaded = loader(path, **options)
-    spikes, attributes = loaded if isinstance(loaded, tuple) else (loaded, {})
-    return Recording(spikes, attributes.get("frame_rate_hz"), attributes)
+    return _LOADERS[ending]
 
 
 _LOADERS: dict[str, Callable[..., Any]] = {

@@ -1,0 +1,36 @@
+"""Which camera a command simulates: a model, with effects added or taken away."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+if TYPE_CHECKING:
+    from spikecam_env.sensor import SensorModel
+
+
+@dataclass(frozen=True)
+class Camera:
+    """The camera's model."""
+
+    model: str = "scsim"
+    """Sensor model: a preset (ideal, scsim, physical, measured) or a model TOML."""
+    effect: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME[:PARAM=VALUE,...]")] = ()
+    """Add an effect, or replace the model's own of that name, e.g. dead_time:tau_us=0.2; may be repeated.  `spikecam
+    effects` lists them."""
+    without: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
+    """Take an effect of the model away; may be repeated."""
+
+    def load(self) -> SensorModel:
+        """The model as asked; raises InputError for an unknown model, effect or parameter."""
+        from spikecam_env.cli.named import named
+        from spikecam_env.sensor import CATALOGUE, SensorModel
+
+        model = SensorModel.load(self.model)
+        for name in self.without:
+            model = model.without(name)
+        for text in self.effect:
+            model = model.with_effect(named(text, CATALOGUE, "effect"))
+        return model

@@ -1,0 +1,165 @@
+"""`spikecam campaign`: measured-data campaigns, simulated or from a real camera's files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from spikecam_env.cli.camera import Camera
+
+if TYPE_CHECKING:
+    from spikecam_env.calibration import Campaign as Folder
+
+Repeated = tyro.conf.UseAppendAction[tuple[str, ...]]
+
+
+@dataclass
+class Simulate:
+    """Record one simulated unit: dark, flats, a step, moving bars, a turning disk.  Goes on where it was stopped.
+
+    example:  spikecam campaign simulate late --effect dead_time:tau_us=0.2 --frames 8000 --seed 3
+    """
+
+    out: tyro.conf.Positional[Path]
+    """Folder for the campaign."""
+    camera: Camera = field(default_factory=Camera)
+    shape: tuple[int, int] = (64, 64)
+    """Rows and columns."""
+    frames: int = 8000
+    """Length of each recording; 40 000 are a second."""
+    seed: int = 0
+    """Which unit of the model: its fixed pattern, and the noise of all recordings."""
+    recording: Annotated[Repeated, tyro.conf.arg(metavar="KIND[:PARAM=VALUE,...]")] = ()
+    """What to record instead of the standard design (dark, nine flats, step, bars, disk), which `standard` stands for;
+    kinds: dark, flat, step, bars, disk or masked_rows, e.g. flat:radiance=0.3,use=holdout; may be repeated."""
+    second_v_d: float | None = None
+    """Record the dark and flats to fit at this V_D - V_ref too, in volts."""
+
+    def run(self) -> None:
+        from spikecam_env.cli.named import named
+        from spikecam_env.gap import KINDS, second_voltage, standard_design, write_campaign
+
+        planned = tuple(
+            recording
+            for text in self.recording or ("standard",)
+            for recording in (standard_design() if text == "standard" else (named(text, KINDS, "recording"),))
+        )
+        if self.second_v_d is not None:
+            planned = second_voltage(planned, self.second_v_d)
+        model = self.camera.load()
+        report(
+            write_campaign(
+                self.out,
+                model,
+                shape=self.shape,
+                frames=self.frames,
+                recordings=planned,
+                seed=self.seed,
+                progress=True,
+            )
+        )
+
+
+@dataclass
+class Import:
+    """Make a campaign of a real camera's files: .dat, .npz, .h5 recordings, rates, flat maps.
+
+    example:  spikecam campaign import recordings wall --label wall.npz=unknown --frame-rate-hz 40000
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of the recordings."""
+    out: tyro.conf.Positional[Path]
+    """Folder for the campaign; new or empty."""
+    table: Path | None = None
+    """CSV table of labels: file, radiance; name, use, v_d, temperature_k, note and options of reading if wanted."""
+    label: Annotated[Repeated, tyro.conf.arg(metavar="FILE=RADIANCE")] = ()
+    """What a recording was shown: a radiance (0 is dark), an .npz of light over time, `unknown` for a static scene, or
+    `relative` for flat maps; may be repeated."""
+    frame_rate_hz: float | None = None
+    """Frames a second; needed where the files do not say."""
+    rows: tuple[int, int] | None = None
+    """First and stop of the rows to keep."""
+    columns: tuple[int, int] | None = None
+    """First and stop of the columns to keep."""
+    holdout_share: float = 0.0
+    """Share of every recording, its end, to hold out for judging."""
+    radiance_per_unit: float = 1.0
+    """Radiance that 1 in the labels is, if they are in lux or another unit."""
+    height: int | None = None
+    """Rows in .dat files; default 250."""
+    width: int | None = None
+    """Columns in .dat files; default 400."""
+    crop_width: int | None = None
+    """Columns of .dat files that are pixels, from the left."""
+    flip: bool = False
+    """Files store the bottom row first, as public Vidar .dat do."""
+    bit_order: Literal["little", "big"] | None = None
+    """First pixel in the least or the most significant bit."""
+    time_axis: int | None = None
+    """Axis of time in .npz files: 0 or 2; default told from the spikes."""
+    key: str | None = None
+    """Name of the array in .npz files."""
+
+    def run(self) -> None:
+        from spikecam_env.gap import import_campaign, label_from_text, labels_from_table
+
+        labels = labels_from_table(self.table) if self.table else ()
+        reading = {
+            name: getattr(self, name)
+            for name in ("height", "width", "crop_width", "bit_order", "time_axis", "key")
+            if getattr(self, name) is not None
+        }
+        report(
+            import_campaign(
+                self.folder,
+                self.out,
+                (*labels, *(label_from_text(text) for text in self.label)),
+                frame_rate_hz=self.frame_rate_hz,
+                rows=self.rows,
+                columns=self.columns,
+                holdout_share=self.holdout_share,
+                radiance_per_unit=self.radiance_per_unit,
+                progress=True,
+                **reading,
+                **({"flip": True} if self.flip else {}),
+            )
+        )
+
+
+@dataclass
+class Campaign:
+    """Measured-data campaigns (format spikecam-campaign/1): simulate one, or import a real camera's recordings.
+
+    example:  spikecam campaign simulate late --effect dead_time:tau_us=0.2
+    """
+
+    action: (
+        Annotated[Simulate, tyro.conf.subcommand("simulate", prefix_name=False)]
+        | Annotated[Import, tyro.conf.subcommand("import", prefix_name=False)]
+    )
+
+    def run(self) -> None:
+        self.action.run()
+
+
+def report(campaign: Folder) -> None:
+    """Print what is in a campaign."""
+    from spikecam_env.cli.table import table
+
+    rows = [
+        {
+            "recording": r.name,
+            "use": r.use,
+            "frames": r.frames,
+            "spikes/frame": float((r.rate() if r.spikes is None else r.load()).mean()),
+            "light": "unknown" if r.radiance is None else "known",
+            "v_d": r.v_d,
+        }
+        for r in campaign.recordings
+    ]
+    print(table(rows))
+    print(f"wrote {len(rows)} recordings of {campaign.shape[0]} x {campaign.shape[1]} pixels in {campaign.folder}")

@@ -1,0 +1,121 @@
+"""What recordings of a real camera were shown: labels, from code, a CSV table or the command line.
+
+0.2                 even, steady light of that radiance; 0 is dark
+unknown             a static scene of unknown light
+steps.npz           light over time, `frame` (K,) and `radiance` (K, H, W) or broadcastable, as in a campaign
+relative            (flat maps only) the unit itself is the light meter, see `imports`
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.streams.files import existing_file
+
+UNKNOWN, RELATIVE = "unknown", "relative"
+
+READING = ("height", "width", "flip", "bit_order", "crop_width", "key", "time_axis", "first", "count")
+"""Options of `read_recording`, here also columns of a table."""
+
+_COLUMNS = ("file", "radiance", "name", "use", "v_d", "temperature_k", "note", *READING)
+
+
+@dataclass(frozen=True)
+class Label:
+    """One file of a real camera and what is known of it.
+
+    file: in the folder.  radiance: a number, or text as above.  name: default the file's.  use: fit or holdout.
+    v_d: V_D - V_ref [V].  temperature_k: [K].  reading: options of `read_recording` for this file.
+    """
+
+    file: str
+    radiance: float | str
+    name: str = ""
+    use: str = "fit"
+    v_d: float | None = None
+    temperature_k: float | None = None
+    note: str = ""
+    reading: Mapping[str, Any] = field(default_factory=dict)
+
+
+def labels_from_table(path: str | Path) -> tuple[Label, ...]:
+    """Labels from a CSV table: columns `file`, `radiance`; name, use, v_d, temperature_k, note and READING if wanted.
+
+    Errors: InputError for an unknown or missing column, an empty label, and a cell that is not a number, with its line.
+    """
+    source = existing_file(path)
+    with source.open(newline="", encoding="utf-8-sig") as lines:
+        table = csv.DictReader(lines, skipinitialspace=True, restkey="", restval="")
+        names = table.fieldnames or []
+        for name in names:
+            if name not in _COLUMNS:
+                raise unknown_name(f"column of {source}", name, _COLUMNS)
+        for name in ("file", "radiance"):
+            if name not in names:
+                raise InputError(
+                    f"{source} has no column {name!r}; its first line must name the columns: file,radiance"
+                )
+        labels = tuple(_label(row, f"{source}, line {table.line_num}") for row in table)
+    if not labels:
+        raise InputError(f"{source} lists no recordings; give one a line below the columns' names")
+    return labels
+
+
+def label_from_text(text: str) -> Label:
+    """A label written as FILE=RADIANCE, e.g. `wall.npz=unknown`."""
+    file, equals, radiance = text.rpartition("=")
+    if not equals or not file:
+        raise InputError(f"label {text!r} is not of the form FILE=RADIANCE, e.g. wall.npz=unknown or flat.dat=0.2")
+    return Label(file, parse_radiance(radiance, f"label {text!r}"))
+
+
+def parse_radiance(text: str, where: str) -> float | str:
+    """A radiance as written: a number, `unknown`, `relative`, or the name of an npz."""
+    if text in (UNKNOWN, RELATIVE) or text.endswith(".npz"):
+        return text
+    if not text:
+        raise InputError(f"{where}: the radiance is missing; give a number (0 is dark), an npz, or `unknown`")
+    return _number(text, f"{where}: radiance", " (0 is dark), an npz, or `unknown`")
+
+
+def _label(row: Mapping[str, str], where: str) -> Label:
+    if "" in row:
+        raise InputError(f"{where} has more cells than there are columns")
+    cells = {name: text.strip() for name, text in row.items() if text.strip()}
+    if "file" not in cells:
+        raise InputError(f"{where}: the file's name is missing")
+    reading = {name: _reading_cell(name, cells[name], where) for name in READING if name in cells}
+    numbers = {name: _number(cells[name], f"{where}: {name}") for name in ("v_d", "temperature_k") if name in cells}
+    texts = {name: cells[name] for name in ("name", "use", "note") if name in cells}
+    radiance = parse_radiance(cells.get("radiance", ""), where)
+    return Label(cells["file"], radiance, reading=reading, **numbers, **texts)  # type: ignore[arg-type]
+
+
+def _reading_cell(name: str, text: str, where: str) -> Any:
+    if name in ("bit_order", "key"):
+        return text
+    if name == "flip":
+        if text.lower() not in ("true", "false", "0", "1"):
+            raise InputError(f"{where}: flip is {text!r}; it must be true or false")
+        return text.lower() in ("true", "1")
+    value = _number(text, f"{where}: {name}")
+    if value != int(value):
+        raise InputError(f"{where}: {name} is {text!r}; it must be a whole number")
+    return int(value)
+
+
+def _number(text: str, what: str, otherwise: str = "") -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not 0 <= value < np.inf:
+        raise InputError(f"{what} is {text!r}; it must be a number, 0 or more{otherwise}")
+    return value

@@ -1,0 +1,208 @@
+"""The kinds of recordings a campaign is made of, each with the light it is taken in.
+
+`light(shape, frames)` is a pure function: keys that are linear between and whole frames apart, stored along the axes on
+which the light changes and no others.  Radiance 1.0 makes the nominal pixel fire once a frame.
+
+    dark            what needs no light: dark current, its patterns and its noise
+    flat            rate curve, response patterns, noise of a spike, row and frame noise
+    step            what remembers: lag, drift, history
+    bars            what depends on place and time together: read-out skew, blur
+    disk            textures in motion before still ones; nothing is like a flat: for judging
+    masked_rows     what couples a row: pixels of the same light in rows of different load
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import TEXTURES, RotatingDisk
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import Keyframes
+
+MOTION_PER_KEY = 1.2
+"""Most pixels of motion between two keys; beyond it linear light is no motion any more (DESIGN section 4)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planned:
+    """What all recordings have.
+
+    name: of its files; empty: made from the kind and its level.  use: fit, or holdout for judging.
+    v_d: V_D - V_ref [V], None is the model's own.  frames: length, None is the campaign's.
+    """
+
+    kind: ClassVar[str]
+
+    name: str = ""
+    use: str = "fit"
+    v_d: float | None = None
+    frames: int | None = None
+
+    def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
+        """Keys over frames [0, frames]; radiance is (K, H, W), or (K, 1, W), ... where it is even along an axis."""
+        raise NotImplementedError
+
+    @property
+    def file_name(self) -> str:
+        """The name, or one made from what is recorded."""
+        return self.name or self._called() + ("" if self.v_d is None else f"-at-{self.v_d:g}V")
+
+    def _called(self) -> str:
+        return self.kind
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dark(Planned):
+    """No light."""
+
+    kind = "dark"
+
+    def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
+        return _still(np.zeros((1, 1)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flat(Planned):
+    """An evenly lit screen of one radiance."""
+
+    kind = "flat"
+
+    radiance: float
+
+    def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
+        return _still(np.full((1, 1), self.radiance))
+
+    def _called(self) -> str:
+        return f"flat-{self.radiance:g}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step(Planned):
+    """A lamp switched between two radiances every `half_period` frames, low first.
+
+    An edge takes one frame: light goes from one level to the other between frames n - 1 and n, n = half_period, ...
+    """
+
+    kind = "step"
+
+    low: float = 0.05
+    high: float = 0.4
+    half_period: int = 200
+
+    def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
+        if self.half_period < 2:
+            raise InputError(f"half_period = {self.half_period} frames; it must be 2 or more, an edge takes one frame")
+        edges = np.arange(self.half_period, frames, self.half_period)
+        levels = np.where(np.arange(edges.size + 1) % 2, self.high, self.low)
+        frame = np.concatenate([[0], np.stack([edges - 1, edges], axis=1).reshape(-1)])
+        radiance = np.concatenate([levels[:1], np.stack([levels[:-1], levels[1:]], axis=1).reshape(-1)])
+        return Keyframes(frame.astype(np.float64), radiance.astype(np.float32).reshape(-1, 1, 1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bars(Planned):
+    """Bars, half of each `period` bright, that move to the right at `speed` (downward with `down`).
+
+    period [pixels], speed [pixels/frame], negative is the other way.  A pixel sees the mean light over its area; while
+    an edge crosses it this is linear in time: keys a pixel of motion apart are exact if 1/speed and period/2 are whole.
+    """
+
+    kind = "bars"
+
+    low: float = 0.05
+    high: float = 0.4
+    period: float = 16.0
+    speed: float = 0.2
+    down: bool = False
+
+    def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
+        if not abs(self.speed) <= MOTION_PER_KEY or not 2.0 <= self.period < np.inf:
+            raise InputError(
+                f"bars of period {self.period} at speed {self.speed}; need a period of 2 pixels or more and at most "
+                f"{MOTION_PER_KEY} pixels a frame either way"
+            )
+        every = frames if self.speed == 0 else max(int(1.0 / abs(self.speed) + 1e-9), 1)
+        frame = np.arange(-(-frames // every) + 1) * every
+        place = np.arange(shape[0 if self.down else 1]) - self.speed * frame[:, None]
+        bright = self._bright_before(place + 1.0) - self._bright_before(place)
+        radiance = (self.low + (self.high - self.low) * bright).astype(np.float32)
+        return Keyframes(frame.astype(np.float64), radiance[:, :, None] if self.down else radiance[:, None, :])
+
+    def _bright_before(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Length of bright bar between 0 and a place [pixels]."""
+        half = self.period / 2.0
+        return np.floor(place / self.period) * half + np.minimum(np.mod(place, self.period), half)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disk(Planned):
+    """A textured disk that turns before a still pattern.
+
+    rim_speed: of the texture at the rim [pixels/frame].  seed: of both textures.
+    """
+
+    kind = "disk"
+
+    low: float = 0.05
+    high: float = 0.5
+    rim_speed: float = 0.04
+    seed: int = 0
+
+    def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
+        if not abs(self.rim_speed) <= MOTION_PER_KEY:
+            raise InputError(f"rim_speed = {self.rim_speed}; it must be within {MOTION_PER_KEY} pixels a frame")
+        radius = 0.44 * min(shape)
+        scene = RotatingDisk(
+            shape,
+            rpm=60 * 40_000 * self.rim_speed / (2 * np.pi * radius),
+            radius=radius,
+            light=(self.low, self.high),
+            background=self._surround(shape),
+            seed=self.seed,
+            frame_rate_hz=40_000,
+            motion_per_key=MOTION_PER_KEY,
+        )
+        return scene.radiance(0, frames)
+
+    def _surround(self, shape: tuple[int, int]) -> NDArray[np.floating]:
+        texture = TEXTURES["dead_leaves"](np.random.default_rng(self.seed), max(64, *shape))
+        return self.low + (self.high - self.low) * texture[: shape[0], : shape[1]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaskedRows(Planned):
+    """A mask over the right half of the picture darkens every second band of rows.
+
+        bright bright        rows 0 .. band - 1
+        bright dark          rows band .. 2 band - 1, ...
+
+    On the left the light is the same in all rows, while half of the rows carry half of the activity.
+    """
+
+    kind = "masked_rows"
+
+    dark: float = 0.02
+    bright: float = 0.4
+    band: int = 8
+
+    def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
+        if not 1 <= self.band < shape[0]:
+            raise InputError(
+                f"band = {self.band} rows; it must be 1 to {shape[0] - 1}, so that there are two kinds of rows"
+            )
+        picture = np.full(shape, self.bright)
+        masked = np.arange(shape[0]) // self.band % 2 == 1
+        picture[masked, shape[1] // 2 :] = self.dark
+        return _still(picture)
+
+
+KINDS: dict[str, type[Planned]] = {kind.kind: kind for kind in (Dark, Flat, Step, Bars, Disk, MaskedRows)}
+"""Kinds of recordings by name."""
+
+
+def _still(picture: NDArray[np.float64]) -> Keyframes:
+    return Keyframes(np.zeros(1), picture[None].astype(np.float32))
