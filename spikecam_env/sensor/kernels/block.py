@@ -3,15 +3,14 @@
 The effects' hooks say once a block what arrives and how the references move (`drive`); a compiled loop (`block_loop`)
 then goes from frame to frame and does what depends on the spikes, from the numbers of `Feedback`.
 
-Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's draw
-mixed in, and what the reference adds or takes from the threshold is counted in at the reset.  What moves the reference or
-the charge by delta between a reset and the next spike is taken without the shot noise of delta: of a spike's variance a
-share |delta|, 1 % where a reference moves by 1 % of the swing.
+Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's
+draw mixed in.  N counts what the reset loses and where the reference stands at the reset.  What moves the reference, or
+the charge (`kick`), by delta from there to the next spike is taken without the shot noise of delta: of a spike's
+variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -63,8 +62,8 @@ class BlockLaw:
 class BlockState:
     """Pixels mid-stream.
 
-    charge, threshold: (P,) float64 [grains].  fired: (P,) uint32 spikes so far.  activity: (H,) share of a row that fired
-    in the last frame.  crossing: (P,) time of the last crossing [frames].  frame: number of the next.
+    charge, threshold: (P,) float64 [grains].  fired: (P,) uint32 spikes so far.  activity: (H,) share of a row that
+    fired in the last frame.  crossing: (P,) time of the last crossing [frames].  frame: number of the next.
     seeds: the two words that, with a pixel's number and its spike's, fix every draw.  memory: the effects'.
     """
 

@@ -43,7 +43,9 @@ def ramp_charge(level, curve, rest, first, out):  # type: ignore[no-untyped-def]
         s0, s1 = np.int32(k0 * k0), np.int32(k1 * k1)
         row = out[t]
         for p in range(pixels):
-            bend = np.int32(np.int32(np.int32(rest[p] * s1) >> np.int32(18)) - np.int32(np.int32(rest[p] * s0) >> np.int32(18)))
+            bend = np.int32(
+                np.int32(np.int32(rest[p] * s1) >> np.int32(18)) - np.int32(np.int32(rest[p] * s0) >> np.int32(18))
+            )
             row[p] = np.int32(np.int32(level[p] + np.int32(curve[p] * np.int32(s1 - s0))) + bend) * (1.0 / _G)
 
 
@@ -107,9 +109,17 @@ def advance(  # type: ignore[no-untyped-def]
                 q, h = r * columns, (r - row0) * pitch
                 a, d, f, m = light_scale[r], dark_scale[r], factors[r], commons[r]
                 load = 1.0 + droop * activity[r]
-                row_light, row_dark, row_field = lights[q : q + columns], darks[q : q + columns], fields[q : q + columns]
+                row_light, row_dark, row_field = (
+                    lights[q : q + columns],
+                    darks[q : q + columns],
+                    fields[q : q + columns],
+                )
                 row_charge, row_threshold = charge[q : q + columns], threshold[q : q + columns]
-                row_scale, row_hit, row_bits = grains_per_mV[q : q + columns], hit[h : h + columns], bits[q : q + columns]
+                row_scale, row_hit, row_bits = (
+                    grains_per_mV[q : q + columns],
+                    hit[h : h + columns],
+                    bits[q : q + columns],
+                )
                 for j in range(columns):
                     x = max(row_light[j] * a, 0.0) + max(row_dark[j] * d, 0.0)
                     c = row_charge[j] + x * _G
@@ -119,13 +129,13 @@ def advance(  # type: ignore[no-untyped-def]
                     row_bits[j] = row_hit[j]
                 n = listed(eights[h // 8 : (h + pitch) // 8], q, r, at, row_of, n)
             for i in range(n):
-                p, r = _Q(at[i]), _Q(row_of[i])
+                p, line = _Q(at[i]), _Q(row_of[i])
                 times[i] = fired[p]
                 fired[p] = _U(fired[p] + _U(1))
-                rate[i] = max(lights[p] * light_scale[r], 0.0) + max(darks[p] * dark_scale[r], 0.0)
-                shift[i] = grains_per_mV[p] * (commons[r] + fields[p])
-                over[i] = charge[p] - (threshold[p] * factors[r] + shift[i]) * (1.0 + droop * activity[r])
-                phi[i] = (_G * factors[r] + shift[i]) * (1.0 + droop * activity[r])
+                rate[i] = max(lights[p] * light_scale[line], 0.0) + max(darks[p] * dark_scale[line], 0.0)
+                shift[i] = grains_per_mV[p] * (commons[line] + fields[p])
+                over[i] = charge[p] - (threshold[p] * factors[line] + shift[i]) * (1.0 + droop * activity[line])
+                phi[i] = (_G * factors[line] + shift[i]) * (1.0 + droop * activity[line])
                 noise[i] = per_electron[p]
                 jitter[i] = kappa_squared[p]
 
@@ -136,16 +146,14 @@ def advance(  # type: ignore[no-untyped-def]
                 phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
 
             for i in range(n):
-                p, r = _Q(at[i]), _Q(row_of[i])
-                f, load = factors[r], 1.0 + droop * activity[r]
+                p, line = _Q(at[i]), _Q(row_of[i])
+                f, load = factors[line], 1.0 + droop * activity[line]
                 limit = (phi[i] * f + shift[i]) * load
                 while over[i] >= limit:
                     draw[i] = drawn(at[i], fired[p], seed_low, seed_high, polynomial)
                     fired[p] = _U(fired[p] + _U(1))
                     level = (_G * f + shift[i]) * load
-                    over[i], electrons[i] = after_reset(
-                        over[i] - limit, rate[i], level, per_root_rate, per_rate, kept
-                    )
+                    over[i], electrons[i] = after_reset(over[i] - limit, rate[i], level, per_root_rate, per_rate, kept)
                     phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
                     limit = (phi[i] * f + shift[i]) * load
                 charge[p] = over[i]
@@ -155,13 +163,13 @@ def advance(  # type: ignore[no-untyped-def]
                 kick_neighbours(kick, hit, pitch, columns, charge[row0 * columns : row1 * columns])
             if left != 0.0:
                 for i in range(n):
-                    p = _Q(at[i])
-                    late = min(max(charge[p] / _G / max(rate[i], 1e-12), 0.0), 1.0)
+                    pixel = _Q(at[i])
+                    late = min(max(charge[pixel] / _G / max(rate[i], 1e-12), 0.0), 1.0)
                     now = number + t + 1.0 - late
-                    stays = left * math.expm1(-(now - crossing[p]) / left_tau)
-                    charge[p] = (charge[p] / _G - stays) * _G
-                    crossing[p] = now
-                    threshold[p] = needed(electrons[i] + stays, noise[i], jitter[i], draw[i])
+                    stays = left * math.expm1(-(now - crossing[pixel]) / left_tau)
+                    charge[pixel] = (charge[pixel] / _G - stays) * _G
+                    crossing[pixel] = now
+                    threshold[pixel] = needed(electrons[i] + stays, noise[i], jitter[i], draw[i])
             if droop != 0.0:
                 for r in range(row0, row1):
                     activity[r] = 0.0
