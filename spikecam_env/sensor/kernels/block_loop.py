@@ -21,7 +21,7 @@ from spikecam_env.sensor.light import GRAINS
 BAND = 1024
 """Pixels of a band, about: what is worked on frame after frame stays in the first-level cache."""
 
-DRAWS = 0x77091f21
+DRAWS = 0x77091F21
 """Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 _U = np.uint32

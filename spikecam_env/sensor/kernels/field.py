@@ -19,7 +19,7 @@ Field = NDArray[np.float32]
 Words = tuple[np.uint32, np.uint32]
 """What fixes every draw of a field."""
 
-DRAWS = 0x77091f21
+DRAWS = 0x77091F21
 """Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 _U = np.uint32
