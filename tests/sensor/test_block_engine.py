@@ -196,7 +196,7 @@ def test_a_given_units_traps_stay_through_a_reset() -> None:
 def test_white_field_is_normal_and_independent_from_pixel_to_pixel_and_frame_to_frame() -> None:
     """400 000 numbers: moments within 4.5 standard errors."""
     of = words(np.random.default_rng(0))
-    field = white_field(of, 5, 40, (100, 100)).astype(np.float64)
+    field = white_field(of, 1.0, 5, 40, (100, 100)).astype(np.float64)
     n = field.size
     moments = {"mean": (field.mean(), 0.0, 1.0), "variance": (field.var(), 1.0, 2.0)}
     moments |= {"third": ((field**3).mean(), 0.0, 15.0), "fourth": ((field**4).mean(), 3.0, 96.0)}
@@ -205,14 +205,14 @@ def test_white_field_is_normal_and_independent_from_pixel_to_pixel_and_frame_to_
     for name, (value, expected, variance) in moments.items():
         print(f"{name}: {value:.5f}, expected {expected:g} +- {np.sqrt(variance / n):.5f}")
         assert abs(value - expected) < 4.5 * np.sqrt(variance / n)
-    np.testing.assert_array_equal(white_field(of, 11, 3, (100, 100)), field[6:9].astype(np.float32))
+    np.testing.assert_array_equal(white_field(of, 1.0, 11, 3, (100, 100)), field[6:9].astype(np.float32))
 
 
 def test_octave_field_keeps_unit_variance_and_its_correlation() -> None:
     rng = np.random.default_rng(0)
     value = rng.standard_normal((1, 50, 400), dtype=np.float32)
     every, kept = np.array([4.0]), np.array([0.8])
-    total, last = octave_field([words(rng)], value, every, kept, 0, 21)
+    total, last = octave_field([words(rng)], 1.0, value, every, kept, 0, 21)
     np.testing.assert_array_equal(total[-1], last[0])
     assert np.array_equal(total[0], total[3]) and not np.array_equal(total[3], total[4])
     for name, one, expected in (("variance", total[20], 1.0), ("5 moves apart", total[1], 0.8**5)):

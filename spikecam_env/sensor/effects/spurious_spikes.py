@@ -48,7 +48,7 @@ class SpuriousSpikes(Effect):
         at = self.struck_until(start + spikes.size, memory)
         due = at[(at >= start) & (at < start + spikes.size)]
         reported = spikes.copy()
-        reported.flat[due - start] = True
+        reported.reshape(-1)[due - start] = True
         return reported, Strikes(at[at >= start + spikes.size], memory.rng)
 
     def struck_until(self, end: int, memory: Strikes) -> NDArray[np.int64]:
