@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import tyro
 
 
 @dataclass
 class Bench:
-    """Measure speed on this machine: the sensor's engines, or the online denoiser.
+    """Measure speed on this machine: the sensor's engines, its effects, or the online denoiser.
 
     example:  spikecam bench sensor
     """
 
-    what: tyro.conf.Positional[Literal["sensor", "online"]]
-    """sensor: pixel-steps a second of numpy, reference and fast.  online: denoised frames a second."""
+    what: tyro.conf.Positional[Literal["sensor", "effects", "online"]]
+    """sensor: pixel-steps a second of numpy, reference and fast.  effects: what each costs, over the base model.
+    online: denoised frames a second."""
     out: Path | None = None
     """Where to write the figures as JSON."""
 
@@ -26,9 +28,15 @@ class Bench:
         from spikecam_env.cli.files import write_json
         from spikecam_env.cli.table import table
         from spikecam_env.sensor.bench import bench_sensor, machine
+        from spikecam_env.sensor.effect_costs import bench_effects
 
         print(machine())
-        rows = bench_sensor() if self.what == "sensor" else bench_online()
+        benches: dict[str, Callable[[], list[dict[str, Any]]]] = {
+            "sensor": bench_sensor,
+            "effects": bench_effects,
+            "online": bench_online,
+        }
+        rows = benches[self.what]()
         print(table(rows))
         if self.out is not None:
             write_json(self.out, {"machine": machine(), "rows": rows})

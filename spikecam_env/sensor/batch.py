@@ -216,9 +216,7 @@ def _checked_models(models: Any, cameras: int) -> tuple[SensorModel, ...]:
     for model in loaded:
         missing = cuda.missing(model.effects)
         if missing:
-            raise InputError(
-                f"the cuda engine does not carry {', '.join(missing)}; use SpikeSensor, engine='reference'"
-            )
+            raise InputError(f"the cuda engine does not carry {', '.join(missing)}; use SpikeSensor, engine='auto'")
     return loaded
 
 

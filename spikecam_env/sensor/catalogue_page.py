@@ -161,15 +161,15 @@ changes no bit, alone and among all others; that its hooks change nothing in pla
 cut, saved and restored; docs, bounds, twins that exist; and a test of your own, `test_slow_shutter_...`, of its law.
 
 Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
-carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames, arrays
-of (frames, rows, columns), and the fast engine runs them as they stand. A `Charge` keeps a picture and a number a frame
-apart: `light.scaled(numbers)` costs nothing a pixel, `Charge(f(light.values))` an array. What depends on the spikes is
-written frame by frame, `react`, `after_reset`, `spiked`, for the reference, and declared in `feedback` for the fast
-engine; without a declaration the fast engine refuses the effect by name and `engine="auto"` takes the reference.
+carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames,
+arrays of (frames, rows, columns), which the fast engine runs as they stand. A `Charge` keeps a picture and a number a
+frame apart: `light.scaled(numbers)` costs nothing a pixel, `Charge(f(light.values))` an array. What depends on the
+spikes is written frame by frame, `react`, `after_reset`, `spiked`, for the reference, and declared in `feedback` for
+the fast engine; without a declaration that engine refuses the effect by name and `engine="auto"` takes the reference.
 
 What must be remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator
-of the effect's own, so that no other effect's draws change. What belongs to the unit (which pixels have a trap) is drawn
-there from `pattern`, the same in all recordings by one unit. Time is `now.number`, absolute, never a count of calls.
+of the effect's own, so that no other effect's draws change. What belongs to the unit (which pixels have a trap) `begin`
+draws from `pattern`, the same in all recordings by one unit. Time is `now.number`, absolute, never a count of calls.
 '''
 
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Spikes, having
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Field, Spikes, having
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.sensor.model import generator
 
@@ -30,7 +30,7 @@ class Comparators:
 
     factor: Array
     common: Array
-    field: NDArray[np.float32]
+    field: Field
     grains_per_mV: Array
 
 
@@ -68,7 +68,7 @@ def comparators(now: Exposure, effects: Sequence[Effect], memory: Memory) -> Com
     """How the references move in the frames; updates `memory`."""
     factor = np.ones((now.frames, now.shape[0], 1))
     common = np.zeros((now.frames, now.shape[0], 1))
-    field = np.zeros((1, *now.shape), dtype=np.float32)
+    fields: list[Field] = []
     for effect in having("compare", effects):
         shift, memory[effect.name] = effect.compare(now, memory[effect.name])
         factor = factor * shift.factor
@@ -76,8 +76,9 @@ def comparators(now: Exposure, effects: Sequence[Effect], memory: Memory) -> Com
         if millivolts.shape[-1:] in ((), (1,)):
             common = common + millivolts
         else:
-            field = field + millivolts.astype(np.float32)
+            fields.append(millivolts.astype(np.float32, copy=False))
     pixels = now.shape[0] * now.shape[1]
+    field = reduce(np.add, fields) if fields else np.zeros((1, pixels), dtype=np.float32)
     grains_per_mV = GRAINS * (1e-3 / now.unit.swing_V)
     return Comparators(factor[:, :, 0], common[:, :, 0], field.reshape(-1, pixels), grains_per_mV)
 

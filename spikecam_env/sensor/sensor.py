@@ -46,9 +46,9 @@ class SpikeSensor:
     model: what kind of camera; a SensorModel, a preset's name or a TOML path.
     seed: which unit of it (fixed pattern), its starting phase and its temporal noise; same seed, same bits,
         for any cutting of the stream into steps and any number of threads.
-    engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification), "cuda" (a GPU, bits of
-        fast, no effects from frame to frame; for many cameras at once see SpikeSensorBatch), or "auto" (fast where it
-        carries every effect of the model, else reference).
+    engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification), "cuda" (a GPU, bits
+        of fast, no effects from frame to frame; for many cameras at once see SpikeSensorBatch), or "auto" (fast where
+        it carries every effect of the model, else reference).
     take: another recording by the same unit: other starting phase, other temporal noise.
     unit: a camera's own firing law, as measured, in place of one drawn from the model.  The model's fixed patterns and
         noise strengths are then not used; its optics and what its effects do from frame to frame are.
@@ -72,9 +72,9 @@ class SpikeSensor:
     ) -> None:
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
         self.shape = checked_shape(shape)
-        self.engine = _chosen_engine(engine, self.model, unit)
         self.take = checked_seed(take, "take")
         self._given = None if unit is None else (checked_unit(unit, self.shape), checked_seed(seed))
+        self.engine = _chosen_engine(engine, self.model, unit)
         self._optics = tuple(e for e in self.model.effects if e.overrides("image"))
         self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
         self._start(checked_seed(seed), phase=None)
@@ -230,7 +230,9 @@ def checked_unit(unit: Any, shape: tuple[int, int]) -> Unit:
     """Raises InputError unless `unit` is a firing law of rows * columns pixels."""
     if not isinstance(unit, Unit):
         raise InputError(f"unit = {type(unit).__name__}; it must be a Unit (spikecam_env.sensor.Unit)")
-    arrays = {field.name: getattr(unit, field.name) for field in fields(Unit) if field.name not in ("shot", "dark_is_noisy")}
+    arrays = {
+        field.name: getattr(unit, field.name) for field in fields(Unit) if field.name not in ("shot", "dark_is_noisy")
+    }
     for name, values in arrays.items():
         if np.shape(values) != (shape[0] * shape[1],):
             raise InputError(

@@ -44,5 +44,5 @@ class Afterpulsing(Effect):
         due = np.concatenate([memory.due, again])
         now_due = np.searchsorted(due, start + spikes.size)
         reported = spikes.copy()
-        reported.flat[due[:now_due] - start] = True
+        reported.reshape(-1)[due[:now_due] - start] = True
         return reported, Pending(due[now_due:], memory.rng)

@@ -49,6 +49,7 @@ from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.unit import PixelArray, Unit
 
 Array = NDArray[np.float64]
+Field = NDArray[np.float32]
 Spikes = NDArray[np.bool_]
 
 
@@ -80,7 +81,7 @@ class Exposure:
     @property
     def middle_s(self) -> Array:
         """Time of the middle of each frame (F, 1, 1) [s]."""
-        return ((self.number + np.arange(self.frames) + 0.5) / self.frame_rate_hz)[:, None, None]
+        return ((self.number + np.arange(self.frames, dtype=np.float64) + 0.5) / self.frame_rate_hz)[:, None, None]
 
     def charge_of(self, current_pA: float) -> Array:
         """Charge (H, W) that a current brings in a frame [thresholds]."""
@@ -113,20 +114,24 @@ class Shift:
     """How the comparators' reference moves: a pixel fires at its threshold * factor + millivolts over its swing.
 
     factor: (F, H, 1), with 1 for F or H where all are alike.  millivolts: (F, H, W), with 1 for F, H or W; a field
-    that differs from pixel to pixel is taken in single precision.  Either may be a number.  Several effects' factors multiply, millivolts add.
+    that differs from pixel to pixel is taken in single precision.  Either may be a number.  Of several effects the
+    factors multiply and the millivolts add.
     """
 
     factor: Array | float = 1.0
-    millivolts: Array | float = 0.0
+    millivolts: Array | Field | float = 0.0
 
 
 class Feedback(NamedTuple):
     """What spikes do to the pixels, in numbers; charge in thresholds, time in frames.
 
-    On a reset, x being the charge of the frame:  residual <- (residual - lost_per_root_rate sqrt(x) - lost_per_rate x) kept.
-    At the end of the frame every pixel gets `kick` for each of its four neighbours that fired, and one that fired keeps
-    left (1 - exp(-T/left_tau)), T the interval that has ended.  Thresholds of a row are (1 + droop a) times higher, a the
-    share of it that fired in the frame before.
+    On a reset, x being the charge of the frame:
+
+        residual <- (residual - lost_per_root_rate sqrt(x) - lost_per_rate x) kept
+
+    At the end of the frame every pixel gets `kick` for each of its four neighbours that fired, and one that fired gets
+    left (1 - exp(-T/left_tau)), T the interval that has ended.  Thresholds of a row are times 1 + droop a, a the share
+    of it that fired in the frame before.
     """
 
     lost_per_root_rate: float = 0.0

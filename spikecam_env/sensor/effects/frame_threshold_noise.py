@@ -28,4 +28,4 @@ class FrameThresholdNoise(Effect):
         return words(rng)
 
     def compare(self, now: Exposure, memory: Words) -> tuple[Shift, Words]:
-        return Shift(millivolts=self.sigma_mV * white_field(memory, now.number, now.frames, now.shape)), memory
+        return Shift(millivolts=white_field(memory, self.sigma_mV, now.number, now.frames, now.shape)), memory

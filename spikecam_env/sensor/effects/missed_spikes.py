@@ -28,5 +28,5 @@ class MissedSpikes(Effect):
     ) -> tuple[Spikes, np.random.Generator]:
         at = np.flatnonzero(spikes)
         kept = spikes.copy()
-        kept.flat[at] = memory.random(at.size) >= self.probability
+        kept.reshape(-1)[at[memory.random(at.size) < self.probability]] = False
         return kept, memory

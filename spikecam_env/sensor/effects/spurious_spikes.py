@@ -18,7 +18,10 @@ from numpy.typing import NDArray
 from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, parameter
 
 _AT_ONCE = 256
-"""Gaps drawn at a time; part of the law of which draw goes where, not to be changed by the block's length."""
+"""Gaps drawn at a time."""
+
+_LONGEST = 1 << 52
+"""A gap of never, short enough that a few hundred of them still add up in 64 bits."""
 
 
 class Strikes(NamedTuple):
@@ -45,12 +48,13 @@ class SpuriousSpikes(Effect):
         at = self.struck_until(start + spikes.size, memory)
         due = at[(at >= start) & (at < start + spikes.size)]
         reported = spikes.copy()
-        reported.flat[due - start] = True
+        reported.reshape(-1)[due - start] = True
         return reported, Strikes(at[at >= start + spikes.size], memory.rng)
 
     def struck_until(self, end: int, memory: Strikes) -> NDArray[np.int64]:
         """Bits struck, up to one at or after `end`: the gaps between them are geometric."""
         runs = [memory.at]
         while runs[-1][-1] < end:
-            runs.append(runs[-1][-1] + np.cumsum(memory.rng.geometric(self.probability, _AT_ONCE)))
+            gaps = np.minimum(memory.rng.geometric(self.probability, _AT_ONCE), _LONGEST)
+            runs.append(runs[-1][-1] + np.cumsum(gaps))
         return np.concatenate(runs)

@@ -21,7 +21,7 @@ from spikecam_env.sensor.kernels.field import Words, octave_field, words
 
 
 class Octaves(NamedTuple):
-    """value: (octaves, H, W) of unit variance, fastest first.  words: what drives each of them."""
+    """value: (octaves, H, W) [mV], fastest first.  words: what drives each of them."""
 
     value: NDArray[np.float32]
     words: tuple[Words, ...]
@@ -39,11 +39,14 @@ class ThresholdFlickerNoise(Effect):
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Octaves:
         shape = (int(self.octaves), *first.shape)
-        return Octaves(rng.standard_normal(shape, dtype=np.float32), tuple(words(rng) for _ in range(shape[0])))
+        value = np.float32(self.sigma_mV) * rng.standard_normal(shape, dtype=np.float32)
+        return Octaves(value, tuple(words(rng) for _ in range(shape[0])))
 
     def compare(self, now: Exposure, memory: Octaves) -> tuple[Shift, Octaves]:
         """An octave moves every eighth of its correlation time, no oftener than every frame."""
         tau = 2.0 ** (1 + np.arange(len(memory.words)))
         every = np.maximum(1, tau // 8)
-        total, value = octave_field(memory.words, memory.value, every, np.exp(-every / tau), now.number, now.frames)
-        return Shift(millivolts=self.sigma_mV * total), Octaves(value, memory.words)
+        total, value = octave_field(
+            memory.words, self.sigma_mV, memory.value, every, np.exp(-every / tau), now.number, now.frames
+        )
+        return Shift(millivolts=total), Octaves(value, memory.words)

@@ -3,32 +3,32 @@
 The effects' hooks say once a block what arrives and how the references move (`drive`); a compiled loop (`block_loop`)
 then goes from frame to frame and does what depends on the spikes, from the numbers of `Feedback`.
 
-Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's draw
-mixed in, and what the reference adds or takes from the threshold is counted in at the reset.  What moves the reference or
-the charge by delta between a reset and the next spike is taken without the shot noise of delta: of a spike's variance a
-share |delta|, 1 % where a reference moves by 1 % of the swing.
+Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's
+draw mixed in.  N counts what the reset loses and where the reference stands at the reset.  What moves the reference, or
+the charge (`kick`), by delta from there to the next spike is taken without the shot noise of delta: of a spike's
+variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, having
 from spikecam_env.sensor.kernels import block_loop, fast
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.light import GRAINS, Segment, ramp
 from spikecam_env.sensor.unit import Unit
 
-_BLOCK = 1 << 18
-"""Pixel-steps of a block, at most: arrays of one number each stay in the second-level cache."""
+_BLOCK = 1 << 22
+"""Pixel-steps of a block, at most: what differs from pixel to pixel and frame to frame then takes 32 megabytes."""
 
 
 def missing(effects: Sequence[Effect]) -> list[str]:
@@ -45,8 +45,11 @@ def missing_of(unit: Unit) -> list[str]:
 
 @dataclass(frozen=True)
 class BlockLaw:
-    """A unit in the loop's numbers: per_electron (1/N, 0 without shot noise) and kappa_squared (P,), and the polynomial."""
+    """A unit in the loop's numbers: gain and dark (P,) float32 [grains/frame], per_electron (1/N, 0 without shot noise)
+    and kappa_squared (P,), and the polynomial that is the law of a spike's charge."""
 
+    gain: NDArray[np.float32]
+    dark: NDArray[np.float32]
     per_electron: Array
     kappa_squared: Array
     polynomial: tuple[np.float32, ...]
@@ -59,8 +62,8 @@ class BlockLaw:
 class BlockState:
     """Pixels mid-stream.
 
-    charge, threshold: (P,) float64 [grains].  fired: (P,) uint32 spikes so far.  activity: (H,) share of a row that fired
-    in the last frame.  crossing: (P,) time of the last crossing [frames].  frame: number of the next.
+    charge, threshold: (P,) float64 [grains].  fired: (P,) uint32 spikes so far.  activity: (H,) share of a row that
+    fired in the last frame.  crossing: (P,) time of the last crossing [frames].  frame: number of the next.
     seeds: the two words that, with a pixel's number and its spike's, fix every draw.  memory: the effects'.
     """
 
@@ -83,7 +86,7 @@ def start(
     charge = np.floor(phase * GRAINS)
     inverse = 1.0 / first.unit.electrons if first.unit.shot else np.zeros(phase.size)
     return BlockState(
-        BlockLaw(inverse, first.unit.kappa**2, pixels.law.polynomial),
+        BlockLaw(*first.unit.grains_per_frame, inverse, first.unit.kappa**2, pixels.law.polynomial),
         charge,
         threshold=charge + pixels.remaining[: phase.size],
         fired=np.zeros(phase.size, dtype=np.uint32),
@@ -113,17 +116,22 @@ def run(
     for done in range(0, segment.count, frames):
         part = replace(segment, first=segment.first + done, count=min(frames, segment.count - done))
         now = replace(first, number=state.frame, frames=part.count)
-        spikes[done : done + part.count] = _block(now, effects, state, part, threads)
+        _block(now, effects, state, part, spikes[done : done + part.count], threads)
         state.frame += part.count
     return spikes
 
 
 def _block(
-    now: Exposure, effects: Sequence[Effect], state: BlockState, segment: Segment, threads: int | None
-) -> NDArray[np.uint8]:
-    light, dark = drive.expected_charge(now, effects, state.memory, _mean(now.unit, segment))
+    now: Exposure,
+    effects: Sequence[Effect],
+    state: BlockState,
+    segment: Segment,
+    spikes: NDArray[np.uint8],
+    threads: int | None,
+) -> None:
+    light, dark = drive.expected_charge(now, effects, state.memory, _mean(state.law, segment))
     law = drive.comparators(now, effects, state.memory)
-    spikes = np.empty((now.frames, state.charge.size), dtype=np.uint8)
+    feedback = _sum([e.feedback(now) for e in effects])
     work = (
         now.number,
         now.shape[1],
@@ -135,7 +143,7 @@ def _block(
         np.ascontiguousarray(law.common),
         law.field,
         law.grains_per_mV,
-        tuple(float(number) for number in _together([e.feedback(now) for e in effects])),
+        tuple(float(number) for number in feedback),
         state.law.per_electron,
         state.law.kappa_squared,
         state.law.polynomial,
@@ -147,19 +155,22 @@ def _block(
         state.crossing,
         spikes,
     )
-    block_loop.advance(0, now.shape[0], *work)
-    return drive.read_out(now, effects, state.memory, spikes.view(np.bool_).reshape(-1, *now.shape)).reshape(
-        now.frames, -1
-    )
+    rows = 1 if feedback.kick else now.shape[0]
+    parts = fast._worth(threads, rows, spikes.size)
+    cuts = [now.shape[0] * part // parts for part in range(parts + 1)]
+    fast._together([partial(block_loop.advance, top, bottom, *work) for top, bottom in pairwise(cuts)])
+    if having("read_out", effects):
+        fired = spikes.view(np.bool_).reshape(-1, *now.shape)
+        spikes[:] = drive.read_out(now, effects, state.memory, fired).reshape(spikes.shape)
 
 
-def _mean(unit: Unit, segment: Segment) -> Array:
+def _mean(law: BlockLaw, segment: Segment) -> Array:
     """Charge of the light law (count, P) [thresholds], or (1, P) in steady light."""
-    law = ramp(segment, *unit.grains_per_frame)
-    if not law.curve.any() and not law.rest.any():
-        return law.level[None] / GRAINS
-    mean = np.empty((segment.count, unit.gain.size))
-    block_loop.ramp_charge(law.level, law.curve, law.rest, segment.first, mean)
+    light = ramp(segment, law.gain, law.dark)
+    if not light.curve.any() and not light.rest.any():
+        return light.level[None] / GRAINS
+    mean = np.empty((segment.count, light.level.size))
+    block_loop.ramp_charge(light.level, light.curve, light.rest, segment.first, mean)
     return mean
 
 
@@ -171,7 +182,7 @@ def _rows(factor: Array | float, now: Exposure) -> Array:
     return np.ascontiguousarray(np.broadcast_to(factor, (now.frames, now.shape[0], 1))[:, :, 0])
 
 
-def _together(feedbacks: Sequence[Feedback]) -> Feedback:
+def _sum(feedbacks: Sequence[Feedback]) -> Feedback:
     """One law of several: losses, kicks and droops add, what is kept multiplies."""
     total = Feedback()
     for one in feedbacks:

@@ -21,9 +21,16 @@ from spikecam_env.sensor.light import GRAINS
 BAND = 1024
 """Pixels of a band, about: what is worked on frame after frame stays in the first-level cache."""
 
+DRAWS = 0x3BD9BCE3
+"""Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
+
 _U = np.uint32
 _Q = np.uint64
 _G = float(GRAINS)
+
+_COUNT = np.array([byte.bit_count() for byte in range(256)])
+"""How many bits of a byte are one, and which, first ones first."""
+_ONES = np.argsort(1 - (np.arange(256)[:, None] >> np.arange(8)) % 2, axis=1, kind="stable").astype(np.uint32)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
@@ -36,7 +43,9 @@ def ramp_charge(level, curve, rest, first, out):  # type: ignore[no-untyped-def]
         s0, s1 = np.int32(k0 * k0), np.int32(k1 * k1)
         row = out[t]
         for p in range(pixels):
-            bend = np.int32(np.int32(np.int32(rest[p] * s1) >> np.int32(18)) - np.int32(np.int32(rest[p] * s0) >> np.int32(18)))
+            bend = np.int32(
+                np.int32(np.int32(rest[p] * s1) >> np.int32(18)) - np.int32(np.int32(rest[p] * s0) >> np.int32(18))
+            )
             row[p] = np.int32(np.int32(level[p] + np.int32(curve[p] * np.int32(s1 - s0))) + bend) * (1.0 / _G)
 
 
@@ -85,8 +94,8 @@ def advance(  # type: ignore[no-untyped-def]
     most = rows * pitch + 8
     hit = np.zeros(most, np.uint8)
     eights = hit.view(np.uint64)
-    begin = np.zeros(rows + 1, np.int64)
     at = np.empty(most, np.uint32)
+    row_of = np.empty(most, np.uint32)
     times = np.empty(most, np.uint32)
     draw = np.empty(most, np.float32)
     rate, over, phi, electrons, shift, noise, jitter = np.empty((7, most), np.float64)
@@ -94,14 +103,23 @@ def advance(  # type: ignore[no-untyped-def]
         row1 = min(row0 + rows, bottom)
         for t in range(frames):
             lights, darks, fields, bits = light[light_step * t], dark[dark_step * t], field[field_step * t], spikes[t]
+            light_scale, dark_scale, factors, commons = light_factor[t], dark_factor[t], factor[t], common[t]
             n = 0
             for r in range(row0, row1):
                 q, h = r * columns, (r - row0) * pitch
-                a, d, f, m = light_factor[t, r], dark_factor[t, r], factor[t, r], common[t, r]
+                a, d, f, m = light_scale[r], dark_scale[r], factors[r], commons[r]
                 load = 1.0 + droop * activity[r]
-                row_light, row_dark, row_field = lights[q : q + columns], darks[q : q + columns], fields[q : q + columns]
+                row_light, row_dark, row_field = (
+                    lights[q : q + columns],
+                    darks[q : q + columns],
+                    fields[q : q + columns],
+                )
                 row_charge, row_threshold = charge[q : q + columns], threshold[q : q + columns]
-                row_scale, row_hit, row_bits = grains_per_mV[q : q + columns], hit[h : h + columns], bits[q : q + columns]
+                row_scale, row_hit, row_bits = (
+                    grains_per_mV[q : q + columns],
+                    hit[h : h + columns],
+                    bits[q : q + columns],
+                )
                 for j in range(columns):
                     x = max(row_light[j] * a, 0.0) + max(row_dark[j] * d, 0.0)
                     c = row_charge[j] + x * _G
@@ -109,22 +127,17 @@ def advance(  # type: ignore[no-untyped-def]
                     row_hit[j] = c >= (row_threshold[j] * f + row_scale[j] * (m + row_field[j])) * load
                 for j in range(columns):
                     row_bits[j] = row_hit[j]
-                for word in range(h // 8, (h + pitch) // 8):
-                    if eights[word]:
-                        for j in range(8 * word, 8 * word + 8):
-                            at[n] = q + (j - h)
-                            n += hit[j]
-                begin[r - row0 + 1] = n
-                for i in range(begin[r - row0], n):
-                    p = _Q(at[i])
-                    times[i] = fired[p]
-                    fired[p] = _U(fired[p] + _U(1))
-                    rate[i] = max(lights[p] * a, 0.0) + max(darks[p] * d, 0.0)
-                    shift[i] = grains_per_mV[p] * (m + fields[p])
-                    over[i] = charge[p] - (threshold[p] * f + shift[i]) * load
-                    phi[i] = (_G * f + shift[i]) * load
-                    noise[i] = per_electron[p]
-                    jitter[i] = kappa_squared[p]
+                n = listed(eights[h // 8 : (h + pitch) // 8], q, r, at, row_of, n)
+            for i in range(n):
+                p, line = _Q(at[i]), _Q(row_of[i])
+                times[i] = fired[p]
+                fired[p] = _U(fired[p] + _U(1))
+                rate[i] = max(lights[p] * light_scale[line], 0.0) + max(darks[p] * dark_scale[line], 0.0)
+                shift[i] = grains_per_mV[p] * (commons[line] + fields[p])
+                over[i] = charge[p] - (threshold[p] * factors[line] + shift[i]) * (1.0 + droop * activity[line])
+                phi[i] = (_G * factors[line] + shift[i]) * (1.0 + droop * activity[line])
+                noise[i] = per_electron[p]
+                jitter[i] = kappa_squared[p]
 
             for i in range(n):
                 draw[i] = drawn(at[i], times[i], seed_low, seed_high, polynomial)
@@ -132,37 +145,53 @@ def advance(  # type: ignore[no-untyped-def]
                 over[i], electrons[i] = after_reset(over[i], rate[i], phi[i], per_root_rate, per_rate, kept)
                 phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
 
-            for r in range(row0, row1):
-                f, load = factor[t, r], 1.0 + droop * activity[r]
-                for i in range(begin[r - row0], begin[r - row0 + 1]):
-                    p = _Q(at[i])
+            for i in range(n):
+                p, line = _Q(at[i]), _Q(row_of[i])
+                f, load = factors[line], 1.0 + droop * activity[line]
+                limit = (phi[i] * f + shift[i]) * load
+                while over[i] >= limit:
+                    draw[i] = drawn(at[i], fired[p], seed_low, seed_high, polynomial)
+                    fired[p] = _U(fired[p] + _U(1))
+                    level = (_G * f + shift[i]) * load
+                    over[i], electrons[i] = after_reset(over[i] - limit, rate[i], level, per_root_rate, per_rate, kept)
+                    phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
                     limit = (phi[i] * f + shift[i]) * load
-                    while over[i] >= limit:
-                        draw[i] = drawn(at[i], fired[p], seed_low, seed_high, polynomial)
-                        fired[p] = _U(fired[p] + _U(1))
-                        level = (_G * f + shift[i]) * load
-                        over[i], electrons[i] = after_reset(
-                            over[i] - limit, rate[i], level, per_root_rate, per_rate, kept
-                        )
-                        phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
-                        limit = (phi[i] * f + shift[i]) * load
-                    charge[p] = over[i]
-                    threshold[p] = phi[i]
+                charge[p] = over[i]
+                threshold[p] = phi[i]
 
             if kick != 0.0:
                 kick_neighbours(kick, hit, pitch, columns, charge[row0 * columns : row1 * columns])
             if left != 0.0:
                 for i in range(n):
-                    p = _Q(at[i])
-                    late = min(max(charge[p] / _G / max(rate[i], 1e-12), 0.0), 1.0)
+                    pixel = _Q(at[i])
+                    late = min(max(charge[pixel] / _G / max(rate[i], 1e-12), 0.0), 1.0)
                     now = number + t + 1.0 - late
-                    stays = left * math.expm1(-(now - crossing[p]) / left_tau)
-                    charge[p] = (charge[p] / _G - stays) * _G
-                    crossing[p] = now
-                    threshold[p] = needed(electrons[i] + stays, noise[i], jitter[i], draw[i])
+                    stays = left * math.expm1(-(now - crossing[pixel]) / left_tau)
+                    charge[pixel] = (charge[pixel] / _G - stays) * _G
+                    crossing[pixel] = now
+                    threshold[pixel] = needed(electrons[i] + stays, noise[i], jitter[i], draw[i])
             if droop != 0.0:
                 for r in range(row0, row1):
-                    activity[r] = (begin[r - row0 + 1] - begin[r - row0]) / columns
+                    activity[r] = 0.0
+                for i in range(n):
+                    activity[row_of[i]] += 1.0
+                for r in range(row0, row1):
+                    activity[r] /= columns
+
+
+@njit(inline="always")
+def listed(eights, first, row, at, row_of, n):  # type: ignore[no-untyped-def]
+    """Append to at[:n] the numbers, from `first`, of the bytes that are one; returns how many there are then.
+
+    The bytes of a word are gathered to eight bits, and the table says at once where the ones are.
+    """
+    for word in range(eights.size):
+        which = (eights[word] * _Q(0x0102040810204080)) >> _Q(56)
+        for k in range(8):
+            at[_Q(n + k)] = _U(_U(first + 8 * word) + _ONES[which, k])
+            row_of[_Q(n + k)] = _U(row)
+        n += _COUNT[which]
+    return n
 
 
 @njit(inline="always")

@@ -158,7 +158,7 @@ def _advance(
         packed,
         spikes,
     )
-    _together([partial(loop.advance, i, *work) for i in range(threads)])
+    _together([partial(loop.advance, i, *work) for i in range(threads)], shared=True)
 
 
 def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
@@ -179,15 +179,18 @@ def _worth(threads: int | None, most: int, pixel_steps: int) -> int:
     return max(1, min(asked, most, pixel_steps // _WORTH_A_THREAD))
 
 
-def _together(parts: list[Callable[[], None]]) -> None:
-    """Run parts of shared work at once, the first on this thread; one that has not begun when none is left need not."""
+def _together(parts: list[Callable[[], None]], *, shared: bool = False) -> None:
+    """Run parts at once, the first on this thread.
+
+    shared: each part takes what is left of the whole, so one that has not begun when the first is done need not.
+    """
     others = []
     if len(parts) > 1:
         here = _processor()
         others = [_pool(os.getpid()).submit(_elsewhere, here, part) for part in parts[1:]]
     parts[0]()
     for other in others:
-        if not other.cancel():
+        if not (shared and other.cancel()):
             other.result()
 
 

@@ -19,6 +19,12 @@ Field = NDArray[np.float32]
 Words = tuple[np.uint32, np.uint32]
 """What fixes every draw of a field."""
 
+DRAWS = 0x3BD9BCE3
+"""Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
+
+TILE = 1024
+"""Pixels whose keys are made once a block."""
+
 _U = np.uint32
 _F = np.float32
 
@@ -29,23 +35,30 @@ def words(rng: np.random.Generator) -> Words:
     return low, high
 
 
-def white_field(of: Words, first: int, frames: int, shape: tuple[int, int]) -> Field:
-    """Independent standard normal numbers (frames, H, W) float32 of frames first .. first + frames."""
+def white_field(of: Words, sigma: float, first: int, frames: int, shape: tuple[int, int]) -> Field:
+    """Independent N(0, sigma^2) numbers (frames, H, W) float32 of frames first .. first + frames."""
     out = np.empty((frames, shape[0] * shape[1]), dtype=np.float32)
-    _white(*of, np.uint32(first % (1 << 32)), _normal(), out)
+    _white(*of, np.uint32(first % (1 << 32)), _normal(sigma), out)
     return out.reshape(frames, *shape)
 
 
 def octave_field(
-    of: Sequence[Words], value: Field, every: NDArray[np.float64], kept: NDArray[np.float64], first: int, frames: int
+    of: Sequence[Words],
+    sigma: float,
+    value: Field,
+    every: NDArray[np.float64],
+    kept: NDArray[np.float64],
+    first: int,
+    frames: int,
 ) -> tuple[Field, Field]:
     """The sum (frames, H, W) of AR(1) processes, and their values (octaves, H, W) after the last frame.
 
-    value: before frame `first`.  Process j moves in frames that every[j] divides: v <- kept v + sqrt(1 - kept^2) n.
+    sigma: standard deviation of each.  value: before frame `first`.  Process j moves in frames that every[j] divides:
+    v <- kept v + sigma sqrt(1 - kept^2) n.
     """
     last = value.copy()
     total = np.empty((frames, *value.shape[1:]), dtype=np.float32)
-    driven = np.sqrt(1.0 - kept**2).astype(np.float32)
+    driven = (sigma * np.sqrt(1.0 - kept**2)).astype(np.float32)
     low_high = np.array(of, dtype=np.uint32)
     _octaves(
         low_high,
@@ -53,45 +66,60 @@ def octave_field(
         kept.astype(np.float32),
         driven,
         first,
-        _normal(),
+        _normal(1.0),
         last.reshape(len(of), -1),
         total.reshape(frames, -1),
     )
     return total, last
 
 
-def _normal() -> tuple[np.float32, ...]:
-    """The polynomial that makes a bell normal."""
-    return fitted_polynomial(np.inf, 0.0)
+def _normal(sigma: float) -> tuple[np.float32, ...]:
+    """The polynomial that makes a bell normal, of this standard deviation."""
+    return tuple(np.float32(sigma) * c for c in fitted_polynomial(np.inf, 0.0))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def _white(low, high, first, polynomial, out):  # type: ignore[no-untyped-def]
     """out: (F, P) float32, overwritten."""
     frames, pixels = out.shape
-    for t in range(frames):
-        row = out[t]
-        step = _U(_U(first + _U(t)) * GOLDEN)
-        for p in range(pixels):
-            key = first_key(p, low)
-            row[p] = standard(_U(key + step), second_key(key, high), polynomial)
+    key = np.empty((2, TILE), np.uint32)
+    for start in range(0, pixels, TILE):
+        n = min(TILE, pixels - start)
+        write_keys(start, low, high, key)
+        for t in range(frames):
+            step = _U(_U(first + _U(t)) * GOLDEN)
+            row = out[t, start : start + n]
+            for p in range(n):
+                row[p] = standard(_U(key[0, p] + step), key[1, p], polynomial)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def _octaves(words, every, kept, driven, first, polynomial, value, total):  # type: ignore[no-untyped-def]
     """value: (J, P) float32, updated.  total: (F, P) float32, overwritten."""
     octaves, pixels = value.shape
-    for t in range(total.shape[0]):
-        number = first + t
-        step = _U(_U(number) * GOLDEN)
-        row = total[t]
-        row[:] = _F(0.0)
+    key = np.empty((octaves, 2, TILE), np.uint32)
+    for start in range(0, pixels, TILE):
+        n = min(TILE, pixels - start)
         for j in range(octaves):
-            v = value[j]
-            if number % every[j] == 0:
-                low, high, a, b = words[j, 0], words[j, 1], kept[j], driven[j]
-                for p in range(pixels):
-                    key = first_key(p, low)
-                    v[p] = a * v[p] + b * standard(_U(key + step), second_key(key, high), polynomial)
-            for p in range(pixels):
-                row[p] += v[p]
+            write_keys(start, words[j, 0], words[j, 1], key[j])
+        for t in range(total.shape[0]):
+            number = first + t
+            step = _U(_U(number) * GOLDEN)
+            row = total[t, start : start + n]
+            row[:] = _F(0.0)
+            for j in range(octaves):
+                v, a, b, of = value[j, start : start + n], kept[j], driven[j], key[j]
+                if number % every[j] == 0:
+                    for p in range(n):
+                        v[p] = a * v[p] + b * standard(_U(of[0, p] + step), of[1, p], polynomial)
+                for p in range(n):
+                    row[p] += v[p]
+
+
+@njit(inline="always")
+def write_keys(start, low, high, out):  # type: ignore[no-untyped-def]
+    """Both keys of the pixels of a tile: out (2, TILE) uint32."""
+    for p in range(TILE):
+        key = first_key(start + p, low)
+        out[0, p] = key
+        out[1, p] = second_key(key, high)
