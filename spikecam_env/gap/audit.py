@@ -1,6 +1,6 @@
 """What the data contradict about themselves, before any model is asked: labels, order, orientation, missing frames.
 
-Each check looks for one mistake that would explain a recording and leaves the others in order; an effect bends them all.
+Each check looks for one mistake that would explain a recording and leave the others in order; an effect bends all.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def silent(case: Case, suspect: set[str]) -> list[Contradiction]:
 def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Recordings that fit their light and the unit's pattern upside down or mirrored."""
     found = []
-    turns = {"rows reversed": (slice(None, None, -1), slice(None)), "columns reversed": (slice(None), slice(None, None, -1)),
-             "turned by 180 degrees": (slice(None, None, -1), slice(None, None, -1))}  # fmt: skip
+    back, all_ = slice(None, None, -1), slice(None)
+    turns = {"rows reversed": (back, all_), "columns reversed": (all_, back), "turned by 180 degrees": (back, back)}
     for i, (c, o) in enumerate(zip(case.conditions, case.observations, strict=True)):
         if c.light is None or o.times.count.sum() < 1000:
             continue
@@ -153,9 +153,13 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
     if left > MENDED * before or abs(off) < max(LEAST_LABEL, 4 * left):
         return []
     if light[i] == 0:
-        text = f"{names[i]}: labelled dark, but {100 * (rate[i] / max(dark, 1e-9) - 1):.2g} % off what the flats extrapolate to"
+        off = float(rate[i] / max(dark, 1e-9) - 1)
+        text = f"{names[i]}: labelled dark, but {100 * off:+.2g} % off what the flats extrapolate to"
     else:
-        text = f"{names[i]}: its rate is that of {100 * off:+.2g} % other light than its label; all others agree to {100 * left:.1g} %"
+        text = (
+            f"{names[i]}: its rate is that of {100 * off:+.2g} % more light than its label says; all others agree to "
+        )
+        text += f"{100 * left:.1g} %"
     return [Contradiction("label", (names[i],), text)]
 
 
@@ -220,7 +224,7 @@ def _shift(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64]) ->
     seen = film[part].astype(np.float64)
     scores = {}
     for shift in range(-MOST_BINS, MOST_BINS + 1):
-        if 0 <= part[0] + shift and part[-1] + shift < len(expected):
+        if part[0] + shift >= 0 and part[-1] + shift < len(expected):
             scores[shift] = float(((seen - expected[part + shift]) ** 2).sum())
     least = min(scores.values())
     if least > 0.8 * scores[0]:

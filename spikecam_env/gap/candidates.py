@@ -54,7 +54,9 @@ def _dark(shown: Sequence[Shown]) -> str | None:
 
 
 def _steady(shown: Sequence[Shown]) -> str | None:
-    return None if any(s.kind in ("dark", "flat", "picture", "unknown") for s in shown) else "a recording in steady light"
+    return (
+        None if any(s.kind in ("dark", "flat", "picture", "unknown") for s in shown) else "a recording in steady light"
+    )
 
 
 _FIELD = "flats at several levels beside a picture with bright and dark rows"
@@ -70,9 +72,13 @@ CANDIDATES: dict[str, Candidate] = {
     "photodiode_lag": Candidate(
         "lag", ("fraction", "tau_us"), {"tau_us": (150.0, 600.0, 2500.0, 10000.0)}, needs=_moving
     ),
-    "light_flicker": Candidate("light", ("modulation",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady),
+    "light_flicker": Candidate(
+        "light", ("modulation",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
+    ),
     "lamp_drift": Candidate("light", ("sigma_per_root_s",), square=True, needs=_steady),
-    "supply_ripple": Candidate("common", ("ripple",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady),
+    "supply_ripple": Candidate(
+        "common", ("ripple",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
+    ),
     "common_threshold_noise": Candidate("common", ("sigma_mV",), square=True, needs=_steady),
     "clock_jitter": Candidate("common", ("sigma_ns",), square=True, needs=_steady),
     "row_temporal_noise": Candidate("common", ("sigma_mV",), square=True, needs=_steady),

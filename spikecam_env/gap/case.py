@@ -54,8 +54,7 @@ def case_of(
     base = measured_base(list(observations), list(conditions))
     reading = Reading(observations, conditions, base, moving)
     statistics = {**bank(reading), **pattern_bank(reading)}
-    return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs,
-                frame_rate_hz)
+    return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs, frame_rate_hz)
 
 
 def twins(

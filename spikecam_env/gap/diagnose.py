@@ -7,6 +7,7 @@ Each step is a function of its own, usable by itself; nothing is decided on the 
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,8 +24,8 @@ from spikecam_env.gap.audit import Contradiction, audit
 from spikecam_env.gap.candidates import candidate, chosen, testable
 from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import Null, adjusted, deviates, misfit, normal, residual, values_of
-from spikecam_env.gap.fit import Fit, confirmed, fit
 from spikecam_env.gap.evidence import evidence_of
+from spikecam_env.gap.fit import Fit, confirmed, fit
 from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
 from spikecam_env.gap.refit import BaseFit, within
@@ -91,7 +92,8 @@ def diagnose(
 
     campaign: a folder in the format spikecam-campaign/1.  model: a SensorModel, a preset's name or a TOML path.
     candidates: names to try, default the whole catalogue; exclude: names to leave out.  Same seed, same answer.
-    jobs: threads.  Raises InputError for an unreadable campaign, an unknown name, or no static recording of known light.
+    jobs: threads.  Raises InputError for an unreadable campaign, an unknown name, or too few static recordings
+    of known light to refit the unit by.
     """
     stages: dict[str, float] = {}
     timed = _stages(stages, progress)
@@ -148,11 +150,17 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     """The case without recordings that contradict the others, where enough is left to refit the unit by."""
     bad = {r for c in contradictions for r in c.recordings}
     keep = [i for i, c in enumerate(case.conditions) if c.name not in bad]
-    enough = sum(case.conditions[i].kind in ("dark", "flat", "picture") and case.conditions[i].use == "fit" for i in keep)
+    enough = sum(
+        case.conditions[i].kind in ("dark", "flat", "picture") and case.conditions[i].use == "fit" for i in keep
+    )
     if not bad or enough < 2:
         return case
     return case_of(
-        case.shape, [case.conditions[i] for i in keep], [case.observations[i] for i in keep], case.seed, case.jobs,
+        case.shape,
+        [case.conditions[i] for i in keep],
+        [case.observations[i] for i in keep],
+        case.seed,
+        case.jobs,
         case.frame_rate_hz,
     )
 
@@ -222,7 +230,7 @@ def concluded(
     z = deviates(null, values)
     p = adjusted(z)
     before = residual(null, values, null.mean, null.twins)
-    found = [r.fits[0] for r, after in zip(rounds, rounds[1:], strict=False) if after.model is not r.model]
+    found = [r.fits[0] for r, after in itertools.pairwise(rounds) if after.model is not r.model]
     last = rounds[-1] if rounds else None
     rho = last.rho if last else before
     predicted = last.predicted if last else null.mean
@@ -296,7 +304,7 @@ def gap_of(case: Case, null: Null, values: Array, after: Array) -> Gap:
     """Mean square distance on held-out recordings, in noise."""
     use = np.array([_use(case, k.recording) for k in null.keys])
     held = use == "holdout" if np.any(use == "holdout") else np.ones(len(use), bool)
-    square = lambda mean: np.nan_to_num(((values - mean) / null.noise)) ** 2  # noqa: E731
+    square = lambda mean: np.nan_to_num((values - mean) / null.noise) ** 2  # noqa: E731
     b, a = square(null.mean), square(after)
     floor = 1.0
     by = {}

@@ -16,7 +16,6 @@ from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case, rests_on, settled, twins
 from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, residual, values_of
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import build

@@ -40,7 +40,8 @@ class Observation:
 
     times: ends, counts and A_k of each pixel.  variance, covariance: (P,) of intervals, and of successive ones, about
     the pixel's own mean [frames^2]; NaN below 3 intervals.  short, long: (P,) intervals T below 0.6 T - 1 or
-    above 1.5 T + 1 of the mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.  blocks: (BLOCKS, P) counts.
+    above 1.5 T + 1 of the mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.
+    blocks: (BLOCKS, P) counts.
     frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (LAGS, 2) spikes of one pixel with its neighbour's,
     lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
     late: (F,) sum over spikes of a frame of their interval less the pixel's mean [frames].  odd: (F,) short and long

@@ -35,7 +35,7 @@ def where(case: Case) -> str:
     out = _outlying_counts(odd, fields) | _outlying_means(bent, fields)
     if not 0 < out.sum() <= FIELDS:
         return ""
-    names = [_name(f, case.shape) for f in np.flatnonzero(out)]
+    names = [_name(int(f), case.shape) for f in np.flatnonzero(out)]
     return "; ".join(names)
 
 
@@ -85,7 +85,7 @@ def when(case: Case) -> str:
         if abs(first - second) > max(SIGMAS * np.sqrt(first + second), 0.3 * (first + second)):
             votes.append(second > first)
         halves = [strongest_line(spectrum(part)) for part in (o.frame[:half], o.frame[half:])]
-        (a, first_line), (b, second_line) = halves
+        (_a, first_line), (_b, second_line) = halves
         if max(first_line, second_line) > 60 and max(first_line, second_line) > 6 * min(first_line, second_line):
             votes.append(second_line > first_line)
         votes += _jump(o.blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))

@@ -87,7 +87,7 @@ def within(model: SensorModel, base: BaseFit) -> BaseFit:
 
 
 def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
-    """The unit to simulate: N as the model says and the rest of s^2 as reset noise; all shot noise where it has less."""
+    """The unit to simulate: N as the model says and the rest of s^2 as reset noise; less is all shot noise."""
     nominal = PixelArray.nominal(model.circuit, model.frame_rate_hz, shape)
     names = {e.name: e for e in model.effects}
     for name in NOISE:

@@ -68,7 +68,7 @@ class Statistic:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate that was tried.  misfit: heavy-tailed sum of squares of what it leaves; parameters at the best fit."""
+    """A candidate that was tried.  misfit: heavy-tailed sum of squares of what it leaves; parameters: at the best."""
 
     name: str
     family: str
@@ -167,9 +167,15 @@ class Diagnosis:
             "data": list(self.data),
             "gap": asdict(self.gap) if self.gap else None,
             "discrepancies": [
-                {"statistic": s.name, "group": s.group, "recordings": list(s.recordings), "z": s.z,
-                 "p_adjusted": s.p_adjusted} for s in sorted(found, key=lambda s: -abs(s.z))
-            ],  # fmt: skip
+                {
+                    "statistic": s.name,
+                    "group": s.group,
+                    "recordings": list(s.recordings),
+                    "z": s.z,
+                    "p_adjusted": s.p_adjusted,
+                }
+                for s in sorted(found, key=lambda s: -abs(s.z))
+            ],
             "not_testable": [{"name": n, "needs": w} for n, w in self.not_testable],
             "bounds": [asdict(b) for b in self.bounds],
             "ranking": [asdict(r) for r in self.ranking],

@@ -2,8 +2,8 @@
 
     python -m spikecam_env.gap.templates          rebuilds them (resumable; minutes an effect), and the limits table
 
-A template is a direction, in noise, at a strength that shows clearly.  Screening scales it to what was measured; the fit
-that follows simulates the campaign at hand and rests on no template.
+A template is a direction, in noise, at a strength that shows clearly.  Screening scales it to what was measured; the
+fit that follows simulates the campaign at hand and rests on no template.
 """
 
 from __future__ import annotations
@@ -109,7 +109,11 @@ def screen(
             continue
         rho = (d - scale * shift) / np.sqrt(1.0 + (2 * TOLERANCE * scale * shift) ** 2)
         measured_line = {"frequency_hz": line_hz} if line_hz and "frequency_hz" in entry.parameters else {}
-        start = {**entry.parameters, **measured_line, strength: entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)}
+        start = {
+            **entry.parameters,
+            **measured_line,
+            strength: entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power),
+        }
         now = Screened(entry.name, bounded(entry.name, start), misfit(rho), scale * shift * null.noise)
         if entry.name not in best or now.misfit < best[entry.name].misfit:
             best[entry.name] = now
@@ -156,10 +160,10 @@ def build(folder: Path, *, jobs: int = 1, only: Sequence[str] | None = None) -> 
         path = folder / f"{label}.npz"
         if not path.exists():
             entry = _simulated(case, model, null, name, parameters)
-            with whole_file(path) as beside:
-                np.savez(open(beside, "wb"), parameters=json.dumps(entry.parameters), shift=entry.shift)
-        with np.load(path) as file:
-            entries.append(Template(name, json.loads(str(file["parameters"])), file["shift"]))
+            with whole_file(path) as beside, beside.open("wb") as file:
+                np.savez(file, parameters=json.dumps(entry.parameters), shift=entry.shift)
+        with np.load(path) as made:
+            entries.append(Template(name, json.loads(str(made["parameters"])), made["shift"]))
     levels = {c.name: c.level for c in case.conditions}
     kinds = {c.name: c.kind for c in case.conditions}
     return Templates(null.keys, levels, kinds, tuple(entries))
@@ -174,8 +178,8 @@ def save(templates: Templates, path: Path) -> None:
         "entries": [{"name": e.name, "parameters": e.parameters} for e in templates.entries],
     }
     shift = np.clip([e.shift for e in templates.entries], -6e4, 6e4).astype(np.float16)
-    with whole_file(path) as beside:
-        np.savez_compressed(open(beside, "wb"), about=json.dumps(about), shift=shift)
+    with whole_file(path) as beside, beside.open("wb") as file:
+        np.savez_compressed(file, about=json.dumps(about), shift=shift)
 
 
 def standard_case(jobs: int = 1, seed: int = SEED, count: int = 12) -> tuple[Case, SensorModel, Null]:

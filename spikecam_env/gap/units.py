@@ -37,7 +37,9 @@ def drawn_banks(
     return [_bank(fitted, base, shown, shape, seed + n) for n in range(count)]
 
 
-def _rescaled(model: SensorModel, nominal: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> SensorModel:
+def _rescaled(
+    model: SensorModel, nominal: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int
+) -> SensorModel:
     unit = model.draw_unit(shape, seed)
     out = model
     for what, spreads in _SPREADS.items():

@@ -17,20 +17,22 @@ from numpy.typing import NDArray
 _Q = np.uint64
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def ones(typing_context: Any, word: Any) -> Any:
+def _ones(typing_context: Any, word: Any) -> Any:
     """Number of set bits of a uint64."""
     return types.uint64(types.uint64), lambda context, builder, signature, args: builder.ctpop(args[0])
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def lowest(typing_context: Any, word: Any) -> Any:
+def _lowest(typing_context: Any, word: Any) -> Any:
     """Position of the lowest set bit of a uint64 that is not zero."""
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
 
     return types.uint64(types.uint64), build
+
+
+ones: Any = intrinsic(_ones)
+lowest: Any = intrinsic(_lowest)
 
 
 def as_words(packed: NDArray[np.uint8]) -> NDArray[np.uint64]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from spikecam_env.gap.observe import LAGS
 from spikecam_env.gap.statistics.reading import STILL, Reading
 

@@ -29,7 +29,9 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     fraction = interval % 1.0
     excess = (o.variance - fraction * (1.0 - fraction))[good]
     found = {
-        "variance": float(np.mean(np.clip(excess / interval[good], *np.quantile(excess / interval[good], [0.01, 0.99])))),
+        "variance": float(
+            np.mean(np.clip(excess / interval[good], *np.quantile(excess / interval[good], [0.01, 0.99])))
+        ),
         "lag-1": float(o.covariance[good].sum() / max(o.variance[good].sum(), 1e-12)),
     }
     white = reading.base.white

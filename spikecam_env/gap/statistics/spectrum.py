@@ -6,6 +6,8 @@ Reveals light_flicker (lines in the light), supply_ripple (in the dark too), com
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,7 +37,7 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
         return {}
     power = spectrum(o.frame)
     edges = bands(o.frames)
-    found = {f"band {n}": log(float(power[a:b].mean())) for n, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True))}
+    found = {f"band {n}": log(float(power[a:b].mean())) for n, (a, b) in enumerate(itertools.pairwise(edges))}
     found["line"] = log(strongest_line(power)[1])
     return found
 

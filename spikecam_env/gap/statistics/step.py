@@ -5,6 +5,8 @@ Reveals photodiode_lag (tails), incomplete_reset (the first intervals), readout_
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,7 +53,7 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
         at = [(t, h) for t, h in edges if h * sign > 0 and t + EDGES[-1] < o.frames]
         if not at:
             continue
-        for a, b in zip(EDGES[:-1], EDGES[1:], strict=True):
+        for a, b in itertools.pairwise(EDGES):
             windows = [left[t + a : t + b].sum() / (abs(h) * gain.sum()) for t, h in at]
             found[f"{name} {a}-{b}"] = float(np.mean(windows))
         late = np.mean([left[t - 1 : t + 4].sum(axis=0) / (h * gain) for t, h in at], axis=0)
