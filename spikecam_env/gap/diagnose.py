@@ -23,9 +23,10 @@ from spikecam_env.errors import InputError
 from spikecam_env.gap.audit import Contradiction, audit
 from spikecam_env.gap.candidates import candidate, chosen, testable
 from spikecam_env.gap.case import Case, case_of
-from spikecam_env.gap.compare import Null, adjusted, deviates, misfit, normal, residual, values_of
+from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, misfit, normal, residual, values_of
 from spikecam_env.gap.evidence import evidence_of
-from spikecam_env.gap.fit import Fit, confirmed, fit
+from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
+from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
 from spikecam_env.gap.refit import BaseFit, within
@@ -106,19 +107,28 @@ def diagnose(
         contradictions = audit(case)
         case = trimmed(case, contradictions)
     names, untestable = testable(names, case.conditions)
+    lacking = missing(case, assumed, names)
+    start = assumed
+    for m in lacking:
+        start = start.with_effect(m.effect)
     with timed("twins"):
-        null = model_null(case, assumed, twin_count)
+        null = model_null(case, start, twin_count)
+        before = model_null(case, assumed, 2) if lacking else null
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
     if adjusted(deviates(null, values)).min() < ALARM:
         with timed("candidates"):
-            rounds = search(case, assumed, null, values, names, templates or load())
+            rounds = search(case, start, null, values, names, templates or load())
     with timed("verdict"):
-        found = concluded(case, assumed, null, values, rounds, contradictions, untestable)
+        found = concluded(
+            case, start, null, in_order(before, null), values, lacking, rounds, contradictions, untestable
+        )
     with timed("evidence"):
         base = within(assumed, case.base)
-        last = rounds[-1] if rounds and rounds[-1].model is not assumed else None
-        evidence = evidence_of(case, assumed, base, last.model, last.base) if last else evidence_of(case, assumed, base)
+        after = rounds[-1].model if rounds else start
+        unit = rounds[-1].base if rounds else within(start, case.base)
+        changed = after is not assumed
+        evidence = evidence_of(case, assumed, base, *((after, unit) if changed else ()))
     found = replace(
         found,
         campaign=str(measured.folder),
@@ -175,7 +185,7 @@ def search(
         rho = residual(null, values, predicted, count)
         if rounds and not alarmed(null, rho):
             break
-        here = replace(null, mean=predicted)
+        here = standing_on(null, predicted)
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left, line_of(case))
         tried = worth_fitting(screened, misfit(rho))
@@ -188,9 +198,19 @@ def search(
         if not sure or sure[0].misfit > misfit(rho) - (GAIN if now is not model else SEPARATED):
             break
         best = sure[0]
+        earlier = [r.fits[0].name for r in rounds[:-1]]
+        if earlier:
+            best = rejoined(case, model, null, values, best, earlier)
+        rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
         now, base, predicted, count = best.model, best.base, best.predicted, best.count
     rounds.append(Round(now, base, predicted, count, residual(null, values, predicted, count), ()))
     return rounds
+
+
+def standing_on(null: Null, predicted: Array) -> Null:
+    """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
+    floor = np.hypot(null.floor, TOLERANCE * (predicted - null.mean))
+    return replace(null, mean=predicted, floor=floor)
 
 
 def line_of(case: Case) -> float | None:
@@ -221,17 +241,23 @@ def concluded(
     case: Case,
     model: SensorModel,
     null: Null,
+    given: Array,
     values: Array,
+    lacking: Sequence[Missing],
     rounds: Sequence[Round],
     contradictions: Sequence[Contradiction],
     untestable: Sequence[tuple[str, str]],
 ) -> Diagnosis:
-    """From the search to a verdict."""
-    z = deviates(null, values)
+    """From the search to a verdict.  given: (S,) predictions of the model as it was given."""
+    z = deviates(replace(null, mean=given), values)
     p = adjusted(z)
     before = residual(null, values, null.mean, null.twins)
-    found = [r.fits[0] for r, after in itertools.pairwise(rounds) if after.model is not r.model]
     last = rounds[-1] if rounds else None
+    kept = {e.name: e for e in last.model.effects} if last else {}
+    added = [r.fits[0] for r, after in itertools.pairwise(rounds) if after.model is not r.model]
+    found = [
+        replace(f, parameters={k: kept[f.name].parameters()[k] for k in f.parameters}) for f in added if f.name in kept
+    ]
     rho = last.rho if last else before
     predicted = last.predicted if last else null.mean
     excess = misfit(before) - len(values)
@@ -242,17 +268,19 @@ def concluded(
         replace(named(f, r, null, values), where=place, when=time_) for f, r in zip(found, rounds, strict=False)
     )
     rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.misfit < r.fits[0].misfit + SEPARATED]
-    parameters = off_nominal(case, model)
+    if not (rounds and not explained):
+        effects = (*(named_missing(m) for m in lacking), *effects)
+    parameters = {} if lacking else off_nominal(case, model)
     unknown, class_ = None, None
     if contradictions:
         verdict = "data"
     elif rounds and not (found and explained):
         verdict, effects = "unknown", ()
         unknown = {**structure(case, null, before), "best_candidate": found[0].name if found else None}
-    elif found and rivals and len(found) == 1:
+    elif found and rivals and len(found) == 1 and not lacking:
         verdict = "class"
         class_ = {"members": [found[0].name, *rivals], "experiment": candidate(found[0].name).experiment}
-    elif found:
+    elif found or lacking:
         verdict = "named"
     else:
         verdict = "parameter" if parameters else "none"
@@ -264,9 +292,9 @@ def concluded(
         class_=class_,
         parameters=parameters,
         data=tuple(c.text for c in contradictions),
-        gap=gap_of(case, null, values, predicted),
-        statistics=table(case, null, values, z, p, predicted, rho),
-        ranking=tuple(ranked(f, r, f in found) for r in rounds for f in r.fits),
+        gap=gap_of(case, null, values, given, predicted),
+        statistics=table(case, null, values, given, z, p, predicted, rho),
+        ranking=tuple(ranked(f, r, f in added) for r in rounds for f in r.fits),
         not_testable=tuple(untestable),
         bounds=(),
         patched=last.model if last else model,
@@ -275,6 +303,22 @@ def concluded(
         seed=case.seed,
         stages={},
     )
+
+
+def named_missing(found: Missing) -> NamedEffect:
+    """An effect of the base pixel, as the refit measured it."""
+    effect = found.effect
+    key = type(effect).strength
+    estimate = {key: Estimate(effect.parameters()[key], found.sd)}
+    share = 0.99 / (1 + len(found.also))
+    rivals = tuple((name, share) for name in found.also)
+    return NamedEffect(effect.name, candidate(effect.name).family, share, estimate, rivals)
+
+
+def in_order(other: Null, null: Null) -> Array:
+    """(S,) predictions of another model for the statistics of `null`; where it has none, those of `null`."""
+    there = dict(zip(other.keys, other.mean, strict=True))
+    return np.array([there.get(k, m) for k, m in zip(null.keys, null.mean, strict=True)])
 
 
 def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
@@ -300,12 +344,12 @@ def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
     return Ranked(found.name, candidate(found.name).family, before, found.misfit, parameters, accepted, reason)
 
 
-def gap_of(case: Case, null: Null, values: Array, after: Array) -> Gap:
+def gap_of(case: Case, null: Null, values: Array, given: Array, after: Array) -> Gap:
     """Mean square distance on held-out recordings, in noise."""
     use = np.array([_use(case, k.recording) for k in null.keys])
     held = use == "holdout" if np.any(use == "holdout") else np.ones(len(use), bool)
     square = lambda mean: np.nan_to_num((values - mean) / null.noise) ** 2  # noqa: E731
-    b, a = square(null.mean), square(after)
+    b, a = square(given), square(after)
     floor = 1.0
     by = {}
     for c in case.conditions:
@@ -317,9 +361,12 @@ def gap_of(case: Case, null: Null, values: Array, after: Array) -> Gap:
     return Gap(before, then, floor, removed, by)
 
 
-def table(case: Case, null: Null, values: Array, z: Array, p: Array, after: Array, rho: Array) -> tuple[Statistic, ...]:
+def table(
+    case: Case, null: Null, values: Array, given: Array, z: Array, p: Array, after: Array, rho: Array
+) -> tuple[Statistic, ...]:
+    """The bank as the result states it."""
     return tuple(
-        Statistic(f"{k.group}: {k.name}", k.group, (k.recording,), float(values[j]), float(null.mean[j]),
+        Statistic(f"{k.group}: {k.name}", k.group, (k.recording,), float(values[j]), float(given[j]),
                   float(after[j]), float(null.noise[j]), float(z[j]), float(rho[j]), float(p[j]),
                   _use(case, k.recording) == "holdout")
         for j, k in enumerate(null.keys)

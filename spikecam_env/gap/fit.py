@@ -22,6 +22,9 @@ from spikecam_env.sensor.effects.base import build
 
 Array = NDArray[np.float64]
 
+NEEDED = 15.0
+"""Misfit by which an effect found earlier has to be missed, once another has been added, to be kept."""
+
 UNITS = 24
 """Units drawn for the pattern statistics of one model."""
 
@@ -213,26 +216,76 @@ def _gauss_newton(
         nudged = with_effect(model, name, bounded(name, {**parameters, key: parameters[key] * 1.3}))
         there, _ = predict(case, nudged, within(nudged, base), null, 1, 100, only)
         columns.append((there - predicted) / np.log(1.3))
-    jacobian = np.stack(columns, axis=1)
-    noise2 = null.sd**2 * (2 + 1 / null.twins) + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2
-    gap = np.nan_to_num(measured - predicted)
-    w = (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
-    normal = jacobian.T @ (w[:, None] * jacobian)
-    normal += 0.02 * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(fitted))
-    step = np.clip(np.linalg.solve(normal, jacobian.T @ (w * gap)), -1.0, 1.0)
+    step = np.clip(_damped(null, measured, predicted, np.stack(columns, axis=1)), -1.0, 1.0)
     return {key: float(np.exp(s)) for key, s in zip(fitted, step, strict=True)}
 
 
 def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, count: int = 4) -> Fit:
     """The fit simulated anew with other draws, its unit settled once more: for the gate."""
-    if is_pattern(found.name):
-        return found
+    added = [e for e in found.model.effects if e not in model.effects]
+    frames = [e for e in added if not is_pattern(e.name)]
+    if not frames:
+        predicted = with_pattern(case, found.model, null, null.mean)
+        rho = residual(null, measured, predicted, UNITS)
+        return replace(found, predicted=predicted, rho=rho, misfit=misfit(rho))
     only = concerned(case, null, found.predicted - null.mean)
     _, refits = predict(case, found.model, within(found.model, found.base), null, 1, 200, only)
     base = settled(found.model, within(found.model, found.base), case.base, refits)
     predicted, _ = predict(case, found.model, base, null, count, 300, only)
+    if len(frames) < len(added):
+        predicted = with_pattern(case, found.model, null, predicted)
     rho = residual(null, measured, predicted, count)
     return replace(found, predicted=predicted, count=count, base=base, rho=rho, misfit=misfit(rho))
+
+
+def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Sequence[str]) -> Fit:
+    """All effects found so far, their strengths fitted together; one that is no longer needed is left out again.
+
+    model, null: as given, before any was added.
+    """
+    whole = found.model
+    for name in earlier:
+        fewer = confirmed(case, model, null, measured, replace(found, model=whole.without(name)), 2)
+        both = confirmed(case, model, null, measured, replace(found, model=whole), 2)
+        if fewer.misfit < both.misfit + NEEDED:
+            whole = whole.without(name)
+    names = [n for n in (*earlier, found.name) if n in {e.name for e in whole.effects}]
+    if len(names) > 1:
+        whole = _joint_step(case, null, measured, whole, names, found.base)
+    return confirmed(case, model, null, measured, replace(found, model=whole))
+
+
+def _joint_step(
+    case: Case, null: Null, measured: Array, model: SensorModel, names: Sequence[str], base: BaseFit
+) -> SensorModel:
+    """One Gauss-Newton step in the logarithms of the strengths."""
+    predicted = _mean_of(case, model, base, null)
+    columns, effects = [], {e.name: e for e in model.effects}
+    for name in names:
+        key = CATALOGUE[name].strength
+        nudged = bounded(name, {**effects[name].parameters(), key: effects[name].parameters()[key] * 1.25})
+        columns.append((_mean_of(case, with_effect(model, name, nudged), base, null) - predicted) / np.log(1.25))
+    step = _damped(null, measured, predicted, np.stack(columns, axis=1))
+    for name, s in zip(names, step, strict=True):
+        key = CATALOGUE[name].strength
+        value = effects[name].parameters()[key] * float(np.exp(np.clip(s, -0.7, 0.7)))
+        model = with_effect(model, name, bounded(name, {**effects[name].parameters(), key: value}))
+    return model
+
+
+def _mean_of(case: Case, model: SensorModel, base: BaseFit, null: Null) -> Array:
+    mean, _ = predict(case, model, within(model, base), null, 1, 400)
+    return with_pattern(case, model, null, mean)
+
+
+def _damped(null: Null, measured: Array, predicted: Array, jacobian: Array) -> Array:
+    """Robust, slightly damped least-squares step (n,) for a jacobian (S, n)."""
+    noise2 = null.sd**2 * (2 + 1 / null.twins) + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2
+    gap = np.nan_to_num(measured - predicted)
+    w = (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
+    normal = jacobian.T @ (w[:, None] * jacobian)
+    normal += 0.02 * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(normal))
+    return np.asarray(np.linalg.solve(normal, jacobian.T @ (w * gap)), dtype=np.float64)
 
 
 def _fit_pattern(

@@ -1,7 +1,8 @@
 """Moving light: what the refit leaves of the film, projected on what each kind of effect would do to it.
 
 The expected film x is the integral of gain L(t) + dark, at most a spike a frame.  Features are made orthogonal in
-this order, so that each says what those before it cannot: level, square, delay, skew, lag 16 / 64 / 256 / 2000 frames, blur, row, column, bloom.
+this order, so that each says what those before it cannot: level, square, delay, skew, lag 16 / 64 / 256 / 2000 frames,
+blur, row, column, bloom.
 """
 
 from __future__ import annotations

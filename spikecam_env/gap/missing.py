@@ -1,0 +1,64 @@
+"""Effects of the base pixel that a model lacks altogether: what the free refit had to move to meet the measurement.
+
+The refit measures response, dark level and jitter of every pixel.  Where it finds what the model has no effect for, the
+effect is missing, and the refit's value is its parameter; nothing has to be searched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.gap.case import Case
+from spikecam_env.gap.refit import DARK, DARK_PATTERN, NOISE, RESPONSE
+from spikecam_env.gap.units import width
+from spikecam_env.sensor import Effect, SensorModel
+from spikecam_env.sensor.effects import CATALOGUE
+from spikecam_env.sensor.effects.base import build
+
+LEAST_WIDTH = 5e-4
+"""Relative spread of pixels that is more than the refit's own error."""
+
+LEAST_JITTER = 1e-7
+"""s^2 that is more than none: a pixel of 10 million electrons."""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """An effect that is not in the model, and its size.  also: names that one V_d cannot tell it from."""
+
+    effect: Effect
+    sd: float
+    also: tuple[str, ...] = ()
+
+
+def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missing]:
+    """What the refit needs and the model has not, of the candidates in `names`; in the order of the pixel."""
+    has = {e.name for e in model.effects}
+    live = case.base.live
+    gain, dark, white = case.base.gain[live], case.base.dark[live], case.base.white
+    count = float(np.sqrt(2 * live.sum()))
+    to_pA = model.circuit.capacitance_fF * model.circuit.swing_V * model.frame_rate_hz * 1e-3
+    found: list[Missing] = []
+
+    def add(name: str, value: float, sd: float, also: tuple[str, ...] = ()) -> None:
+        if name in names:
+            effect = build(CATALOGUE, name, {CATALOGUE[name].strength: value})
+            found.append(Missing(effect, sd, also))
+
+    spread = width(gain)
+    if not has & set(RESPONSE) and spread > LEAST_WIDTH:
+        add("conversion_gain_spread", spread, spread / count, ("bias_voltage_spread", "capacitor_spread"))
+    level = float(np.median(dark))
+    error = float(np.median(case.base.dark_sd[live]))
+    if not has & set(DARK) and level > 5 * error / count:
+        add("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
+    if not has & set(DARK_PATTERN) and level > 0:
+        own = np.sqrt(max(width(dark) ** 2 - width(gain) ** 2 - (error / level) ** 2, 0.0))
+        if own * level > error:
+            add("dark_current_spread", own * level * to_pA, own * level * to_pA / count)
+    if not has & set(NOISE) and white > LEAST_JITTER:
+        add("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
+    return found
