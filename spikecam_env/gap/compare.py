@@ -84,6 +84,30 @@ def residual(null: Null, measured: Array, predicted: Array, twins: int) -> Array
     return np.nan_to_num((measured - predicted) / noise)
 
 
+def scale_of(gap: Array, effect: Array, variance: Array, tolerance: float = TOLERANCE) -> tuple[float, float]:
+    """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
+
+    gap, effect: (S,) measured and simulated change.  variance: (S,) of their difference.
+    Under a heavy-tailed loss there are many minima: it is followed down from every ratio that many statistics agree on.
+    """
+    clear = np.abs(effect) > 3.0 * np.sqrt(variance)
+    if not clear.any():
+        clear = np.abs(effect) >= np.sort(np.abs(effect / np.sqrt(variance)))[-1] * np.sqrt(variance)
+    ratios = gap[clear] / np.where(effect[clear] == 0, np.inf, effect[clear])
+    starts = np.unique(np.quantile(ratios, [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95]))
+    best = (np.inf, 0.0, np.inf)
+    for start in starts:
+        scale, total = float(start), 0.0
+        for _ in range(8):
+            noise2 = variance + (tolerance * scale * effect) ** 2
+            w = (HEAVY + 1.0) / (HEAVY + (gap - scale * effect) ** 2 / noise2) / noise2
+            total = float(np.sum(w * effect**2))
+            scale = float(np.sum(w * effect * gap)) / max(total, 1e-300)
+        left = misfit((gap - scale * effect) / np.sqrt(variance + (tolerance * scale * effect) ** 2))
+        best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))
+    return best[1], best[2]
+
+
 def misfit(rho: Array) -> float:
     """Heavy-tailed sum of squares: of order S for noise alone."""
     return float(np.sum((HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))
