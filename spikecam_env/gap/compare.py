@@ -43,7 +43,7 @@ def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key]) -> Null:
     """From simulated campaigns, for the statistics in `keys` that all of them have."""
     there = tuple(k for k in keys if all(k in b for b in banks))
     values = np.array([[b[k] for k in there] for b in banks])
-    floor = np.array([floor_of(k) for k in there])
+    floor = np.maximum([floor_of(k) for k in there], 1e-9)
     sd = values.std(axis=0, ddof=1)
     return Null(there, values.mean(axis=0), sd, floor, len(banks))
 
@@ -90,10 +90,11 @@ def scale_of(gap: Array, effect: Array, variance: Array, tolerance: float = TOLE
     gap, effect: (S,) measured and simulated change.  variance: (S,) of their difference.
     Under a heavy-tailed loss there are many minima: it is followed down from every ratio that many statistics agree on.
     """
-    clear = np.abs(effect) > 3.0 * np.sqrt(variance)
+    size = np.abs(effect) / np.sqrt(variance)
+    clear = (size > min(3.0, 0.5 * float(size.max()))) & (effect != 0)
     if not clear.any():
-        clear = np.abs(effect) >= np.sort(np.abs(effect / np.sqrt(variance)))[-1] * np.sqrt(variance)
-    ratios = gap[clear] / np.where(effect[clear] == 0, np.inf, effect[clear])
+        return 0.0, np.inf
+    ratios = gap[clear] / effect[clear]
     starts = np.unique(np.quantile(ratios, [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95]))
     best = (np.inf, 0.0, np.inf)
     for start in starts:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import itertools
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,7 +55,7 @@ def strongest_line(power: NDArray[np.float64]) -> tuple[int, float]:
     return at + 3, float(ratio[at])
 
 
-def frequency(frame: NDArray[np.int32], at: int) -> float:
+def frequency(frame: NDArray[Any], at: int) -> float:
     """Frequency [cycles a frame] of a line near bin `at`: where the transform is largest between the bins."""
     t = np.arange(len(frame))
     relative = (frame - frame.mean()) * np.hanning(len(frame))
