@@ -40,7 +40,9 @@ def regular_spikes(shape: tuple[int, int], frames: int = 500) -> NDArray[np.uint
 MADE = {"random": random_spikes, "regular": regular_spikes}
 
 
-@pytest.fixture(params=[(kind, shape) for kind in MADE for shape in SHAPES], ids=lambda p: f"{p[0]}-{p[1][0]}x{p[1][1]}")
+@pytest.fixture(
+    params=[(kind, shape) for kind in MADE for shape in SHAPES], ids=lambda p: f"{p[0]}-{p[1][0]}x{p[1][1]}"
+)
 def stream(request) -> NDArray[np.uint8]:
     kind, shape = request.param
     return MADE[kind](shape)
