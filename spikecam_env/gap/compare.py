@@ -43,7 +43,7 @@ def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key]) -> Null:
     """From simulated campaigns, for the statistics in `keys` that all of them have."""
     there = tuple(k for k in keys if all(k in b for b in banks))
     values = np.array([[b[k] for k in there] for b in banks])
-    floor = np.array([floor_of(k) for k in there])
+    floor = np.maximum([floor_of(k) for k in there], 1e-9)
     sd = values.std(axis=0, ddof=1)
     return Null(there, values.mean(axis=0), sd, floor, len(banks))
 
@@ -82,6 +82,31 @@ def residual(null: Null, measured: Array, predicted: Array, twins: int) -> Array
     effect = predicted - null.mean
     noise = np.sqrt(null.sd**2 * (1.0 + 1.0 / twins) + null.floor**2 + (TOLERANCE * effect) ** 2)
     return np.nan_to_num((measured - predicted) / noise)
+
+
+def scale_of(gap: Array, effect: Array, variance: Array, tolerance: float = TOLERANCE) -> tuple[float, float]:
+    """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
+
+    gap, effect: (S,) measured and simulated change.  variance: (S,) of their difference.
+    Under a heavy-tailed loss there are many minima: it is followed down from every ratio that many statistics agree on.
+    """
+    size = np.abs(effect) / np.sqrt(variance)
+    clear = (size > min(3.0, 0.5 * float(size.max()))) & (effect != 0)
+    if not clear.any():
+        return 0.0, np.inf
+    ratios = gap[clear] / effect[clear]
+    starts = np.unique(np.quantile(ratios, [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95]))
+    best = (np.inf, 0.0, np.inf)
+    for start in starts:
+        scale, total = float(start), 0.0
+        for _ in range(8):
+            noise2 = variance + (tolerance * scale * effect) ** 2
+            w = (HEAVY + 1.0) / (HEAVY + (gap - scale * effect) ** 2 / noise2) / noise2
+            total = float(np.sum(w * effect**2))
+            scale = float(np.sum(w * effect * gap)) / max(total, 1e-300)
+        left = misfit((gap - scale * effect) / np.sqrt(variance + (tolerance * scale * effect) ** 2))
+        best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))
+    return best[1], best[2]
 
 
 def misfit(rho: Array) -> float:

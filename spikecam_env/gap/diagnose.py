@@ -31,7 +31,7 @@ from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
-from spikecam_env.gap.statistics.spectrum import spectrum, strongest_line
+from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.structure import structure
 from spikecam_env.gap.templates import Screened, Templates, load, model_null, screen
 from spikecam_env.gap.words import sentence
@@ -215,13 +215,10 @@ def standing_on(null: Null, predicted: Array) -> Null:
 
 def line_of(case: Case) -> float | None:
     """Frequency [Hz] of the strongest line in steady light; None where no line stands out."""
-    lines = [
-        (*strongest_line(spectrum(o.frame))[::-1], o.frames)
-        for c, o in zip(case.conditions, case.observations, strict=True)
-        if not c.moves and o.frame.sum() > 1000
-    ]
-    ratio, at, frames = max(lines, default=(0.0, 0, 1))
-    return at / frames * case.frame_rate_hz if ratio > 30 else None
+    steady = [o.frame for c, o in zip(case.conditions, case.observations, strict=True) if not c.moves]
+    lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > 1000]
+    (ratio, at), frame = max(lines, key=lambda line: line[0][0], default=((0.0, 0), np.zeros(1)))
+    return frequency(frame, at) * case.frame_rate_hz if ratio > 30 else None
 
 
 def worth_fitting(screened: Sequence[Screened], before: float) -> list[Screened]:
@@ -323,7 +320,7 @@ def in_order(other: Null, null: Null) -> Array:
 
 def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
     """A candidate as the diagnosis names it, with its rivals and the share of the gap that each would remove."""
-    rivals = [(f, float(np.exp(-max(f.misfit - found.misfit, 0.0) / 2))) for f in turn.fits if f is not found]
+    rivals = [(f, float(np.exp(-max(f.misfit - found.misfit, 0.0) / 2))) for f in turn.fits if f.name != found.name]
     total = 1.0 + sum(w for _, w in rivals)
     parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
     return NamedEffect(

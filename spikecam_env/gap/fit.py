@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case, rests_on, settled, twins
-from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, residual, values_of
+from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, residual, scale_of, values_of
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -107,19 +107,10 @@ def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
     return out
 
 
-def scale_of(null: Null, measured: Array, effect: Array, twin_count: int) -> tuple[float, float]:
-    """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one."""
-    d = np.nan_to_num(measured - null.mean)
-    scale = 0.0
-    for _ in range(12):
-        noise2 = null.sd**2 * (1 + 1 / null.twins + 1 / twin_count) + null.floor**2 + (TOLERANCE * scale * effect) ** 2
-        rho2 = (d - scale * effect) ** 2 / noise2
-        w = (HEAVY + 1) / (HEAVY + rho2) / noise2
-        total = float(np.sum(w * effect**2))
-        if total <= 0:
-            return 0.0, np.inf
-        scale = float(np.sum(w * effect * d)) / total
-    return scale, float(1 / np.sqrt(total))
+def _scale(null: Null, measured: Array, predicted: Array) -> tuple[float, float]:
+    """Scale of a simulated effect that comes nearest to the measured statistics, and its standard error."""
+    variance = null.sd**2 * (2.0 + 1.0 / null.twins) + null.floor**2
+    return scale_of(np.nan_to_num(measured - null.mean), predicted - null.mean, variance)
 
 
 def _fit_twins(
@@ -143,7 +134,7 @@ def _fit_twins(
         tried = with_effect(model, name, parameters)
         predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
         base = settled(tried, within(tried, base), case.base, refits)
-        scale, sd = scale_of(null, measured, predicted - null.mean, 1)
+        scale, sd = _scale(null, measured, predicted)
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
         if factor < 0 and not _may_be_negative(name):
             factor = 0.1
@@ -154,7 +145,7 @@ def _fit_twins(
             if max(abs(np.log(f)) for f in step.values()) > 0.1:
                 continue
             predicted, _ = predict(case, with_effect(model, name, parameters), base, null, 1, 100, only)
-            scale, sd = scale_of(null, measured, predicted - null.mean, 1)
+            scale, sd = _scale(null, measured, predicted)
             factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
         if near or turn == 3:
             break

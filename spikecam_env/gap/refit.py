@@ -27,6 +27,10 @@ DARK_PATTERN = (*DARK[1:], *RESPONSE)
 NOISE = ("shot_noise", "reset_noise", "excess_threshold_noise")
 
 
+RESTLESS = 3.0
+"""Times the median A_16 from which a pixel is left out of the jitter."""
+
+
 @dataclass(frozen=True)
 class BaseFit:
     """A unit as its recordings show it.  gain, dark: (P,) thresholds a frame at radiance 1 and in the dark.
@@ -64,11 +68,23 @@ def measured_base(observations: list[Observation], conditions: list[Shown]) -> B
 
 def jitter_of(observations: list[Observation]) -> float:
     """s^2 pooled over static recordings; 3e-5 where nothing can be seen."""
-    rate = np.stack([np.where(o.times.count / o.frames > 0.9, np.nan, o.times.rate) for o in observations])
+    rate = np.stack(
+        [np.where((o.times.count / o.frames > 0.9) | restless(o), np.nan, o.times.rate) for o in observations]
+    )
     square = np.stack([o.times.square for o in observations])
     terms = np.stack([o.times.terms for o in observations]).astype(np.float64)
     jitter = fit_jitter(np.array(STEPS), square, terms, rate)
     return jitter.white if jitter else 3e-5
+
+
+def restless(o: Observation) -> NDArray[np.bool_]:
+    """(P,) pixels whose A_16 is far above the others': what troubles a few says nothing of the noise of all."""
+    terms = o.times.terms[:, STEPS.index(16)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = o.times.square[:, STEPS.index(16)] / terms * o.times.rate**2
+    usual = np.nanmedian(np.where(terms > 20, relative, np.nan)) if np.any(terms > 20) else np.inf
+    out: NDArray[np.bool_] = np.where(terms > 20, relative > RESTLESS * usual, False)
+    return out
 
 
 def within(model: SensorModel, base: BaseFit) -> BaseFit:

@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.case import Case, case_of, twins
-from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, null_of
+from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, scale_of
 from spikecam_env.gap.fit import UNITS, bounded, concerned, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.statistics import Key
@@ -102,7 +102,7 @@ def screen(
         if entry.name not in names:
             continue
         shift = np.where(at >= 0, entry.shift[at], 0.0)
-        scale = _scale(d, shift)
+        scale, _ = scale_of(d, shift, np.ones_like(d), 2 * TOLERANCE)
         strength = CATALOGUE[entry.name].strength
         power = 2.0 if candidate(entry.name).square else 1.0
         if scale <= 0 and not _signed(entry.name):
@@ -123,15 +123,6 @@ def screen(
 def _signed(name: str) -> bool:
     f = CATALOGUE[name].__dataclass_fields__[CATALOGUE[name].strength]
     return bool(f.metadata["bounds"] and f.metadata["bounds"][0] < 0)
-
-
-def _scale(d: Array, shift: Array) -> float:
-    scale = 0.0
-    for _ in range(12):
-        noise2 = 1.0 + (2 * TOLERANCE * scale * shift) ** 2
-        w = (HEAVY + 1) / (HEAVY + (d - scale * shift) ** 2 / noise2) / noise2
-        scale = float(np.sum(w * shift * d) / max(np.sum(w * shift**2), 1e-12))
-    return scale
 
 
 def _places(templates: Templates, conditions: Sequence[Shown], keys: Sequence[Key]) -> NDArray[np.int64]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import itertools
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,3 +53,12 @@ def strongest_line(power: NDArray[np.float64]) -> tuple[int, float]:
     ratio = low / np.maximum(local, 1e-30)
     at = int(np.argmax(ratio))
     return at + 3, float(ratio[at])
+
+
+def frequency(frame: NDArray[Any], at: int) -> float:
+    """Frequency [cycles a frame] of a line near bin `at`: where the transform is largest between the bins."""
+    t = np.arange(len(frame))
+    relative = (frame - frame.mean()) * np.hanning(len(frame))
+    fine = (at + np.linspace(-1.0, 1.0, 41)) / len(frame)
+    power = [abs(np.exp(-2j * np.pi * f * t) @ relative) for f in fine]
+    return float(fine[int(np.argmax(power))])
