@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.observe import BIN
 from spikecam_env.gap.statistics.moving import light_film
+from spikecam_env.gap.world import Shown
 
 Array = NDArray[np.float64]
 
@@ -72,8 +73,7 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
             continue
         if o.film is not None:
             seen = o.film.reshape(-1, *case.shape).astype(np.float64)
-            light = light_film(c.light, c.frames) * case.base.gain + BIN * case.base.dark
-            expected = light.reshape(-1, *case.shape).astype(np.float64)
+            expected = _expected_film(case, c).reshape(-1, *case.shape)
         else:
             seen = o.rate.reshape(1, *case.shape)
             others = [p.rate for j, p in enumerate(case.observations) if j != i and case.conditions[j].kind == "flat"]
@@ -88,6 +88,13 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
                 found.append(Contradiction("flipped", (c.name,), text))
                 break
     return found
+
+
+def _expected_film(case: Case, condition: Shown) -> Array:
+    """(bins, P) spikes of the refitted unit in moving light, at most one a frame."""
+    assert condition.light is not None
+    light = light_film(condition.light, condition.frames).astype(np.float64)
+    return np.minimum(light * case.base.gain + BIN * case.base.dark, BIN)
 
 
 def _correlation(a: Array, b: Array) -> float:
@@ -194,8 +201,7 @@ def _jump_steady(o) -> tuple[int, float] | None:  # type: ignore[no-untyped-def]
 
 def _jump_moving(case: Case, condition, o) -> tuple[int, float] | None:  # type: ignore[no-untyped-def]
     """(frame, missing) from how late each segment of the film is against its light."""
-    light = light_film(condition.light, condition.frames).astype(np.float64)
-    expected = light * case.base.gain + BIN * case.base.dark
+    expected = _expected_film(case, condition)
     parts = np.array_split(np.arange(len(expected)), SEGMENTS)
     coarse = [_shift(o.film, expected, part) for part in parts]
     if len(set(coarse)) > 1 and coarse[0] == 0:
