@@ -75,7 +75,7 @@ def test_noise_that_is_known_makes_a_normal_deviate():
 
 def test_deviates_keep_their_sign_and_stay_finite():
     z = normal(made_up(count=3), np.array([-1e9, 0.0, 1e9]))
-    assert z[0] == -z[2] and np.isfinite(z).all() and abs(z[2]) > 30 and z[1] == 0.0
+    assert z[0] == -z[2] and np.isfinite(z).all() and abs(z[2]) > 20 and z[1] == 0.0
 
 
 def test_an_unknown_statistic_is_no_deviation():
