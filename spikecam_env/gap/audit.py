@@ -80,9 +80,10 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
             if c.kind == "dark" or not others:
                 continue
             expected = np.mean([r / r.mean() for r in others], axis=0).reshape(1, *case.shape)
-        right = _correlation(seen, expected)
+        whole = (seen, expected), (seen.sum(axis=0)[None], expected.sum(axis=0)[None])  # in time, and its sum
         for name, (rows, columns) in turns.items():
-            turned = _correlation(seen[:, rows, columns], expected)
+            agree = [(_correlation(s[:, rows, columns], e), _correlation(s, e)) for s, e in whole]
+            turned, right = max(agree, key=lambda a: a[0] - a[1])
             if turned > 0.2 and turned > right + 0.5 * (1.0 - max(right, 0.0)):
                 text = f"{c.name}: {name}; so it agrees with the rest (correlation {turned:.2f}, as it is {right:.2f})"
                 found.append(Contradiction("flipped", (c.name,), text))
