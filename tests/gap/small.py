@@ -27,7 +27,7 @@ Spikes = NDArray[np.uint8]
 SHAPE = (32, 32)
 FRAMES = 2000
 MODEL = SensorModel.preset("scsim")
-DESIGN = (Dark(), *(Flat(radiance=x) for x in (0.03, 0.08, 0.2, 0.4, 0.65)), Step(), Bars(high=1.4, period=8.0),
+DESIGN = (Dark(), *(Flat(radiance=x) for x in (0.03, 0.08, 0.2, 0.4, 0.65)), Step(), Bars(high=1.4, period=16.0),
           Flat(radiance=0.5, use="holdout"))  # fmt: skip
 UNIT = 3
 TWINS = 12

@@ -12,7 +12,7 @@ SOME = [
     effect("missed_spikes", probability=0.004),
     effect("dead_time", tau_us=2.0),
 ]
-LINES = [effect("light_flicker", modulation=0.05, frequency_hz=400.0), SOME[0], SOME[1], SOME[2]]
+LINES = [effect("light_flicker", modulation=0.05, frequency_hz=400.0), SOME[0], SOME[1]]
 
 
 def mixed(shown_by, part) -> object:
@@ -55,6 +55,11 @@ def test_an_effect_from_half_way_on_is_timed(shown_by):
     print(f"when {when(case)!r}, where {where(case)!r}")
     assert when(case) == "from about half of each recording on"
     assert where(case) == ""
+
+
+def test_a_change_of_the_rate_half_way_is_timed():
+    """Which half is the odd one, a rate alone does not say."""
+    assert "half of each recording" in when(mixed(SOME[2], slice(FRAMES // 2, None)))
 
 
 def test_an_effect_that_ends_half_way_is_timed():
