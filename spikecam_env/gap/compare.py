@@ -84,13 +84,15 @@ def residual(null: Null, measured: Array, predicted: Array, twins: int) -> Array
     return np.nan_to_num((measured - predicted) / noise)
 
 
-def scale_of(gap: Array, effect: Array, variance: Array, tolerance: float = TOLERANCE) -> tuple[float, float]:
+def scale_of(
+    gap: Array, effect: Array, of_gap: Array, of_effect: Array, tolerance: float = TOLERANCE
+) -> tuple[float, float]:
     """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
 
-    gap, effect: (S,) measured and simulated change.  variance: (S,) of their difference.
+    gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.
     Under a heavy-tailed loss there are many minima: it is followed down from every ratio that many statistics agree on.
     """
-    size = np.abs(effect) / np.sqrt(variance)
+    size = np.abs(effect) / np.sqrt(of_gap + of_effect)
     clear = (size > min(3.0, 0.5 * float(size.max()))) & (effect != 0)
     if not clear.any():
         return 0.0, np.inf
@@ -100,11 +102,12 @@ def scale_of(gap: Array, effect: Array, variance: Array, tolerance: float = TOLE
     for start in starts:
         scale, total = float(start), 0.0
         for _ in range(8):
-            noise2 = variance + (tolerance * scale * effect) ** 2
+            noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
             w = (HEAVY + 1.0) / (HEAVY + (gap - scale * effect) ** 2 / noise2) / noise2
             total = float(np.sum(w * effect**2))
             scale = float(np.sum(w * effect * gap)) / max(total, 1e-300)
-        left = misfit((gap - scale * effect) / np.sqrt(variance + (tolerance * scale * effect) ** 2))
+        noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
+        left = misfit((gap - scale * effect) / np.sqrt(noise2))
         best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))
     return best[1], best[2]
 

@@ -10,8 +10,10 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -189,7 +191,8 @@ def search(
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left, line_of(case))
         tried = worth_fitting(screened, misfit(rho))
-        fits = [fit(case, now, here, values, s.name, s.start, s.expected) for s in tried]
+        with ThreadPoolExecutor(case.jobs) as pool:
+            fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
         fits.sort(key=lambda f: f.misfit)
         finalists = [f for f in fits if f.misfit < fits[0].misfit + CLOSE][:3]
         sure = [confirmed(case, now, here, values, f) for f in finalists]
@@ -205,6 +208,10 @@ def search(
         now, base, predicted, count = best.model, best.base, best.predicted, best.count
     rounds.append(Round(now, base, predicted, count, residual(null, values, predicted, count), ()))
     return rounds
+
+
+def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screened) -> Fit:
+    return fit(case, model, null, values, s.name, s.start, s.expected)
 
 
 def standing_on(null: Null, predicted: Array) -> Null:

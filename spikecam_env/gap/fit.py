@@ -109,8 +109,8 @@ def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
 
 def _scale(null: Null, measured: Array, predicted: Array) -> tuple[float, float]:
     """Scale of a simulated effect that comes nearest to the measured statistics, and its standard error."""
-    variance = null.sd**2 * (2.0 + 1.0 / null.twins) + null.floor**2
-    return scale_of(np.nan_to_num(measured - null.mean), predicted - null.mean, variance)
+    gap = np.nan_to_num(measured - null.mean)
+    return scale_of(gap, predicted - null.mean, null.noise**2, null.sd**2)
 
 
 def _fit_twins(

@@ -102,12 +102,12 @@ def screen(
         if entry.name not in names:
             continue
         shift = np.where(at >= 0, entry.shift[at], 0.0)
-        scale, _ = scale_of(d, shift, np.ones_like(d), 2 * TOLERANCE)
+        scale, _ = scale_of(d, shift, np.ones_like(d), np.ones_like(d), 2 * TOLERANCE)
         strength = CATALOGUE[entry.name].strength
         power = 2.0 if candidate(entry.name).square else 1.0
         if scale <= 0 and not _signed(entry.name):
             continue
-        rho = (d - scale * shift) / np.sqrt(1.0 + (2 * TOLERANCE * scale * shift) ** 2)
+        rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 + (2 * TOLERANCE * scale * shift) ** 2)
         measured_line = {"frequency_hz": line_hz} if line_hz and "frequency_hz" in entry.parameters else {}
         start = {
             **entry.parameters,

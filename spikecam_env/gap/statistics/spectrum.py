@@ -7,7 +7,6 @@ Reveals light_flicker (lines in the light), supply_ripple (in the dark too), com
 from __future__ import annotations
 
 import itertools
-
 from typing import Any
 
 import numpy as np
