@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 LEAST_LABEL = 1e-3
 """Relative error of a label that is worth a word."""
 
+LEAST_DARK = 0.02
+"""Relative difference of a dark recording from what the flats extrapolate to that is worth a word: of few spikes a
+pixel, the rate between first and last is biased by their number squared."""
+
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
 
@@ -166,6 +170,8 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
         return []
     if light[i] == 0:
         off = float(rate[i] / max(dark, 1e-9) - 1)
+        if abs(off) < LEAST_DARK:
+            return []
         text = f"{names[i]}: labelled dark, but {100 * off:+.2g} % off what the flats extrapolate to"
     else:
         text = (
