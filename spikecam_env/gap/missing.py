@@ -53,7 +53,7 @@ def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missin
         add("conversion_gain_spread", spread, spread / count, ("bias_voltage_spread", "capacitor_spread"))
     level = float(np.median(dark))
     error = float(np.median(case.base.dark_sd[live]))
-    if not has & set(DARK) and level > 5 * error / count:
+    if not has & set(DARK) and level > 5 * error / count and fires_in_the_dark(case, level):
         add("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
     if not has & set(DARK_PATTERN) and level > 0:
         own = np.sqrt(max(width(dark) ** 2 - width(gain) ** 2 - (error / level) ** 2, 0.0))
@@ -62,3 +62,13 @@ def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missin
     if not has & set(NOISE) and white > LEAST_JITTER:
         add("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
     return found
+
+
+def fires_in_the_dark(case: Case, level: float) -> bool:
+    """Whether the dark recordings hold a third of the spikes that a dark level [thresholds/frame] would give.
+
+    Phases are uniform, so `level` a frame is to be expected of every pixel; without a dark recording: True.
+    """
+    dark = [o for c, o in zip(case.conditions, case.observations, strict=True) if c.kind == "dark"]
+    expected = sum(level * o.frames * o.times.count.size for o in dark)
+    return not dark or sum(int(o.times.count.sum()) for o in dark) > expected / 3

@@ -61,10 +61,12 @@ def _outlying_counts(odd: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]
 
 
 def _outlying_means(values: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Fields whose median is off by SIGMAS of its own error, sqrt(pi / 2) sd / sqrt(n), and of the others' scatter."""
     mean = np.array([np.median(values[fields == f]) for f in range(FIELDS**2)])
     off = np.abs(mean - np.median(mean))
     inside = np.sort(off)[: FIELDS**2 - FIELDS]
-    return off > np.maximum(SIGMAS * np.sqrt(np.mean(inside**2)), 1e-4)
+    error = 1.2533 * np.array([values[fields == f].std() / np.sqrt((fields == f).sum()) for f in range(FIELDS**2)])
+    return off > np.maximum(SIGMAS * np.maximum(np.sqrt(np.mean(inside**2)), error), 1e-4)
 
 
 def _name(field: int, shape: tuple[int, int]) -> str:

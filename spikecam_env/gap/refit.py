@@ -37,7 +37,7 @@ class BaseFit:
 
     white: s^2 = 1/N + kappa^2 a spike.  gain_sd, dark_sd: (P,) standard errors.  residual: (R, P) relative distance of
     the static recordings' rates from the line gain L + dark, in the order given; NaN where unknown.
-    live: (P,) pixels that respond.
+    live: (P,) pixels that respond; all where most get darker in more light, which labels are to blame for.
     """
 
     gain: Array
@@ -62,7 +62,7 @@ def measured_base(observations: list[Observation], conditions: list[Shown]) -> B
     expected = gain * light + dark
     known = ~rates.saturated & (expected > 0) & (expected < 0.95) & np.isnan(rates.limit)
     residual = np.where(known, rates.rate / np.where(known, expected, 1.0) - 1.0, np.nan)
-    live = gain > 0.1 * np.median(gain)
+    live = gain > 0.1 * np.median(gain) if np.median(gain) > 0 else np.ones(gain.shape, bool)
     return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, live)
 
 

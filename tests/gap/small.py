@@ -1,0 +1,134 @@
+"""Small cameras for the tests of the diagnosis: a known unit, with or without an effect, recorded and refitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from spikecam_env.gap import Bars, Dark, Flat, Step
+from spikecam_env.gap.case import Case, case_of
+from spikecam_env.gap.compare import Null, deviates, values_of
+from spikecam_env.gap.observe import observe
+from spikecam_env.gap.refit import BaseFit, unit_of
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.templates import model_null, unit_as_base
+from spikecam_env.gap.twin import expose
+from spikecam_env.gap.world import Shown, planned
+from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
+from spikecam_env.streams import pack_frames, unpack_frames
+
+Spikes = NDArray[np.uint8]
+
+SHAPE = (32, 32)
+FRAMES = 2000
+MODEL = SensorModel.preset("scsim")
+DESIGN = (Dark(), *(Flat(radiance=x) for x in (0.03, 0.08, 0.2, 0.4, 0.65)), Step(), Bars(high=1.4, period=16.0),
+          Flat(radiance=0.5, use="holdout"))  # fmt: skip
+UNIT = 3
+TWINS = 12
+CLEAR = 5.0
+"""Normal deviates that a statistic is off by, to reveal an effect."""
+
+
+def effect(name: str, **parameters: float) -> Effect:
+    """An effect of the catalogue."""
+    return CATALOGUE[name](**parameters)
+
+
+def conditions(frames: int = FRAMES) -> list[Shown]:
+    """What the small design shows."""
+    return planned(DESIGN, SHAPE, frames)
+
+
+@lru_cache(maxsize=64)
+def unit(model: SensorModel = MODEL, seed: int = UNIT) -> BaseFit:
+    """A drawn unit, exactly."""
+    return unit_as_base(model.draw_unit(SHAPE, seed))
+
+
+def with_effects(model: SensorModel, effects: Sequence[Effect]) -> SensorModel:
+    """The model with effects added."""
+    for e in effects:
+        model = model.with_effect(e)
+    return model
+
+
+@lru_cache(maxsize=64)
+def recorded(*effects: Effect, seed: int = 1, model: SensorModel = MODEL) -> Case:
+    """The unit's campaign under the model with effects added, observed and refitted."""
+    return case_from(spikes_of(*effects, seed=seed, model=model), seed=seed)
+
+
+def spikes_of(
+    *effects: Effect, seed: int = 1, model: SensorModel = MODEL, frames: int = FRAMES, only: Sequence[str] = ()
+) -> dict[str, Spikes]:
+    """(F, H, W) spikes of every recording, by name; only: of these."""
+    there = with_effects(model, effects)
+    base = unit(there)
+    law = unit_of(there, base, SHAPE)
+    return {
+        c.name: unpack_frames(expose(there, law, c, base, SHAPE, seed, take), SHAPE)
+        for take, c in enumerate(conditions(frames))
+        if not only or c.name in only
+    }
+
+
+def case_from(spikes: dict[str, Spikes], seed: int = 1, shown: Sequence[Shown] | None = None) -> Case:
+    """A case of spikes that a test may have changed; lengths are those of the spikes."""
+    there = [replace(c, frames=len(spikes[c.name])) for c in shown or conditions() if c.name in spikes]
+    seen_by = [observe(pack_frames(spikes[c.name]), SHAPE, film=c.moves) for c in there]
+    return case_of(SHAPE, there, seen_by, seed)
+
+
+@lru_cache(maxsize=1)
+def null() -> Null:
+    """What the model predicts for this unit, without any effect."""
+    return model_null(recorded(seed=2), MODEL, TWINS)
+
+
+def seen(case: Case) -> dict[Key, float]:
+    """Every statistic of a case as a normal deviate from the model without effects."""
+    n = null()
+    return dict(zip(n.keys, deviates(n, values_of(case.bank, n.keys)), strict=True))
+
+
+def loudest(z: dict[Key, float], group: str) -> tuple[float, Key | None]:
+    """The largest |z| of a group."""
+    of = [(abs(v), k) for k, v in z.items() if k.group == group]
+    return max(of, default=(0.0, None))
+
+
+def summary(z: dict[Key, float]) -> str:
+    """One line: the loudest of every group."""
+    groups = dict.fromkeys(k.group for k in z)
+    return ", ".join(
+        f"{g} {loudest(z, g)[0]:.1f} ({loudest(z, g)[1].recording} {loudest(z, g)[1].name})" for g in groups
+    )
+
+
+def quiet(count: int) -> float:
+    """|z| that `count` normal deviates exceed once in a thousand times, with room for a null of TWINS twins."""
+    return float(stats.norm.isf(0.5e-3 / max(count, 1))) + 1.0
+
+
+def check_reveals(group: str, shown_by: Effect, where: str, names: Sequence[str], silent: Sequence[str] = ()) -> None:
+    """Of recording `where`, each statistic in `names` is more than CLEAR off with the effect and chance without.
+
+    silent: recordings, or other groups, that the effect leaves alone: nothing of them is off.
+    """
+    with_it, without = seen(recorded(shown_by)), seen(recorded(seed=5))
+    for name in names:
+        key = Key(group, where, name)
+        print(f"{shown_by.name}: {where} {name} {with_it[key]:.1f}, without {without[key]:.1f}")
+        assert abs(with_it[key]) > CLEAR
+        assert abs(without[key]) < quiet(1)
+    alone = {k: abs(z) for k, z in with_it.items() if (k.group == group and k.recording in silent) or k.group in silent}
+    if silent:
+        worst = max(alone, key=lambda k: alone[k])
+        print(f"left alone: at worst {worst} {alone[worst]:.1f} of {len(alone)}, at most {quiet(len(alone)):.1f}")
+        assert alone[worst] < quiet(len(alone))

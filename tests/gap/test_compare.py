@@ -1,0 +1,127 @@
+"""Distances in noise: what is chance, and what is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import special, stats
+
+from spikecam_env.gap.compare import (
+    HEAVY,
+    TOLERANCE,
+    Null,
+    adjusted,
+    deviates,
+    misfit,
+    normal,
+    null_of,
+    residual,
+    values_of,
+)
+from spikecam_env.gap.statistics import Key, floor_of
+
+
+def made_up(mean=0.0, sd=1.0, floor=0.0, twins=12, count=1) -> Null:
+    full = lambda v: np.full(count, float(v))  # noqa: E731
+    return Null(tuple(Key("g", "r", str(i)) for i in range(count)), full(mean), full(sd), full(floor), twins)
+
+
+def test_holm_of_a_hand_example():
+    """p = 0.01, 0.04, 0.03, 0.005: in order 4 x 0.005, 3 x 0.01, 2 x 0.03, and 0.04 may not be below 0.06."""
+    p = np.array([0.01, 0.04, 0.03, 0.005])
+    z = special.ndtri(p / 2) * np.array([1, -1, 1, -1])
+    assert adjusted(z) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+
+
+def test_adjusted_p_values_are_at_most_one_and_small_ones_keep_their_order():
+    z = np.array([0.0, 0.1, -30.0, 5.0, 38.0])
+    p = adjusted(z)
+    assert p.max() == 1.0 and p[4] < p[2] < p[3] < 1e-4
+
+
+@pytest.mark.parametrize("twins", [4, 8, 12])
+def test_false_alarms_are_as_often_as_asked_for_however_few_the_twins(twins):
+    """4000 campaigns of 20 statistics, alarm at 5 %: 5 -+ 4 sqrt(0.05 * 0.95 / 4000) % at most."""
+    rng = np.random.default_rng(twins)
+    alarms = 0
+    for _ in range(4000):
+        made = rng.standard_normal((twins, 20))
+        null = Null(made_up(count=20).keys, made.mean(axis=0), made.std(axis=0, ddof=1), np.zeros(20), twins)
+        alarms += adjusted(deviates(null, rng.standard_normal(20))).min() < 0.05
+    share, allowed = alarms / 4000, 0.05 + 4 * np.sqrt(0.05 * 0.95 / 4000)
+    print(f"{twins} twins: {share:.3f}, allowed {allowed:.3f}")
+    assert 0.02 < share < allowed
+
+
+@pytest.mark.parametrize("twins", [4, 12])
+def test_deviates_of_few_twins_are_normal(twins):
+    """Kolmogorov distance of 20 000: 1.95 / sqrt(n) once in a thousand times."""
+    rng = np.random.default_rng(0)
+    made = 3 + 2 * rng.standard_normal((twins, 20_000))
+    null = Null(made_up(count=20_000).keys, made.mean(axis=0), made.std(axis=0, ddof=1), np.zeros(20_000), twins)
+    z = deviates(null, 3 + 2 * rng.standard_normal(20_000))
+    distance = float(stats.kstest(z, "norm").statistic)
+    print(f"distance {distance:.4f}, sd {z.std():.3f}")
+    assert distance < 1.95 / np.sqrt(20_000)
+
+
+def test_noise_that_is_known_makes_a_normal_deviate():
+    """All floor: Student's t has no say.  All learnt: |z| of Student's t of 11 at 5 is 3.6 or so."""
+    assert normal(made_up(sd=1e-9, floor=1.0), np.array([5.0]))[0] == pytest.approx(5.0, abs=0.01)
+    learnt = float(normal(made_up(), np.array([5.0]))[0])
+    assert learnt == pytest.approx(stats.norm.isf(stats.t.sf(5.0, 11)))
+    assert learnt < 5.0
+
+
+def test_deviates_keep_their_sign_and_stay_finite():
+    z = normal(made_up(count=3), np.array([-1e9, 0.0, 1e9]))
+    assert z[0] == -z[2] and np.isfinite(z).all() and abs(z[2]) > 20 and z[1] == 0.0
+
+
+def test_an_unknown_statistic_is_no_deviation():
+    assert deviates(made_up(count=2), np.array([np.nan, 0.0])).tolist() == [0.0, 0.0]
+    assert residual(made_up(), np.array([np.nan]), np.zeros(1), 3)[0] == 0.0
+
+
+def test_noise_is_of_the_measurement_and_of_the_mean_of_twins():
+    assert made_up(sd=2.0, twins=4).noise[0] == pytest.approx(2 * np.sqrt(1.25))
+    assert made_up(sd=0.0, floor=0.3).noise[0] == 0.3
+
+
+def test_a_label_within_its_floor_is_no_deviation():
+    """Rates are known to 2e-5, whatever the number of spikes."""
+    key = Key("rates", "flat", "level")
+    null = null_of([{key: 1e-9 * n} for n in range(12)], [key])
+    assert null.floor[0] == floor_of(key) == 2e-5
+    within_floor, beyond = deviates(null, np.array([2e-5]))[0], deviates(null, np.array([2e-4]))[0]
+    print(f"{within_floor:.2f}, {beyond:.2f}")
+    assert within_floor == pytest.approx(1.0, abs=0.01) and beyond == pytest.approx(10.0, abs=0.1)
+
+
+def test_null_keeps_statistics_that_all_twins_have():
+    a, b = Key("g", "r", "a"), Key("g", "r", "b")
+    null = null_of([{a: 1.0, b: 2.0}, {a: 3.0}], [b, a])
+    assert null.keys == (a,) and null.mean.tolist() == [2.0] and null.sd[0] == pytest.approx(np.sqrt(2))
+    assert np.isnan(values_of({a: 1.0}, [a, b])[1])
+
+
+def test_residual_forgives_a_share_of_the_effects_own_size():
+    """An effect of 1000 noises that is simulated 5 % off leaves one noise of 50, not 50."""
+    null = made_up(count=2)
+    measured = np.array([1000.0, 0.0])
+    rho = residual(null, measured, np.array([1000.0 / (1 + TOLERANCE), 0.0]), 1)
+    print(rho)
+    assert rho[0] == pytest.approx(1.0, abs=0.06) and rho[1] == 0.0
+    assert residual(null, measured, np.array([500.0, 0.0]), 1)[0] > 15
+
+
+def test_misfit_of_noise_alone_is_about_the_number_of_statistics():
+    """E[9 log(1 + z^2 / 8)] = 0.98 of a statistic; 100 000 of them."""
+    z = np.random.default_rng(0).standard_normal(100_000)
+    print(f"{misfit(z) / z.size:.3f}")
+    assert misfit(z) / z.size == pytest.approx(0.98, abs=0.03)
+
+
+def test_misfit_grows_with_the_logarithm_of_what_is_far_off():
+    far, further = misfit(np.array([1e3])), misfit(np.array([1e4]))
+    assert further - far == pytest.approx((HEAVY + 1) * np.log(100), rel=1e-3)

@@ -1,0 +1,192 @@
+"""A diagnosis from files to verdict, on small campaigns."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small import DESIGN, FRAMES, MODEL, SHAPE, effect
+
+from spikecam_env.errors import InputError
+from spikecam_env.gap import Bars, Flat, Step, read_campaign, write_campaign
+from spikecam_env.gap.diagnose import diagnose, read_case
+from spikecam_env.gap.result import VERDICTS, Diagnosis
+from spikecam_env.sensor import SensorModel
+
+LAG = effect("photodiode_lag", fraction=0.08, tau_us=1000.0)
+FEW = 6
+"""Twins, to be quick."""
+KEYS = {
+    "format": str, "verdict": str, "sentence": str, "effects": list, "unknown": (dict, type(None)),
+    "class": (dict, type(None)), "parameters": dict, "data": list, "gap": (dict, type(None)), "discrepancies": list,
+    "not_testable": list, "bounds": list, "ranking": list, "model": str, "campaign": str, "seed": int,
+    "stages_s": dict, "elapsed_s": float,
+}  # fmt: skip
+
+
+def asked(campaign, model="scsim", **options) -> Diagnosis:
+    found = diagnose(campaign, model, **{"twin_count": FEW, "progress": False, **options})
+    print(found.verdict, [(e.name, e.parameters) for e in found.effects], found.sentence)
+    return found
+
+
+def written(folder: Path, model: SensorModel, recordings=DESIGN):
+    return write_campaign(folder, model, shape=SHAPE, frames=FRAMES, recordings=recordings, seed=4)
+
+
+@pytest.fixture(scope="module")
+def lagging(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("lagging"), MODEL.with_effect(LAG))
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("clean"), MODEL)
+
+
+@pytest.fixture(scope="module")
+def named(lagging) -> Diagnosis:
+    return asked(lagging)
+
+
+@pytest.fixture(scope="module")
+def nothing(clean) -> Diagnosis:
+    return asked(clean)
+
+
+def relabelled(campaign, name: str, factor: float, folder: Path):
+    """The campaign with one label multiplied, its files beside."""
+    folder.mkdir()
+    for path in campaign.folder.iterdir():
+        (folder / path.name).write_bytes(path.read_bytes())
+    entry = next(r for r in campaign.recordings if r.name == name)
+    with np.load(campaign.folder / f"{entry.name}.npz") as light:
+        changed = {"frame": light["frame"], "radiance": (light["radiance"] * factor).astype(np.float32)}
+    np.savez(folder / f"{entry.name}.npz", **changed)
+    return read_campaign(folder)
+
+
+def test_a_strong_effect_is_named_with_its_parameters(named):
+    """Within 15 % of the strength: the time constant, which goes with it, is one of a factor of two here."""
+    assert named.verdict == "named"
+    (found,) = named.effects
+    assert found.name == "photodiode_lag" and found.family == "lag" and found.confidence > 0.5
+    assert found.parameters["fraction"].value == pytest.approx(0.08, rel=0.15)
+    assert 500 < found.parameters["tau_us"].value < 2000
+
+
+def test_the_patched_model_holds_what_was_named_and_loads_back(named, tmp_path):
+    named.write(tmp_path)
+    model = SensorModel.load(tmp_path / "model.toml")
+    assert {e.name for e in model.effects} == {e.name for e in MODEL.effects} | {"photodiode_lag"}
+    patched = next(e for e in model.effects if e.name == "photodiode_lag")
+    assert patched.fraction == pytest.approx(named.effects[0].parameters["fraction"].value)
+
+
+def test_nothing_is_found_where_nothing_is_missing(nothing):
+    assert nothing.verdict == "none"
+    assert nothing.effects == () and nothing.ranking == () and nothing.unknown is None
+    assert nothing.patched == MODEL
+
+
+def test_the_gap_of_nothing_is_chance(nothing):
+    """Mean square of about 50 held-out statistics of one flat, some on a floor: 1 -+ 3 sqrt(2 / 20), or less."""
+    print(nothing.gap)
+    assert nothing.gap.before < 1 + 3 * np.sqrt(2 / 20)
+    assert nothing.gap.before == nothing.gap.after
+
+
+def test_a_wrong_label_is_the_datas_fault(clean, tmp_path):
+    found = asked(relabelled(clean, "flat-0.2", 1.02, tmp_path / "wrong"))
+    assert found.verdict == "data"
+    assert len(found.data) == 1 and found.data[0].startswith("flat-0.2")
+    assert found.to_json()["data"] == list(found.data)
+
+
+@pytest.mark.parametrize("which", ["named", "nothing"])
+def test_json_has_the_documented_entries(which, request, tmp_path):
+    diagnosis = request.getfixturevalue(which)
+    diagnosis.write(tmp_path)
+    said = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert list(said) == list(KEYS)
+    assert all(isinstance(said[k], kind) for k, kind in KEYS.items())
+    assert said["format"] == "spikecam-diagnosis/1" and said["verdict"] in VERDICTS
+    assert said["elapsed_s"] == pytest.approx(sum(said["stages_s"].values()))
+    assert set(said["gap"]) == {"before", "after", "floor", "removed", "by_recording"}
+    for e in said["effects"]:
+        assert {"name", "family", "confidence", "parameters", "alternatives"} <= set(e)
+        assert all(set(p) == {"value", "sd"} for p in e["parameters"].values())
+        assert all(set(a) == {"name", "confidence"} for a in e["alternatives"])
+    for d in said["discrepancies"]:
+        assert set(d) == {"statistic", "group", "recordings", "z", "p_adjusted"} and d["p_adjusted"] < 0.05
+    z = [abs(d["z"]) for d in said["discrepancies"]]
+    assert z == sorted(z, reverse=True)
+    assert all(set(n) == {"name", "needs"} for n in said["not_testable"])
+
+
+def test_the_same_seed_gives_the_same_answer(lagging, named):
+    again = asked(lagging)
+    assert again.to_json() | {"stages_s": 0, "elapsed_s": 0} == named.to_json() | {"stages_s": 0, "elapsed_s": 0}
+
+
+def test_threads_change_nothing(clean, nothing):
+    assert asked(clean, jobs=2).statistics == nothing.statistics
+
+
+def test_a_name_that_is_excluded_is_not_named(lagging):
+    found = asked(lagging, exclude=["photodiode_lag"])
+    names = {e.name for e in found.effects} | {r.name for r in found.ranking}
+    names |= {n for n, _ in found.not_testable} | set((found.class_ or {}).get("members", ()))
+    print(names)
+    assert "photodiode_lag" not in names
+    assert found.verdict == "unknown" and found.exclude == ("photodiode_lag",)
+
+
+def test_only_candidates_are_tried(lagging):
+    only = ("photodiode_lag", "crosstalk")
+    found = asked(lagging, candidates=only)
+    assert {r.name for r in found.ranking} <= set(only)
+    assert [e.name for e in found.effects] == ["photodiode_lag"] and found.candidates == only
+
+
+def test_what_a_campaign_cannot_show_is_said_with_what_it_needs(tmp_path):
+    still = tuple(p for p in DESIGN if not isinstance(p, Step | Bars))
+    found = asked(written(tmp_path, MODEL, still))
+    needs = dict(found.not_testable)
+    print(needs)
+    assert found.verdict == "none"
+    for name in ("photodiode_lag", "readout_skew", "optical_blur", "blooming"):
+        assert name in needs and needs[name].startswith("a recording with")
+
+
+def test_a_campaign_without_holdout_is_diagnosed(clean, tmp_path):
+    found = asked(written(tmp_path, MODEL, tuple(p for p in DESIGN if p.use == "fit")))
+    assert found.verdict == "none"
+
+
+def test_unknown_names_are_errors_that_say_so(clean):
+    for option in ("candidates", "exclude"):
+        with pytest.raises(InputError, match="'dead_tim'"):
+            asked(clean, **{option: ["dead_tim"]})
+    with pytest.raises(InputError, match="'scs'"):
+        asked(clean, "scs")
+
+
+def test_a_folder_that_is_no_campaign_is_an_error(tmp_path):
+    with pytest.raises(InputError, match="no campaign"):
+        asked(tmp_path)
+
+
+def test_too_few_static_recordings_are_an_error(tmp_path):
+    campaign = written(tmp_path, MODEL, (Flat(radiance=0.2), Step()))
+    with pytest.raises(InputError, match="fewer than two static recordings"):
+        asked(campaign)
+
+
+def test_another_voltage_than_most_is_left_out(clean):
+    odd = replace(clean.recordings[2], v_d=0.7)
+    case = read_case(replace(clean, recordings=(*clean.recordings[:2], odd, *clean.recordings[3:])))
+    assert [c.name for c in case.conditions] == [r.name for r in clean.recordings if r.name != odd.name]

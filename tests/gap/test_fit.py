@@ -1,0 +1,127 @@
+"""Scaling an effect to a measurement, its bounds, and which recordings it concerns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small import MODEL, effect, null, recorded
+
+from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_pattern, testable
+from spikecam_env.gap.compare import Null, misfit, values_of
+from spikecam_env.gap.fit import bounded, concerned, fit, scale_of, with_effect
+from spikecam_env.gap.statistics import Key
+from spikecam_env.sensor import CATALOGUE
+
+KEYS = tuple(Key("g", "r", str(i)) for i in range(200))
+
+
+def flat_null() -> Null:
+    return Null(KEYS, np.zeros(200), np.ones(200), np.zeros(200), 12)
+
+
+@pytest.mark.parametrize("true", [1.0, 0.2, 4.0, -1.0])
+def test_scale_is_recovered_within_its_stated_error(true):
+    """An effect of 20 noises in 40 of 200 statistics."""
+    rng = np.random.default_rng(1)
+    change = np.where(np.arange(200) < 40, 20.0 * rng.standard_normal(200), 0.0)
+    scale, sd = scale_of(flat_null(), true * change + rng.standard_normal(200), change, 1)
+    print(f"{scale:.4f} +- {sd:.4f}")
+    assert abs(scale - true) < 4 * sd and sd < 0.1 * max(abs(true), 0.2)
+
+
+def test_an_effect_that_shows_nowhere_has_no_scale():
+    assert scale_of(flat_null(), np.ones(200), np.zeros(200), 1) == (0.0, np.inf)
+
+
+def test_a_few_statistics_that_another_effect_moves_do_not_move_the_scale_much():
+    rng = np.random.default_rng(1)
+    change = np.where(np.arange(200) < 40, 20.0, 0.0)
+    measured = change + rng.standard_normal(200)
+    measured[:4] += 500.0
+    scale, _ = scale_of(flat_null(), measured, change, 1)
+    print(f"{scale:.3f}")
+    assert scale == pytest.approx(1.0, abs=0.05)
+
+
+def test_parameters_are_kept_within_their_bounds_and_whole_where_they_count():
+    assert bounded("photodiode_lag", {"fraction": 3.0, "tau_us": 10.0})["fraction"] <= 1.0
+    assert bounded("afterpulsing", {"delay_frames": 2.7})["delay_frames"] == 3
+    assert "nothing" not in bounded("dead_time", {"nothing": 1.0})
+
+
+def test_with_effect_adds_or_replaces_one_effect():
+    once = with_effect(MODEL, "dead_time", {"tau_us": 0.1})
+    twice = with_effect(once, "dead_time", {"tau_us": 0.2})
+    assert len(once.effects) == len(twice.effects) == len(MODEL.effects) + 1
+    assert [e.tau_us for e in twice.effects if e.name == "dead_time"] == [0.2]
+
+
+def test_an_effect_of_moving_light_concerns_the_moving_recordings_only():
+    case = recorded()
+    noise = null().noise
+    change = np.array([20.0 * n if k.group == "step" else 0.0 for k, n in zip(null().keys, noise, strict=True)])
+    names = [case.conditions[i].name for i in concerned(case, null(), change) or ()]
+    assert names == ["step"]
+
+
+def test_an_effect_on_one_flat_concerns_all_that_the_refit_rests_on():
+    case = recorded()
+    there = [(k.group, k.recording) == ("rates", "flat-0.65") for k in null().keys]
+    which = concerned(case, null(), np.where(there, 20.0 * null().noise, 0.0))
+    still = {i for i, c in enumerate(case.conditions) if c.kind in ("dark", "flat")}
+    assert which is None or still <= set(which)
+
+
+@pytest.mark.parametrize("start", [0.5, 2.0])
+def test_fit_of_the_true_effect_finds_its_strength_from_half_or_twice_of_it(start):
+    """Lag of 8 %, the time constant free; the fit leaves about as much as chance."""
+    true = effect("photodiode_lag", fraction=0.08, tau_us=1000.0)
+    case = recorded(true)
+    measured = values_of(case.bank, null().keys)
+    found = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08 * start, "tau_us": 1000.0})
+    print(found.parameters, found.sd, f"misfit {found.misfit:.0f} of {len(measured)}")
+    assert found.parameters["fraction"] == pytest.approx(0.08, rel=0.15)
+    assert found.misfit < 1.5 * len(measured)
+    assert found.model.effects[-1].name == "photodiode_lag" or "photodiode_lag" in {e.name for e in found.model.effects}
+
+
+def test_a_wrong_effect_leaves_more_than_the_right_one():
+    case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
+    measured = values_of(case.bank, null().keys)
+    right = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
+    wrong = fit(case, MODEL, null(), measured, "readout_skew", {"span": 0.5})
+    print(f"right {right.misfit:.0f}, wrong {wrong.misfit:.0f}")
+    assert wrong.misfit > right.misfit + 40
+    assert misfit(right.rho) == right.misfit
+
+
+# ---- candidates
+
+
+def test_every_effect_of_the_catalogue_is_a_candidate_with_a_strength():
+    assert set(CANDIDATES) == set(CATALOGUE)
+    for name, what in CANDIDATES.items():
+        assert what.fitted[0] == CATALOGUE[name].strength, name
+        assert set(what.fitted) | set(what.shapes) <= set(CATALOGUE[name].__dataclass_fields__), name
+
+
+def test_an_effect_without_a_line_of_its_own_is_fitted_by_its_strength(monkeypatch):
+    monkeypatch.delitem(CANDIDATES, "dead_time")
+    assert candidate("dead_time").fitted == ("tau_us",) and candidate("dead_time").family == "other"
+
+
+def test_pattern_effects_are_those_that_only_draw_units():
+    assert is_pattern("hot_pixels") and is_pattern("row_fixed_pattern") and not is_pattern("dead_time")
+    assert not is_pattern("optical_blur") and not is_pattern("reset_noise")
+
+
+def test_what_the_model_has_is_no_candidate():
+    names = chosen(MODEL, None, ["crosstalk"])
+    assert not set(names) & ({e.name for e in MODEL.effects} | {"crosstalk"})
+    assert chosen(MODEL, ["dead_time", "shot_noise"], []) == ["dead_time"]
+
+
+def test_what_needs_motion_is_not_testable_in_steady_light():
+    still = [c for c in recorded().conditions if not c.moves]
+    kept, lacking = testable(["dead_time", "readout_skew", "optical_blur"], still)
+    assert kept == ["dead_time"] and [n for n, _ in lacking] == ["readout_skew", "optical_blur"]

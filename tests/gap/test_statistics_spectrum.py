@@ -1,0 +1,36 @@
+"""Power spectrum of the array's spikes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small import FRAMES, check_reveals, effect
+
+from spikecam_env.gap.statistics.spectrum import BANDS, bands, spectrum, strongest_line
+
+CASES = [
+    (effect("light_flicker", modulation=0.02, frequency_hz=400.0), "flat-0.65", ["line", "band 2"], ["dark", "rates"]),
+    (effect("supply_ripple", ripple=0.002, frequency_hz=400.0), "flat-0.65", ["line", "band 2"], ["rates"]),
+    (effect("common_threshold_noise", sigma_mV=3.0), "dark", ["band 7"], ["rates", "intervals"]),
+    (effect("clock_jitter", sigma_ns=2000.0), "flat-0.65", ["band 7"], ["step"]),
+]
+
+
+@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
+def test_spectrum_reveal(shown_by, where, names, silent):
+    check_reveals("spectrum", shown_by, where, names, silent)
+
+
+@pytest.mark.parametrize("cycles", [5, 20, 200])
+def test_strongest_line_is_at_its_cycles(cycles):
+    """A sine of amplitude a over noise of deviation s has power a^2 F / 4 s^2 over the noise's; here 45."""
+    t = np.arange(4000)
+    rate = 200 + 3 * np.sin(2 * np.pi * cycles * t / t.size) + np.random.default_rng(0).normal(0, 14, t.size)
+    at, ratio = strongest_line(spectrum(rate))
+    print(f"{at} cycles, {ratio:.0f} over the median")
+    assert at == cycles and 20 < ratio < 160
+
+
+def test_bands_go_on_from_each_other_to_half_the_rate():
+    edges = bands(FRAMES)
+    assert edges[0] == 3 and edges[-1] == FRAMES // 2 and (edges[1:] > edges[:-1]).all() and edges.size == BANDS + 1

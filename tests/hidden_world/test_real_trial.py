@@ -1,0 +1,38 @@
+"""The blind trial end to end, with the real diagnosis, on two tiny cases."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+from spikecam_env.cli.blind_trial import BlindTrial, hidden_world
+from tests.hidden_world.trial import chosen
+
+SHAPE, FRAMES = (32, 32), 2000
+
+
+def test_trial_runs_the_real_diagnosis_and_scores_it(tmp_path, monkeypatch, capsys):
+    """A camera with nothing hidden and a strong effect; what is checked is that it works, not how well."""
+    trial = hidden_world(Path(__file__).parent)
+
+    def tiny(*options):
+        return [replace(c, recipe=replace(c.recipe, shape=SHAPE, frames=FRAMES)) for c in chosen(*options)]
+
+    monkeypatch.setattr(trial, "chosen", tiny)
+    BlindTrial(tmp_path, set="quick", part="tune", only=["none", "tricky"], limit=1).run()
+    printed = capsys.readouterr().out
+    print(printed)
+    results = [json.loads(p.read_text()) for p in sorted((tmp_path / "results").glob("*.json"))]
+    assert len(results) == 2
+    for result in results:
+        assert "error" not in result, result.get("error")
+        assert result["diagnosis"]["format"] == "spikecam-diagnosis/1"
+        made = {p.name for p in (tmp_path / "diagnoses" / result["id"]).iterdir()}
+        assert made == {"diagnosis.json", "model.toml", "report.html"}
+    scores = json.loads((tmp_path / "trial.json").read_text())
+    assert (scores["cases"], scores["of"], scores["errors"]) == (2, 2, 0)
+    assert "false alarms, nothing hidden" in printed and (tmp_path / "trial.md").is_file()
+    verdicts = {s["group"]: s["answer"] for s in scores["scored"]}
+    print(verdicts)
+    assert set(verdicts) == {"none", "tricky"}
