@@ -40,9 +40,10 @@ def effect(name: str, **parameters: float) -> Effect:
     return CATALOGUE[name](**parameters)
 
 
-def conditions(frames: int = FRAMES) -> list[Shown]:
+@lru_cache(maxsize=1)
+def conditions() -> list[Shown]:
     """What the small design shows."""
-    return planned(DESIGN, SHAPE, frames)
+    return planned(DESIGN, SHAPE, FRAMES)
 
 
 @lru_cache(maxsize=64)
@@ -64,18 +65,17 @@ def recorded(*effects: Effect, seed: int = 1, model: SensorModel = MODEL) -> Cas
     return case_from(spikes_of(*effects, seed=seed, model=model), seed=seed)
 
 
-def spikes_of(
-    *effects: Effect, seed: int = 1, model: SensorModel = MODEL, frames: int = FRAMES, only: Sequence[str] = ()
-) -> dict[str, Spikes]:
-    """(F, H, W) spikes of every recording, by name; only: of these."""
+def spikes_of(*effects: Effect, seed: int = 1, model: SensorModel = MODEL) -> dict[str, Spikes]:
+    """(F, H, W) spikes of every recording, by name, for a test to change."""
+    return {name: unpack_frames(packed, SHAPE) for name, packed in _packed(effects, seed, model).items()}
+
+
+@lru_cache(maxsize=64)
+def _packed(effects: tuple[Effect, ...], seed: int, model: SensorModel) -> dict[str, Spikes]:
     there = with_effects(model, effects)
     base = unit(there)
     law = unit_of(there, base, SHAPE)
-    return {
-        c.name: unpack_frames(expose(there, law, c, base, SHAPE, seed, take), SHAPE)
-        for take, c in enumerate(conditions(frames))
-        if not only or c.name in only
-    }
+    return {c.name: expose(there, law, c, base, SHAPE, seed, take) for take, c in enumerate(conditions())}
 
 
 def case_from(spikes: dict[str, Spikes], seed: int = 1, shown: Sequence[Shown] | None = None) -> Case:
