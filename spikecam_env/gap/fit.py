@@ -132,7 +132,7 @@ def _fit_twins(
     power = 2.0 if what.square else 1.0
     base = within(model, case.base)
     parameters = bounded(name, parameters)
-    only = None if expected is None else concerned(case, null, expected)
+    only = None if expected is None else concerned(case, null, measured, expected)
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
         predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
@@ -153,7 +153,7 @@ def _fit_twins(
         if near or turn == TURNS - 1:
             break
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
-        only = concerned(case, null, (predicted - null.mean) * factor**power)
+        only = concerned(case, null, measured, (predicted - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
     scaled = null.mean + moved * (predicted - null.mean)
@@ -172,12 +172,14 @@ def _fit_twins(
     )
 
 
-def concerned(case: Case, null: Null, effect: Array) -> list[int] | None:
-    """Recordings on which an effect shows, by index; with those that the refit rests on where it shows on one of them.
+def concerned(case: Case, null: Null, measured: Array, effect: Array) -> list[int] | None:
+    """Recordings on which an effect shows, or something has to be explained, by index; with those that the refit rests
+    on where one of them is among these.
 
     None for all.
     """
-    shows = {k.recording for k, e, n in zip(null.keys, effect, null.noise, strict=True) if abs(e) > 5 * n}
+    seen = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean))) > 5 * null.noise
+    shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
     which = {i for i, c in enumerate(case.conditions) if c.name in shows}
     if not which:
         return None
@@ -222,7 +224,7 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
         predicted = with_pattern(case, found.model, null, null.mean)
         rho = residual(null, measured, predicted, UNITS)
         return replace(found, predicted=predicted, rho=rho, misfit=misfit(rho))
-    only = concerned(case, null, found.predicted - null.mean)
+    only = concerned(case, null, measured, found.predicted - null.mean)
     _, refits = predict(case, found.model, within(found.model, found.base), null, 1, 200, only)
     base = settled(found.model, within(found.model, found.base), case.base, refits)
     predicted, _ = predict(case, found.model, base, null, count, 300, only)
