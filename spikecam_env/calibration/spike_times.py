@@ -14,6 +14,8 @@ import numpy as np
 from numba import config, njit
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.streams.bits import as_words, by_pixel, times_of
+
 STEPS = (1, 2, 4, 8, 16, 32, 64, 128)
 """k of A_k by default: short ones see dim light's jitter, long ones bright light's and slow noise."""
 
@@ -48,51 +50,46 @@ def spike_times(
     threads: default NUMBA_NUM_THREADS.
     """
     ks = np.asarray(steps, dtype=np.int64)
-    bits = np.asarray(packed)
-    whole = bits.shape[1] * 8
+    words = as_words(np.asarray(packed))
+    whole = words.shape[1] * 64
     ends = np.full((whole, 3), -1, dtype=np.int64)
     square = np.zeros((whole, ks.size))
     terms = np.zeros((whole, ks.size), dtype=np.int64)
     workers = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
-    cuts = np.linspace(0, bits.shape[1], max(1, min(workers, bits.shape[1])) + 1).astype(int)
+    cuts = np.linspace(0, words.shape[1], max(1, min(workers, words.shape[1])) + 1).astype(int)
     with ThreadPoolExecutor(len(cuts) - 1) as pool:
-        jobs = [pool.submit(_scan, bits, a, b, ks, ends, square, terms) for a, b in pairwise(cuts)]
+        jobs = [pool.submit(_scan, words, a, b, ks, ends, square, terms) for a, b in pairwise(cuts)]
         for job in jobs:
             job.result()
     count, first, last = ends[:pixels].T
-    return SpikeTimes(len(bits), count, first, last, ks, square[:pixels], terms[:pixels])
+    return SpikeTimes(len(words), count, first, last, ks, square[:pixels], terms[:pixels])
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _scan(bits, first_byte, last_byte, ks, ends, square, terms):  # type: ignore[no-untyped-def]
-    frames = bits.shape[0]
-    times = np.empty((8, frames), np.int32)
-    count = np.empty(8, np.int64)
-    for column in range(first_byte, last_byte):
-        count[:] = 0
-        for t in range(frames):
-            byte = bits[t, column]
-            if byte:
-                for bit in range(8):
-                    if (byte >> bit) & 1:
-                        times[bit, count[bit]] = t
-                        count[bit] += 1
-        for bit in range(8):
-            pixel, n = 8 * column + bit, count[bit]
+def _scan(words, first_word, last_word, ks, ends, square, terms):  # type: ignore[no-untyped-def]
+    frames = words.shape[0]
+    bits = np.empty((64, (frames + 63) // 64), np.uint64)
+    times = np.empty(frames + 1, np.int32)
+    for column in range(first_word, last_word):
+        by_pixel(words, column, bits)
+        for within in range(64):
+            pixel = 64 * column + within
+            n = times_of(bits[within], times)
             ends[pixel, 0] = n
             if n == 0:
                 continue
-            ends[pixel, 1] = times[bit, 0]
-            ends[pixel, 2] = times[bit, n - 1]
+            ends[pixel, 1] = times[0]
+            ends[pixel, 2] = times[n - 1]
             for i in range(ks.size):
                 k = ks[i]
                 if n > 2 * k:
-                    square[pixel, i] = _second_differences(times[bit], n, k)
+                    square[pixel, i] = second_differences(times, n, k)
                     terms[pixel, i] = n - 2 * k
 
 
 @njit(inline="always")
-def _second_differences(t, n, k):  # type: ignore[no-untyped-def]
+def second_differences(t, n, k):  # type: ignore[no-untyped-def]
+    """Sum of (t_(i+2k) - 2 t_(i+k) + t_i)^2 over the n spike times at the start of t."""
     total = np.float64(0.0)
     for start in range(0, n - 2 * k, 4096):  # in blocks, so that int64 sums vectorise and cannot overflow
         part = np.int64(0)

@@ -88,7 +88,7 @@ CANDIDATES: dict[str, Candidate] = {
     "reset_noise": Candidate("noise", ("sigma_mV",), square=True, needs=_steady, experiment=_SECOND),
     "shot_noise": Candidate("noise", ("quanta",), needs=_steady, experiment=_SECOND),
     "random_telegraph_noise": Candidate(
-        "dark", ("amplitude_pA", "fraction"), {"dwell_ms": (0.5, 3.0, 20.0)}, square=True, needs=_steady
+        "dark", ("amplitude_pA", "fraction", "dwell_ms"), {"dwell_ms": (0.5, 3.0, 20.0)}, square=True, needs=_steady
     ),
     "dark_current_drift": Candidate("dark", ("rise", "tau_ms"), {"tau_ms": (10.0, 50.0, 200.0)}, needs=_dark),
     "dark_current": Candidate("dark", ("mean_pA",), needs=_dark),

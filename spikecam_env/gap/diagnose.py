@@ -28,6 +28,7 @@ from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, misfit, normal, residual, values_of
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
+from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
@@ -35,7 +36,7 @@ from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.structure import structure
-from spikecam_env.gap.templates import Screened, Templates, load, model_null, screen
+from spikecam_env.gap.templates import Screened, Templates, bounds, load, model_null, screen
 from spikecam_env.gap.words import sentence
 from spikecam_env.gap.world import observed, shown
 from spikecam_env.sensor import SensorModel
@@ -131,8 +132,11 @@ def diagnose(
         unit = rounds[-1].base if rounds else within(start, case.base)
         changed = after is not assumed
         evidence = evidence_of(case, assumed, base, *((after, unit) if changed else ()))
+    if found.verdict in ("none", "parameter"):
+        found = replace(found, bounds=tuple(bounds(templates or load(), case.conditions, null, values, names)))
     found = replace(
         found,
+        gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
         model_name=assumed.name if isinstance(model, SensorModel) else str(model),
         candidates=None if candidates is None else tuple(candidates),
@@ -354,15 +358,21 @@ def gap_of(case: Case, null: Null, values: Array, given: Array, after: Array) ->
     held = use == "holdout" if np.any(use == "holdout") else np.ones(len(use), bool)
     square = lambda mean: np.nan_to_num((values - mean) / null.noise) ** 2  # noqa: E731
     b, a = square(given), square(after)
-    floor = 1.0
     by = {}
     for c in case.conditions:
         of = np.array([k.recording == c.name for k in null.keys])
         if np.any(of):
-            by[c.name] = {"before": float(b[of].mean()), "after": float(a[of].mean()), "floor": floor}
+            by[c.name] = {"before": float(b[of].mean()), "after": float(a[of].mean()), "floor": 1.0}
     before, then = float(b[held].mean()), float(a[held].mean())
-    removed = (before - then) / (before - floor) if before > 1.5 * floor else 0.0
-    return Gap(before, then, floor, removed, by)
+    return grounded(Gap(before, then, 1.0, 0.0, by), 1.0)
+
+
+def grounded(gap: Gap, floor: float) -> Gap:
+    """A gap with its floor: what two halves of the measurement differ by, or 1 where there are no halves."""
+    ground = floor if np.isfinite(floor) else 1.0
+    removed = (gap.before - gap.after) / (gap.before - ground) if gap.before > 1.5 * ground else 0.0
+    by = {name: {**values, "floor": ground} for name, values in gap.by_recording.items()}
+    return Gap(gap.before, gap.after, ground, removed, by)
 
 
 def table(

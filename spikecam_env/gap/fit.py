@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 NEEDED = 15.0
 """Misfit by which an effect found earlier has to be missed, once another has been added, to be kept."""
 
+TURNS = 5
+"""Most twins, Gauss-Newton steps apart, that the fit of one candidate takes."""
+
 UNITS = 24
 """Units drawn for the pattern statistics of one model."""
 
@@ -130,7 +133,7 @@ def _fit_twins(
     base = within(model, case.base)
     parameters = bounded(name, parameters)
     only = None if expected is None else concerned(case, null, expected)
-    for turn in range(4):
+    for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
         predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
         base = settled(tried, within(tried, base), case.base, refits)
@@ -139,7 +142,7 @@ def _fit_twins(
         if factor < 0 and not _may_be_negative(name):
             factor = 0.1
         near = 0.7 < factor < 1.4
-        if near and len(what.fitted) > 1 and turn < 2:
+        if near and len(what.fitted) > 1 and turn < TURNS - 1:
             step = _gauss_newton(case, model, null, measured, name, parameters, what.fitted, predicted, base, only)
             parameters = bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
             if max(abs(np.log(f)) for f in step.values()) > 0.1:
@@ -147,7 +150,7 @@ def _fit_twins(
             predicted, _ = predict(case, with_effect(model, name, parameters), base, null, 1, 100, only)
             scale, sd = _scale(null, measured, predicted)
             factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
-        if near or turn == 3:
+        if near or turn == TURNS - 1:
             break
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
         only = concerned(case, null, (predicted - null.mean) * factor**power)

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from spikecam_env.calibration.spike_times import SpikeTimes
+from spikecam_env.calibration.spike_times import SpikeTimes, second_differences
 from spikecam_env.streams.bits import as_words, by_pixel, ones, times_of
 from spikecam_env.streams.packing import unpack_frames
 
@@ -152,7 +152,7 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late, odd):  #
             for j in range(len(STEPS)):
                 k = STEPS[j]
                 if n > 2 * k:
-                    square[p, j] = _second_differences(t, n, k)
+                    square[p, j] = second_differences(t, n, k)
                     terms[p, j] = n - 2 * k
             if n < 2:
                 continue
@@ -180,18 +180,6 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late, odd):  #
             inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
             moments[p, 1] = (products - mean * inner) / (n - 2) + mean * mean
             moments[p, 2], moments[p, 3] = short, long
-
-
-@njit(inline="always")
-def _second_differences(t, n, k):  # type: ignore[no-untyped-def]
-    total = np.float64(0.0)
-    for start in range(0, n - 2 * k, 4096):  # in blocks, so that int64 sums vectorise and cannot overflow
-        part = np.int64(0)
-        for j in range(start, min(start + 4096, n - 2 * k)):
-            e = np.int64(t[j + 2 * k]) - 2 * np.int64(t[j + k]) + np.int64(t[j])
-            part += e * e
-        total += part
-    return total
 
 
 @njit(cache=True, nogil=True, boundscheck=False)

@@ -25,6 +25,7 @@ from spikecam_env.gap.case import Case, case_of, twins
 from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, scale_of
 from spikecam_env.gap.fit import UNITS, bounded, concerned, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
+from spikecam_env.gap.result import Bound
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twin import simulate
 from spikecam_env.gap.units import drawn_banks
@@ -36,6 +37,9 @@ Array = NDArray[np.float64]
 
 SHAPE, FRAMES, SEED = (64, 64), 8000, 20
 MODEL = "scsim"
+SHOWS = 8.0
+"""Noises that a template has to show on the recordings at hand to bound its effect."""
+
 PEAK = 40.0
 """Templates are taken where the statistic that shows the effect best is this many noises off."""
 
@@ -118,6 +122,34 @@ def screen(
         if entry.name not in best or now.misfit < best[entry.name].misfit:
             best[entry.name] = now
     return sorted(best.values(), key=lambda s: s.misfit)
+
+
+def bounds(
+    templates: Templates, conditions: Sequence[Shown], null: Null, measured: Array, names: Sequence[str]
+) -> list[Bound]:
+    """Upper bounds (about 95 %) of effects that were not found: the strength whose template would have been seen.
+
+    Statistics count as independent, but for the pattern's: every recording shows the same one.
+    """
+    at = _places(templates, conditions, null.keys)
+    d = np.nan_to_num((measured - null.mean) / null.noise)
+    one = np.ones_like(d)
+    found: dict[str, Bound] = {}
+    for entry in templates.entries:
+        if entry.name not in names:
+            continue
+        shift = np.where(at >= 0, entry.shift[at], 0.0)
+        if float(np.abs(shift).max()) < SHOWS:
+            continue
+        scale, sd = scale_of(d, shift, one, 0.0 * one, 2 * TOLERANCE)
+        sd *= np.sqrt(len(conditions)) if is_pattern(entry.name) else 1.0
+        key = CATALOGUE[entry.name].strength
+        power = 2.0 if candidate(entry.name).square else 1.0
+        below = abs(entry.parameters[key]) * (abs(scale) + 1.645 * sd) ** (1 / power)
+        if entry.name not in found or below > found[entry.name].below:
+            unit = CATALOGUE[entry.name].__dataclass_fields__[key].metadata["unit"]
+            found[entry.name] = Bound(entry.name, key, unit, float(below))
+    return [found[name] for name in sorted(found)]
 
 
 def _signed(name: str) -> bool:

@@ -157,6 +157,7 @@ class Recording:
         self.threshold = 1.0 + ph.kappa * rng.standard_normal(pixels)
         self.blind = np.zeros(pixels)
         self.last = np.full(pixels, -1e9)
+        self.ramp = np.zeros(pixels)
         self.parity = rng.integers(0, 2, pixels)
         self.dark = ph.dark.copy()
         self.late = [ph.gain * ph.key_light[0].astype(np.float64) for _ in ph.lags]
@@ -172,7 +173,7 @@ class Recording:
 
     def resume(self, before: Recording) -> Recording:
         """This recording with the charge, thresholds and resets of another: its physics changes on the way."""
-        for name in ("charge", "owed", "threshold", "blind", "last", "parity"):
+        for name in ("charge", "owed", "threshold", "blind", "last", "ramp", "parity"):
             setattr(self, name, getattr(before, name))
         return self
 
@@ -201,14 +202,15 @@ class Recording:
         x = light + self._dark_of(n)
         if ph.frame_length is not None:
             x = x * ph.frame_length[n]
-        ramp = 7.0 * ph.ramp_tau if ph.ramp_loss else 0.0
-        near = self.near[
-            : coast(self.charge, self.owed, self.threshold, self.blind, self.last, n - ramp, margin, x, self.near)
-        ]
+        count = coast(
+            self.charge, self.owed, self.threshold, self.blind, self.ramp, ph.ramp_tau, margin, x, self.near
+        )  # fmt: skip
+        near = self.near[:count]
         stretch, shift = self._thresholds(n, near)
         cross(
-            near, n, x, stretch, shift, self.charge, self.owed, self.threshold, self.blind, self.last, self.parity,
-            ph.quiet, ph.kappa, ph.substeps, ph.dead, ph.delay, ph.hold_loss, ph.left_fraction, ph.left_tau,
+            near, n, x, stretch, shift, self.charge, self.owed, self.threshold, self.blind, self.last, self.ramp,
+            self.parity, ph.quiet, ph.kappa, ph.substeps, ph.dead, ph.delay, ph.hold_loss,
+            ph.left_fraction, ph.left_tau,
             ph.ramp_loss, ph.ramp_tau, ph.alternate, ph.outlier_share, ph.outlier_kappa, self.random, _NORMAL, bits,
         )  # fmt: skip
         for rows, columns in ph.kick_to if ph.kick else ():
@@ -391,13 +393,15 @@ def steady(charge, owed, threshold, x, quiet, kappa, random, normal, spikes):
 
 
 @njit(cache=True)
-def coast(charge, owed, threshold, blind, last, since, margin, x, near):
+def coast(charge, owed, threshold, blind, ramp, ramp_tau, margin, x, near):
     """Advance pixels that cannot fire in this frame; `near` lists the others, their number is returned."""
-    count = 0
+    count, left = 0, np.exp(-1.0 / ramp_tau)
     for p in range(charge.size):
-        if charge[p] + x[p] < threshold[p] - margin and blind[p] == 0.0 and last[p] <= since:
-            charge[p] += x[p]
-            owed[p] += x[p]
+        if charge[p] + x[p] < threshold[p] - margin and blind[p] == 0.0:
+            come = x[p] * (1.0 - ramp[p] * ramp_tau * (1.0 - left))
+            charge[p] += come
+            owed[p] += come
+            ramp[p] = ramp[p] * left if ramp[p] > 1e-9 else 0.0
         else:
             near[count] = p
             count += 1
@@ -434,21 +438,20 @@ def give(to, what, factor, rows, columns, wraps):
 
 @njit(cache=True)
 def cross(
-    near, n, x, stretch, shift, charge, owed, threshold, blind, last, parity,
+    near, n, x, stretch, shift, charge, owed, threshold, blind, last, ramp, parity,
     quiet, kappa, substeps, dead, delay, hold_loss, left_fraction, left_tau,
     ramp_loss, ramp_tau, alternate, outlier_share, outlier_kappa, random, normal, bits,
 ):  # fmt: skip
     """Frame n of the pixels `near`, in sub-steps; x (P,) charge a frame, bar = stretch * threshold + shift."""
     dt = 1.0 / substeps
     ramp_step = np.exp(-dt / ramp_tau)
+    ramp_mean = ramp_tau / dt * (1.0 - ramp_step)
     for i in range(near.size):
         p = near[i]
         q = charge[p] + _collected(owed[p], quiet[p], random, normal) - owed[p]
         owed[p] = 0.0
         bar = threshold[p] * stretch[i] + shift[i]
-        kept, even, ramp = 1.0, x[p] * dt, 0.0
-        if ramp_loss > 0.0:
-            ramp = ramp_loss * np.exp(-(n + 0.5 * dt - last[p]) / ramp_tau)
+        kept, even = 1.0, x[p] * dt
         many, spread = even > 16.0 * quiet[p], np.sqrt(even * quiet[p])
         for s in range(substeps):
             open_for = dt
@@ -458,8 +461,8 @@ def cross(
                 open_for -= shut
             share = open_for * kept
             if ramp_loss > 0.0:
-                share *= 1.0 - ramp
-                ramp *= ramp_step
+                share *= 1.0 - ramp[p] * ramp_mean
+                ramp[p] *= ramp_step
             if share == dt and many:
                 come = even + spread * _gauss(random, normal)
             else:
@@ -484,7 +487,7 @@ def cross(
                     over -= left_fraction * np.expm1(-(crossing - last[p]) / left_tau)
                 last[p] = crossing
                 if ramp_loss > 0.0:
-                    ramp = ramp_loss * np.exp(-(n + (s + 1.5) * dt - crossing) / ramp_tau)
+                    ramp[p] = ramp_loss * np.exp(-after / ramp_tau)
                 q = over
                 threshold[p] = 1.0 + kappa[p] * _gauss(random, normal)
                 if outlier_share > 0.0 and _uniform(random) < outlier_share:
