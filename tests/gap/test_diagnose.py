@@ -16,6 +16,8 @@ from spikecam_env.gap.diagnose import diagnose, read_case
 from spikecam_env.gap.result import VERDICTS, Diagnosis
 from spikecam_env.sensor import SensorModel
 
+pytestmark = pytest.mark.slow
+
 LAG = effect("photodiode_lag", fraction=0.08, tau_us=1000.0)
 ONLY = ("photodiode_lag", "crosstalk")
 FEW = 6

@@ -6,12 +6,15 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from spikecam_env.cli.blind_trial import BlindTrial, hidden_world
 from tests.hidden_world.trial import chosen
 
 SHAPE, FRAMES = (32, 32), 2000
 
 
+@pytest.mark.slow
 def test_trial_runs_the_real_diagnosis_and_scores_it(tmp_path, monkeypatch, capsys):
     """A camera with nothing hidden and a strong effect; what is checked is that it works, not how well."""
     trial = hidden_world(Path(__file__).parent)
