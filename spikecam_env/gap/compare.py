@@ -96,9 +96,7 @@ def scale_of(
     clear = (size > min(3.0, 0.5 * float(size.max()))) & (effect != 0)
     if not clear.any():
         return 0.0, np.inf
-    loudest = np.flatnonzero(clear)[np.argsort(-size[clear])[:16]]
-    agreed = np.quantile(gap[clear] / effect[clear], [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95])
-    starts = np.unique(np.concatenate([agreed, gap[loudest] / effect[loudest]]))
+    starts = np.unique(np.quantile(gap[clear] / effect[clear], [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95]))
     best = (np.inf, 0.0, np.inf)
     for start in starts:
         scale, total = float(start), 0.0
@@ -106,9 +104,7 @@ def scale_of(
             noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
             w = (HEAVY + 1.0) / (HEAVY + (gap - scale * effect) ** 2 / noise2) / noise2
             total = float(np.sum(w * effect**2))
-            # A simulated effect's own noise adds to its square and not to its product with the measured one.
-            square = max(float(np.sum(w * (effect**2 - of_effect))), 0.1 * total, 1e-300)
-            scale = float(np.sum(w * effect * gap)) / square
+            scale = float(np.sum(w * effect * gap)) / max(total, 1e-300)
         noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
         left = misfit((gap - scale * effect) / np.sqrt(noise2))
         best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))

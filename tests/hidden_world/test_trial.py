@@ -122,8 +122,8 @@ def test_right_names_families_and_twins():
     other = case_of("strong", "photo_response_nonlinearity")
     members = {"members": ["photo_response_nonlinearity", "ir_drop"], "experiment": "a masked row"}
     assert answered(other, "class", "ir_drop", **{"class": members}).right
-    wide = {"members": ["photo_response_nonlinearity", "dead_time"], "experiment": "more levels"}
-    assert not answered(other, "class", "dead_time", **{"class": wide}).right
+    wide = {"members": ["photo_response_nonlinearity", "comparator_delay"], "experiment": "more levels"}
+    assert not answered(other, "class", "comparator_delay", **{"class": wide}).right
 
 
 def test_excess_noise_may_be_called_a_wrong_parameter():
