@@ -36,7 +36,7 @@ UNITS = 24
 class Fit:
     """A candidate at its best.  parameters, sd: by name.  predicted: (S,) mean over `count` twins; base: its unit.
 
-    rho: (S,) what it leaves, in noise.  misfit: their heavy-tailed sum.  direction: (S,) change with the strength.
+    rho: (S,) what it leaves, in noise.  misfit: their heavy-tailed sum.
     """
 
     name: str

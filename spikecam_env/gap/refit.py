@@ -53,7 +53,6 @@ def measured_base(observations: list[Observation], conditions: list[Shown]) -> B
     """Free refit: every pixel its own line, from static recordings of known light marked "fit"."""
     static = [(o, c) for o, c in zip(observations, conditions, strict=True) if c.kind in ("dark", "flat", "picture")]
     rates = together([rates_from_times([o.times]) for o, _ in static])
-    light = np.stack([c.picture if c.light else np.zeros(o.times.count.size) for o, c in static])
     light = np.stack([np.broadcast_to(c.picture, o.times.count.shape) for o, c in static])
     use = np.array([c.use == "fit" for _, c in static])
     white = jitter_of([o for o, _ in static])

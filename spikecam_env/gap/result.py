@@ -81,7 +81,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Bound:
-    """Upper bound (95 %) of an effect that was not found."""
+    """Upper bound (about 95 %, see `templates.bounds`) of an effect that was not found."""
 
     name: str
     parameter: str

@@ -1,6 +1,6 @@
 """What each candidate does to the statistics bank, simulated beforehand on the standard design: to screen by.
 
-    python -m spikecam_env.gap.templates          rebuilds them (resumable; minutes an effect), and the limits table
+    python -m spikecam_env.gap.templates          rebuilds them (resumable)
 
 A template is a direction, in noise, at a strength that shows clearly.  Screening scales it to what was measured; the
 fit that follows simulates the campaign at hand and rests on no template.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.observe import Observation, observe
 from spikecam_env.gap.refit import BaseFit, unit_of
 from spikecam_env.gap.world import Shown
-from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
 from spikecam_env.streams import pack_frames
 
 _BLOCK = 1024
@@ -30,13 +30,15 @@ def simulate(
     """
     unit = unit_of(model, base, shape)
     return [
-        observe(expose(model, unit, c, base, shape, seed, take), shape, film=c.moves)
+        observe(expose(model, unit, c, shape, seed, take), shape, film=c.moves)
         for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
     ]
 
 
-def expose(model, unit, condition, base, shape, seed, take) -> NDArray[np.uint8]:  # type: ignore[no-untyped-def]
-    """(F, P/8) bits of one recording."""
+def expose(
+    model: SensorModel, unit: Unit, condition: Shown, shape: tuple[int, int], seed: int, take: int
+) -> NDArray[np.uint8]:
+    """(F, P/8) bits of one recording in known light."""
     sensor = SpikeSensor(model, shape, seed, engine="auto", take=take, unit=unit)
     light = condition.light
     assert light is not None

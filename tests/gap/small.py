@@ -75,7 +75,7 @@ def _packed(effects: tuple[Effect, ...], seed: int, model: SensorModel) -> dict[
     there = with_effects(model, effects)
     base = unit(there)
     law = unit_of(there, base, SHAPE)
-    return {c.name: expose(there, law, c, base, SHAPE, seed, take) for take, c in enumerate(conditions())}
+    return {c.name: expose(there, law, c, SHAPE, seed, take) for take, c in enumerate(conditions())}
 
 
 def case_from(spikes: dict[str, Spikes], seed: int = 1, shown: Sequence[Shown] | None = None) -> Case:

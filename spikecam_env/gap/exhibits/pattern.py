@@ -53,11 +53,6 @@ def maps(evidence: Evidence) -> Iterator[Maps]:
         yield Maps(f"{title} [{_UNITS[what]}]", measured, before, after)
 
 
-def _off_mean(values: Array) -> Array:
-    """Off their mean [%]."""
-    return 100 * (values / max(float(values.mean()), 1e-12) - 1)
-
-
 def _values(evidence: Evidence, what: str) -> list[Array | None]:
     """Measured, before, after (P,): of fresh units where there are any, else of the twins."""
     index = list(_TITLES).index(what)
