@@ -1,0 +1,102 @@
+"""What a renderer is: one surface at one pose, seen by a pinhole camera, as a picture of linear light.
+
+World and camera follow OpenGL: the camera looks along its -z, x to the right, y up.  Pictures follow
+`scenes.protocol`: x to the right, y down, pixel (r, c) has its centre at (x, y) = (c, r).  A point (X, Y, Z)
+in camera coordinates, Z < 0, is seen at
+
+    x = centre_x + focal X / -Z,  y = centre_y - focal Y / -Z.  Light is Lambert's:
+
+    radiance = albedo (ambient + intensity max(0, n . towards)) + emission        n: interpolated vertex normal
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+Array = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A mesh and its reflection.  Compared by identity, so that a back-end may keep what it has uploaded.
+
+    mesh      in its own coordinates, with `visual.uv` where albedo is a texture
+    albedo    0..1, linear: one value or a texture (h, w) float32; row 0 is the top, v = 1
+    emission  radiance that the surface gives by itself
+    """
+
+    mesh: trimesh.Trimesh
+    albedo: float | Array = 0.8
+    emission: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Pinhole:
+    """focal [pixels], centre (x, y) [pixels], pose (4, 4) camera to world."""
+
+    focal: float
+    centre: tuple[float, float]
+    pose: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """Ambient radiance, and one distant lamp: its intensity and the direction towards it, in the world."""
+
+    ambient: float = 0.3
+    intensity: float = 0.7
+    towards: tuple[float, float, float] = (0.3, 0.8, 0.6)
+
+
+@dataclass(frozen=True)
+class Window:
+    """A part of the picture: rows top .. top + rows - 1, columns left .. left + columns - 1; may lie outside it."""
+
+    top: int
+    left: int
+    rows: int
+    columns: int
+
+
+@dataclass(frozen=True)
+class Sprite:
+    """A surface alone, cut to a window.
+
+    radiance  (rows, columns) float32, premultiplied: light times coverage
+    coverage  (rows, columns) float32 in [0, 1], share of the pixel that the surface covers
+    depth     (rows, columns) float32, distance along the camera's axis; inf where nothing is covered
+    """
+
+    window: Window
+    radiance: Array
+    coverage: Array
+    depth: Array
+
+
+class Renderer(Protocol):
+    """A back-end.  name: what the log says, e.g. "EGL (llvmpipe)"."""
+
+    @property
+    def name(self) -> str: ...
+
+    def render(
+        self,
+        surface: Surface,
+        pose: NDArray[np.float64],
+        camera: Pinhole,
+        lighting: Lighting,
+        window: Window,
+        supersample: int = 2,
+    ) -> Sprite:
+        """The surface at `pose` (4, 4: its coordinates to the world), averaged over supersample x supersample rays a
+        pixel."""
+        ...
+
+    def close(self) -> None:
+        """Give back what the back-end holds."""
+        ...
