@@ -185,10 +185,3 @@ def test_an_empty_and_a_full_stream():
     assert empty.frame.sum() == 0 and np.all(empty.times.first == -1) and np.isnan(empty.variance).all()
     assert full.times.count.min() == 70 and full.lengths[0] == 69 * 20 and full.lengths[1:].sum() == 0
     assert np.all(full.variance == 0) and np.all(full.late == 0) and full.odd.sum() == 0
-
-
-def test_columns_are_summed_over_more_rows_than_a_byte_counts():
-    spikes = np.random.default_rng(3).random((5, 300, 70)) < 0.97
-    seen = observe(pack_frames(spikes.astype(np.uint8)), (300, 70))
-    assert np.array_equal(seen.column, spikes.sum(axis=1))
-    assert np.array_equal(seen.row, spikes.sum(axis=2))
