@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -61,9 +61,6 @@ GAIN = 25.0
 UNEXPLAINED = 0.08
 """Share of the evidence that may stay unexplained when something is named."""
 
-CLOSE = 40.0
-"""Difference of misfits, one twin each, up to which candidates are simulated anew to compare them."""
-
 SEPARATED = 9.0
 """Difference of misfits from which one candidate is told from another (likelihood ratio of 90)."""
 
@@ -75,6 +72,7 @@ class Round:
     model: SensorModel
     base: BaseFit
     predicted: Array
+    spread: Array
     count: int
     rho: Array
     fits: tuple[Fit, ...]
@@ -186,22 +184,19 @@ def search(
 ) -> list[Round]:
     """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps."""
     rounds: list[Round] = []
-    now, base, predicted, count = model, within(model, case.base), null.mean, null.twins
+    now, base, predicted, spread, count = model, within(model, case.base), null.mean, null.sd, null.twins
     while len(rounds) < MOST:
-        rho = residual(null, values, predicted, count)
+        rho = residual(null, values, predicted, count, spread)
         if rounds and not alarmed(null, rho):
             break
-        here = standing_on(null, predicted)
+        here = standing_on(null, predicted, spread)
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left, line_of(case))
         tried = worth_fitting(screened, misfit(rho))
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
-        fits.sort(key=lambda f: f.misfit)
-        finalists = [f for f in fits if f.misfit < fits[0].misfit + CLOSE][:3]
-        sure = [confirmed(case, now, here, values, f) for f in finalists]
-        sure.sort(key=lambda f: f.misfit)
-        rounds.append(Round(now, base, predicted, count, rho, (*sure, *(f for f in fits if f not in finalists))))
+        sure, rest = settle(fits, partial(confirmed, case, now, here, values))
+        rounds.append(Round(now, base, predicted, spread, count, rho, (*sure, *rest)))
         if not sure or sure[0].misfit > misfit(rho) - (GAIN if now is not model else SEPARATED):
             break
         best = sure[0]
@@ -209,19 +204,29 @@ def search(
         if earlier:
             best = rejoined(case, model, null, values, best, earlier)
         rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
-        now, base, predicted, count = best.model, best.base, best.predicted, best.count
-    rounds.append(Round(now, base, predicted, count, residual(null, values, predicted, count), ()))
+        now, base, predicted, spread, count = best.model, best.base, best.predicted, best.spread, best.count
+    rho = residual(null, values, predicted, count, spread)
+    rounds.append(Round(now, base, predicted, spread, count, rho, ()))
     return rounds
+
+
+def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:
+    """(confirmed, best first; the others).  A fit has been adjusted to its one twin and looks better than it is: they
+    are confirmed from the best on, until one stands below all that the others promise."""
+    waiting, sure = sorted(fits, key=lambda f: f.misfit), list[Fit]()
+    while waiting and (not sure or waiting[0].misfit < min(f.misfit for f in sure) + SEPARATED):
+        sure.append(confirm(waiting.pop(0)))
+    return sorted(sure, key=lambda f: f.misfit), waiting
 
 
 def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screened) -> Fit:
     return fit(case, model, null, values, s.name, s.start, s.expected)
 
 
-def standing_on(null: Null, predicted: Array) -> Null:
+def standing_on(null: Null, predicted: Array, spread: Array) -> Null:
     """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
     floor = np.hypot(null.floor, TOLERANCE * (predicted - null.mean))
-    return replace(null, mean=predicted, floor=floor)
+    return replace(null, mean=predicted, sd=spread, floor=floor)
 
 
 def line_of(case: Case) -> float | None:
@@ -275,7 +280,7 @@ def concluded(
     effects = tuple(
         replace(named(f, r, null, values), where=place, when=time_) for f, r in zip(found, rounds, strict=False)
     )
-    rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.misfit < r.fits[0].misfit + SEPARATED]
+    rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.count > 1 and f.misfit < r.fits[0].misfit + SEPARATED]
     if not (rounds and not explained):
         effects = (*(named_missing(m) for m in lacking), *effects)
     parameters = {} if lacking else off_nominal(case, model)
