@@ -24,7 +24,8 @@ HEAVY = 8.0
 class Null:
     """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns.
 
-    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.
+    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  weight: (S,) how much each says
+    of its own: what several recordings tell of one fixed pattern is told once.
     """
 
     keys: tuple[Key, ...]
@@ -32,6 +33,7 @@ class Null:
     sd: Array
     floor: Array
     twins: int
+    weight: Array | float = 1.0
 
     @property
     def noise(self) -> Array:
@@ -96,7 +98,7 @@ def judged(
     rho = residual(null, measured, predicted, twins, spread)
     sd = null.sd if spread is None else spread
     wider = (sd**2 + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2) / (null.sd**2 + null.floor**2)
-    return rho, misfit(rho) + float(np.log(wider).sum())
+    return rho, misfit(rho, null.weight) + float((null.weight * np.log(wider)).sum())
 
 
 def spread_of(null: Null, values: Array) -> Array:
@@ -151,6 +153,6 @@ def is_clear(effect: Array, variance: Array) -> NDArray[np.bool_]:
     return np.asarray((size > min(3.0, 0.5 * float(size.max()))) & (effect != 0))
 
 
-def misfit(rho: Array) -> float:
-    """Heavy-tailed sum of squares: of order S for noise alone."""
-    return float(np.sum((HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))
+def misfit(rho: Array, weight: Array | float = 1.0) -> float:
+    """Heavy-tailed sum of squares: of the order of the weights' sum for noise alone."""
+    return float(np.sum(weight * (HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))

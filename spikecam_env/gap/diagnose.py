@@ -25,7 +25,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.gap.audit import Contradiction, audit
 from spikecam_env.gap.candidates import candidate, chosen, testable
 from spikecam_env.gap.case import Case, case_of
-from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, misfit, normal, residual, values_of
+from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, judged, misfit, normal, residual, values_of
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
 from spikecam_env.gap.floor import floor_of_halves
@@ -46,6 +46,9 @@ Array = NDArray[np.float64]
 ALARM = 0.02
 """Adjusted p-value below which there is a discrepancy at all."""
 
+SURE = 0.002
+"""Adjusted p-value below which a discrepancy is unknown where no candidate takes it up; above, it may be chance."""
+
 TRIED = 5
 """Candidates fitted a round, the best by their templates."""
 
@@ -55,8 +58,8 @@ MOST = 3
 GATE = 0.005
 """Adjusted p-value of what a named effect leaves, below which something is left."""
 
-GAIN = 25.0
-"""Misfit that a further effect has to remove to be added."""
+GAIN = 20.0
+"""Misfit that an effect has to remove to be added."""
 
 UNEXPLAINED = 0.08
 """Share of the evidence that may stay unexplained when something is named."""
@@ -75,6 +78,7 @@ class Round:
     spread: Array
     count: int
     rho: Array
+    misfit: float
     fits: tuple[Fit, ...]
 
 
@@ -190,14 +194,15 @@ def search(
         if rounds and not alarmed(null, rho):
             break
         here = standing_on(null, predicted, spread)
+        left_over = judged(here, values, predicted, count)[1]
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left, line_of(case))
-        tried = worth_fitting(screened, misfit(rho))
+        tried = worth_fitting(screened, left_over)
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
         sure, rest = settle(fits, partial(confirmed, case, now, here, values))
-        rounds.append(Round(now, base, predicted, spread, count, rho, (*sure, *rest)))
-        if not sure or sure[0].misfit > misfit(rho) - (GAIN if now is not model else SEPARATED):
+        rounds.append(Round(now, base, predicted, spread, count, rho, left_over, (*sure, *rest)))
+        if not sure or sure[0].misfit > left_over - GAIN:
             break
         best = sure[0]
         earlier = [r.fits[0].name for r in rounds[:-1]]
@@ -205,8 +210,8 @@ def search(
             best = rejoined(case, model, null, values, best, earlier)
         rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
         now, base, predicted, spread, count = best.model, best.base, best.predicted, best.spread, best.count
-    rho = residual(null, values, predicted, count, spread)
-    rounds.append(Round(now, base, predicted, spread, count, rho, ()))
+    rho, left_over = judged(null, values, predicted, count, spread)
+    rounds.append(Round(now, base, predicted, spread, count, rho, left_over, ()))
     return rounds
 
 
@@ -273,21 +278,22 @@ def concluded(
     ]
     rho = last.rho if last else before
     predicted = last.predicted if last else null.mean
-    excess = misfit(before) - len(values)
-    left = (misfit(rho) - len(values)) / max(excess, 1.0)
+    by_chance = float(np.sum(null.weight * np.ones(len(values))))
+    left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
     explained = not alarmed(null, rho) or left < UNEXPLAINED
+    chance = not found and bool(p.min() > SURE)
     place, time_ = where(case), when(case)
     effects = tuple(
         replace(named(f, r, null, values), where=place, when=time_) for f, r in zip(found, rounds, strict=False)
     )
     rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.count > 1 and f.misfit < r.fits[0].misfit + SEPARATED]
-    if not (rounds and not explained):
+    if explained or chance:
         effects = (*(named_missing(m) for m in lacking), *effects)
     parameters = {} if lacking else off_nominal(case, model)
     unknown, class_ = None, None
     if contradictions:
         verdict = "data"
-    elif rounds and not (found and explained):
+    elif rounds and not chance and not (found and explained):
         verdict, effects = "unknown", ()
         unknown = {**structure(case, null, before), "best_candidate": found[0].name if found else None}
     elif found and rivals and len(found) == 1 and not lacking:
@@ -350,7 +356,7 @@ def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
 
 def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
     """A row of the ranking."""
-    before = misfit(turn.rho)
+    before = turn.misfit
     parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
     worst = float(np.abs(found.rho).max())
     reason = f"leaves {worst:.1f} noises at worst" if found.misfit < before else "explains nothing"
