@@ -91,6 +91,11 @@ class Collage:
         }
         return Truth(radiance, flow, owner, None, poses | {"camera": _offset(frame, gaze)})
 
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """Where the shapes' middles are seen, see `scenes.protocol.Placed`."""
+        offset = _offset(frame, gaze)
+        return {f"shape-{n}": layer.pose(frame, offset, self.shape)[:2] for n, layer in enumerate(self._shapes, 1)}
+
     def _picture(self, frame: float, gaze: Gaze | None) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         offset = _offset(frame, gaze)
         picture = self._background.tiled(frame, offset, self.shape)

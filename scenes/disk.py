@@ -119,6 +119,10 @@ class RotatingDisk:
             poses={"disk": (x, y, self.angle_at(frame)), "camera": gaze.at(frame)},
         )
 
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """Where the disk's middle is seen, see `scenes.protocol.Placed`."""
+        return {"disk": self.centre_at(frame, gaze)}
+
     def placed(
         self, centre: tuple[float, float], drift_px_s: tuple[float, float] = (0.0, 0.0), angle: float = 0.0
     ) -> RotatingDisk:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.protocol import Gaze, Scene, Truth
+from scenes.protocol import Gaze, Placed, Scene, Truth
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -60,3 +60,7 @@ class Exposed:
         """The scene's truth, its radiance scaled."""
         truth = self.scene.truth(frame, gaze)
         return dataclasses.replace(truth, radiance=truth.radiance * np.float32(self.gain))
+
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """The scene's places; none where it has nothing to follow."""
+        return self.scene.places(frame, gaze) if isinstance(self.scene, Placed) else {}

@@ -160,6 +160,23 @@ class World:
         _, depth, owner = self._seen(frame, gaze)
         return self._displaced(owner, depth, frame, frames, gaze).astype(np.float32)
 
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """Where the middle of every body that moves is seen, see `scenes.protocol.Placed`."""
+        at = np.array(float(frame))
+        to_camera = np.linalg.inv(self._pinhole(at).pose)
+        centre = np.asarray(self._centre) - (gaze or _AT_REST).at(frame)
+        places = {}
+        for body in self.bodies:
+            if not (body.backdrop or isinstance(body.trajectory, Still)):
+                middle = np.append(body.surface.mesh.bounds.mean(axis=0), 1.0)
+                right, up, back, _ = to_camera @ self._body_pose(body, at) @ middle
+                away = max(-back, 1e-6)
+                places[body.name] = (
+                    float(centre[0] + self._focal * right / away),
+                    float(centre[1] - self._focal * up / away),
+                )
+        return places
+
     # -- the plan ----------------------------------------------------------------------------------------------
 
     def _key_frames(self, start: int, stop: int, gaze: Gaze | None) -> Floats:
