@@ -87,7 +87,7 @@ def problem(name: str) -> str | None:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
     except subprocess.TimeoutExpired:
-        return f"hangs: no triangle after {LONGEST_TRIAL_S:.0f} s"
+        return f"hangs: no triangle after {LONGEST_TRIAL_S:g} s"
     if trial.returncode == 0:
         return None
     if trial.returncode < 0:
