@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.keys import side_by_side
 from scenes.protocol import Gaze, Truth
 from scenes.textures import random_texture
 from spikecam_env.errors import InputError
@@ -74,7 +75,13 @@ class Collage:
         frame = np.arange(first, last + 1) * float(self.key_every)
         if gaze is not None:
             frame = np.union1d(frame[(frame > start) & (frame < stop)], [start, stop])
-        return Keyframes(frame.astype(np.float64), np.stack([self._picture(t, gaze)[0] for t in frame]))
+        light = np.empty((len(frame), *self.shape), np.float32)
+
+        def paint(key: int) -> None:
+            light[key] = self._picture(float(frame[key]), gaze)[0]
+
+        side_by_side(paint, len(frame))
+        return Keyframes(frame.astype(np.float64), light)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Radiance, flow [pixels/frame] and object number (0: background, then the shapes from the back)."""

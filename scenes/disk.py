@@ -314,7 +314,9 @@ def _paint_disk(behind, texture, texels, x, y, radius, u0, v0, cosine, sine, pic
     for r in range(rows):
         picture[r] = behind[r]
         dy = np.float32(r - y)
-        chord = np.sqrt(max(reach * reach - dy * dy, np.float32(0)))
+        if abs(dy) >= reach:
+            continue
+        chord = np.sqrt(reach * reach - dy * dy)
         first = max(int(np.ceil(x - chord)), 0)
         count = min(int(np.floor(x + chord)) + 1, columns) - first
         u_first = np.float32(u0 - sine * r + cosine * first)

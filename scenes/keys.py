@@ -25,7 +25,7 @@ def interval_for(speed: float, motion_per_key: float) -> int:
 
     speed: of the fastest point [pixels/frame].
     """
-    return int(np.clip(motion_per_key / max(speed, 1e-9), 1, LONGEST_INTERVAL))
+    return int(np.clip(motion_per_key / max(speed, 1e-9) + 1e-9, 1, LONGEST_INTERVAL))
 
 
 def painted(
