@@ -439,9 +439,9 @@ def _plan_block(world: World, block: int) -> _Plan:
         box = _extent(probe.extreme, view, world._focal, centre)
         ranges.append((depth.min(), depth.max()))
         boxes.append((*box[:, :2].min(0), *box[:, 2:].max(0)))
-        seen = ((box[:, 0] < world.shape[0]) & (box[:, 2] > 0) & (box[:, 1] < world.shape[1]) & (box[:, 3] > 0)).any()
-        near = np.linalg.norm(np.diff(pixels, axis=0), axis=-1)[(depth[:-1] > 0) & (depth[1:] > 0)]
-        speeds.append(float(near.max(initial=0.0)) * _NODES / BLOCK if seen else 0.0)
+        seen = (box[:, 0] < world.shape[0]) & (box[:, 2] > 0) & (box[:, 1] < world.shape[1]) & (box[:, 3] > 0)
+        moved = np.linalg.norm(np.diff(pixels, axis=0), axis=-1)[seen[:-1] | seen[1:]]
+        speeds.append(float(moved.max(initial=0.0)) * _NODES / BLOCK)
         resting.append(np.ptp(view, axis=0).max() == 0)
     backdrops = [n for n, body in enumerate(world.bodies) if body.backdrop]
     others = sorted((n for n, body in enumerate(world.bodies) if not body.backdrop), key=lambda n: -ranges[n][1])
