@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from scenes.catalogue import SCENES, make_scene, random_world
+from scenes.catalogue import SCENES, make_scene
 from scenes.collage import Collage
 from scenes.disk import RotatingDisk, disk_texture
 from scenes.exact import supersampled
@@ -47,7 +47,7 @@ def bench_scenes(names: Iterable[str] = (), seconds: float = 2.0) -> dict[str, R
         f"space: {SPACE}": lambda: bench_space(seconds),
         "renderer back-ends": _backends,
         "end to end: light to noisy spikes": lambda: bench_end_to_end(seconds),
-        "flow: frame 100 moved along it, against frame 140": lambda: flow_table(list(names) or [*SCENES, "random"]),
+        "flow: frame 100 moved along it, against frame 140": lambda: flow_table(list(names) or list(SCENES)),
     }
     return {title: step() for title, step in tqdm(steps.items(), desc="bench", unit="table", leave=False)}
 
@@ -55,8 +55,8 @@ def bench_scenes(names: Iterable[str] = (), seconds: float = 2.0) -> dict[str, R
 def bench_planar(seconds: float = 2.0) -> Rows:
     """Frames a second, and how far the disk is from 16 x 16 samples a pixel, inside its rim, share of full scale.
 
-    Columns: scene; pixels a key, most that anything moves from one to the next; keys a frame; frames/s; best block of 64,
-    what it is where the machine does nothing else; processor, time of all threads together; rms at keys; rms of
+    Columns: scene; pixels a key, most that anything moves from one to the next; keys a frame; frames/s; best block
+    of 64, what it is where the machine does nothing else; processor, time of all threads together; rms at keys; rms of
     frames, the light that the sensor collects over a frame against 8 instants of it, which is what counts; rms midway,
     the instant half-way between two keys, the worst.
     """
@@ -135,10 +135,10 @@ def bench_end_to_end(seconds: float = 2.0) -> Rows:
 
 
 def flow_table(names: Iterable[str]) -> Rows:
-    """`scenes.flow.check_flow` of scenes of the catalogue and "random", in per cent."""
+    """`scenes.flow.check_flow` of scenes of the catalogue, in per cent."""
     rows = []
     for name in tqdm(list(names), desc="flow", unit="scene", leave=False):
-        check = check_flow(random_world(0, SHAPE) if name == "random" else make_scene(name, SHAPE))
+        check = check_flow(make_scene(name, SHAPE))
         rows.append(
             {
                 "scene": name,

@@ -19,7 +19,7 @@ class Demo:
     out: Path = Path("demo")
     """Folder for demo.mp4, demo.png and demo.json."""
     scene: str = "disk"
-    """The rotating disk, another scene of `spikecam scenes`, or `random`."""
+    """The rotating disk or another scene of `spikecam scenes`."""
     rpm: float | None = None
     """Speed of the disk; default 2000."""
     frames: int = 1200

@@ -19,7 +19,7 @@ class Record:
     out: Path
     """Where to; .h5 (bit-packed with attributes), .dat (raw Vidar bits) or .npz (key `spikes`)."""
     scene: str = "disk"
-    """What the camera looks at: the rotating disk, another scene of `spikecam scenes`, or `random`."""
+    """What the camera looks at: the rotating disk, or another scene of `spikecam scenes`."""
     frames: int = 4000
     """Spike frames to record; 40 000 are a second."""
     camera: Camera = field(default_factory=Camera)

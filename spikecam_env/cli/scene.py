@@ -11,19 +11,17 @@ if TYPE_CHECKING:
 
 
 def scene_named(name: str, shape: tuple[int, int], seed: int, frame_rate_hz: float, rpm: float | None = None) -> Scene:
-    """The disk at a speed, a scene of the catalogue by name, or "random": a random world from the seed.
+    """The disk at a speed, or another scene of the catalogue by name.
 
     rpm: of the disk; default 2000.  Errors: InputError for an unknown name, and for rpm with another scene.
     """
     from scenes import RotatingDisk
-    from scenes.catalogue import SCENES, make_scene, random_world
+    from scenes.catalogue import SCENES, make_scene
 
-    if name not in ("random", *SCENES):
-        raise unknown_name("scene", name, ("random", *SCENES))
+    if name not in SCENES:
+        raise unknown_name("scene", name, SCENES)
     if name == "disk":
         return RotatingDisk(shape, rpm=2000.0 if rpm is None else rpm, frame_rate_hz=frame_rate_hz)
     if rpm is not None:
         raise InputError(f"--rpm {rpm:g} is the disk's speed; the scene {name!r} has its own")
-    if name == "random":
-        return random_world(seed, shape, frame_rate_hz=frame_rate_hz)
     return make_scene(name, shape, seed, frame_rate_hz=frame_rate_hz)

@@ -26,7 +26,7 @@ class Scenes:
     """
 
     name: tyro.conf.Positional[str | None] = None
-    """A scene; default all, or a random world for a film: `random`."""
+    """A scene; default all."""
     out: Path | None = None
     """Write a picture (PNG) of the scene, or of all on one sheet."""
     film: Path | None = None
@@ -34,7 +34,7 @@ class Scenes:
     size: tuple[int, int] = (250, 400)
     """Rows and columns."""
     seed: int = 0
-    """Seed of what the scene leaves to chance; of a random world, its seed."""
+    """Seed of what the scene leaves to chance; the scene `random` is another world with each."""
     frames: int = 4000
     """Length of the film in frames of the camera; 40 000 are a second."""
     every: int = 32
@@ -43,8 +43,8 @@ class Scenes:
     def run(self) -> None:
         from scenes.catalogue import SCENES
 
-        if self.name not in (None, "random", *SCENES):
-            raise unknown_name("scene", self.name, (*SCENES, "random"))
+        if self.name not in (None, *SCENES):
+            raise unknown_name("scene", self.name, SCENES)
         if min(self.size) < 8:
             raise InputError(f"--size {self.size[0]} {self.size[1]}; at least 8 rows and 8 columns")
         if self.film is not None:
@@ -52,7 +52,7 @@ class Scenes:
         if self.out is not None:
             self._write_sheet(self.out)
         if self.film is None and self.out is None:
-            for name in (self.name,) if self.name else (*SCENES, "random"):
+            for name in (self.name,) if self.name else SCENES:
                 print(f"{name:10} {about(name)}")
 
     def _write_film(self, path: Path) -> None:
@@ -91,26 +91,26 @@ class Scenes:
 
         if path.suffix.lower() != ".png":
             raise InputError(f"--out {path}: unknown file type {path.suffix!r}; use .png")
-        names = (self.name,) if self.name else (*SCENES, "random")
+        names = (self.name,) if self.name else SCENES
         panels = []
         for name in tqdm(names, desc="scenes", unit="scene", leave=False):
             light = self._scene(name).truth(SHOWN_AT).radiance
-            panels.append(Panel(light / _white(light), name, about(name).partition(": ")[2].rstrip(".")))
+            panels.append(Panel(light / _white(light), name, about(name).partition(": ")[2]))
         write_picture(path, sheet(panels, COLUMNS))
         print(f"wrote {path}: {len(names)} scene{'s' if len(names) > 1 else ''}")
 
     def _scene(self, name: str | None) -> Any:
-        from scenes.catalogue import make_scene, random_world
+        from scenes.catalogue import make_scene
 
-        return random_world(self.seed, self.size) if name == "random" else make_scene(str(name), self.size, self.seed)
+        return make_scene(str(name), self.size, self.seed)
 
 
 def about(name: str) -> str:
-    """A scene's line: the first of the file that it is in."""
-    from scenes.catalogue import SCENES, random_world
+    """A scene's line: the first sentence of the file that it is in."""
+    from scenes.catalogue import SCENES
 
-    described = random_world if name == "random" else sys.modules[SCENES[name].__module__]
-    return (described.__doc__ or "").strip().splitlines()[0]
+    described = sys.modules[SCENES[name].__module__].__doc__ or ""
+    return described.splitlines()[0].partition(".  ")[0].rstrip(".")
 
 
 def _white(light: Any) -> float:

@@ -71,7 +71,7 @@ def stream(
 ) -> Streamed:
     """Stream a scene through environment and denoiser.
 
-    scene: "disk" (at a speed of rpm, default 2000), "random", or a name of the catalogue.
+    scene: "disk" (at a speed of rpm, default 2000), or another name of the catalogue.
     Errors: InputError for fewer than 500 frames, an unknown scene, and rpm with another scene than the disk.
     """
     if frames < 500:

@@ -12,12 +12,31 @@ import gymnasium
 
 SCENE = "spikecam_env.envs.scene:SceneEnv"
 
+NAMED = (
+    "Ball",
+    "Car",
+    "Collage",
+    "Cook",
+    "Dice",
+    "Disk",
+    "Doll",
+    "Fan",
+    "Fly",
+    "Hand",
+    "Jump",
+    "Poker",
+    "Text",
+    "Top",
+    "Train",
+    "Tumble",
+)
+"""Scenes of the catalogue that have an id of their own, e.g. `spikecam_env/Fan-v0`."""
+
 ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
     "spikecam_env/RotatingDisk-v0": ("spikecam_env.envs.rotating_disk:RotatingDiskEnv", {}),
     "spikecam_env/Scene-v0": (SCENE, {}),
-    "spikecam_env/Collage-v0": (SCENE, {"scene": "collage"}),
-}
-"""Id -> where its class is, and what it is made with.  Scenes of the catalogue by name; `Scene-v0` has any of them."""
+} | {f"spikecam_env/{name}-v0": (SCENE, {"scene": name.lower()}) for name in NAMED}
+"""Id -> where its class is, and what it is made with.  `Scene-v0` is a random world, or what `scene=` says."""
 
 MAX_EPISODE_STEPS = 500
 

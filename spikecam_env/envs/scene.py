@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from scenes.catalogue import SCENES, make_scene, random_world
+from scenes.catalogue import SCENES, make_scene
 from scenes.later import Later
 from scenes.protocol import Gaze, Placed
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
@@ -28,8 +28,7 @@ class SceneEnv(SpikeCameraEnv):
     at the end of the step: 1 in the middle, 0 in a corner, less beyond.  The episode terminates when the target's
     middle leaves the picture, and is truncated after 500 steps (0.5 s at 40 frames a step).
 
-    scene             a name of `scenes.catalogue.SCENES`; "random" is `scenes.catalogue.random_world`, anew in
-                      every episode
+    scene             a name of `scenes.catalogue.SCENES`; "random" is another world in every episode
     target            name of what is to be followed (`poses` of the truth has them); default: the first that moves
     scene_seed        of a named scene: textures, poses; episodes differ by where and when they start
     start_offset_px   most the camera looks away from its place at first; default a quarter of the shorter side
@@ -54,8 +53,8 @@ class SceneEnv(SpikeCameraEnv):
         **camera: Any,
     ) -> None:
         super().__init__(self._draw, self._judge_target, shape=shape, **camera)
-        if scene != "random" and scene not in SCENES:
-            raise unknown_name("scene", scene, ("random", *SCENES))
+        if scene not in SCENES:
+            raise unknown_name("scene", scene, SCENES)
         self.start_offset_px = 0.25 * min(self.shape) if start_offset_px is None else float(start_offset_px)
         if not 0 <= self.start_offset_px < np.inf:
             raise InputError(f"start_offset_px is {start_offset_px}; it must be 0 or more, and finite")
@@ -66,8 +65,7 @@ class SceneEnv(SpikeCameraEnv):
         """The scene of this seed; raises InputError where there is nothing to follow in it."""
         rate = self.model.frame_rate_hz
         options: Any = {"seed": seed, "shape": self.shape, "mean_interval": self.mean_interval, "frame_rate_hz": rate}
-        random = self.scene_name == "random"
-        scene = random_world(**options) if random else make_scene(self.scene_name, **options)
+        scene = make_scene(self.scene_name, **options)
         places = scene.places(0.0) if isinstance(scene, Placed) else {}
         if not isinstance(scene, Placed) or not places:
             raise InputError(f"nothing moves in the scene {self.scene_name!r}, so there is nothing to follow")
