@@ -7,6 +7,7 @@ import logging
 import os
 import stat
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,11 @@ def test_a_renderer_refuses_to_live_on_in_a_fork(opengl: OpenGL, monkeypatch: py
     monkeypatch.setattr(os, "getpid", lambda: parent + 1)
     with pytest.raises(NotReadyError, match="spawn"):
         picture(opengl, ball())
+
+
+def test_a_renderer_refuses_another_thread(opengl: OpenGL) -> None:
+    with ThreadPoolExecutor(1) as other, pytest.raises(NotReadyError, match="another thread"):
+        other.submit(picture, opengl, ball()).result()
 
 
 def test_one_process_serves_one_kind_of_opengl(opengl: OpenGL) -> None:
