@@ -16,7 +16,7 @@ from scenes.renderers.pyramid import Pyramid, pyramid
 from spikecam_env.errors import InputError
 
 NEAREST = 1e-3
-"""Share of the farthest vertex's distance at which a surface begins to be seen; nearer parts are cut away."""
+"""Share of the farthest vertex's distance at which OpenGL begins to see a surface; it cuts nearer parts away."""
 
 
 @dataclass(frozen=True)

@@ -140,6 +140,13 @@ def test_without_opengl_embree_serves_and_one_line_says_so(
     assert "embree" in record.getMessage() and "libegl1 libgl1" in record.getMessage()
 
 
+def test_where_nothing_works_one_error_has_every_reason_and_the_fix(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choose, "problem", lambda name: f"{name} is broken")
+    with pytest.raises(InputError, match=r"osmesa is broken.*libegl1 libgl1.*pip install embreex") as caught:
+        choose_renderer("auto")
+    print(caught.value)
+
+
 def test_the_choice_is_named_in_one_line(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     monkeypatch.setenv(choose.VARIABLE, "embree")
     with caplog.at_level(logging.INFO):
