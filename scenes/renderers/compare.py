@@ -44,7 +44,7 @@ class Comparison:
     to_embree: float
 
 
-def compare_backends(shape: tuple[int, int] = (250, 400), supersample: int = 2, repeats: int = 9) -> list[Comparison]:
+def compare_backends(shape: tuple[int, int] = (250, 400), supersample: int = 2, repeats: int = 20) -> list[Comparison]:
     """One row for each of `BACKENDS`, each measured in a process of its own, one after the other."""
     truth = [sprite.radiance for sprite in _key(Embree(), shape, TRUTH_RAYS)]
     embree = [sprite.radiance for sprite in _key(Embree(), shape, supersample)]

@@ -7,6 +7,7 @@ import logging
 import os
 import stat
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,11 @@ def test_a_renderer_refuses_to_live_on_in_a_fork(opengl: OpenGL, monkeypatch: py
         picture(opengl, ball())
 
 
+def test_a_renderer_refuses_another_thread(opengl: OpenGL) -> None:
+    with ThreadPoolExecutor(1) as other, pytest.raises(NotReadyError, match="another thread"):
+        other.submit(picture, opengl, ball()).result()
+
+
 def test_one_process_serves_one_kind_of_opengl(opengl: OpenGL) -> None:
     with pytest.raises((NotReadyError, InputError), match=r"new process|libosmesa6"):
         choose_renderer("osmesa")
@@ -132,6 +138,13 @@ def test_without_opengl_embree_serves_and_one_line_says_so(
     print(record.getMessage())
     assert record.levelno == logging.WARNING
     assert "embree" in record.getMessage() and "libegl1 libgl1" in record.getMessage()
+
+
+def test_where_nothing_works_one_error_has_every_reason_and_the_fix(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choose, "problem", lambda name: f"{name} is broken")
+    with pytest.raises(InputError, match=r"osmesa is broken.*libegl1 libgl1.*pip install embreex") as caught:
+        choose_renderer("auto")
+    print(caught.value)
 
 
 def test_the_choice_is_named_in_one_line(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:

@@ -146,6 +146,26 @@ def test_moving_the_camera_is_moving_the_world_the_other_way(renderer: Renderer)
     np.testing.assert_allclose(moved.coverage, still.coverage)
 
 
+def test_a_mirrored_pose_shows_the_mirrored_picture(renderer: Renderer) -> None:
+    surface = Surface(trimesh.creation.annulus(0.3, 0.7, 0.4))
+    pose = at(0, 0, -5) @ trimesh.transformations.rotation_matrix(0.9, (1, 2, 0))
+    mirror = np.diag([-1.0, 1, 1, 1])
+    lighting = Lighting(towards=(0, 1, 1))
+    image, mirrored = (renderer.render(surface, p, CAMERA, lighting, PICTURE) for p in (pose, mirror @ pose))
+    assert image.coverage.sum() > 100
+    assert rms(image.coverage - mirrored.coverage[:, ::-1]) < 0.01
+    assert rms(image.radiance - mirrored.radiance[:, ::-1]) < 0.01
+
+
+def test_a_room_is_seen_from_inside_and_a_sheet_from_behind(renderer: Renderer) -> None:
+    room = renderer.render(Surface(trimesh.creation.box((4, 4, 6))), np.eye(4), CAMERA, AMBIENT_ONLY, PICTURE)
+    np.testing.assert_array_equal(room.coverage, 1)
+    assert room.depth[44, 59] == pytest.approx(3)
+    behind = at(0, 0, -5) @ trimesh.transformations.rotation_matrix(np.pi, (0, 1, 0))
+    sheet = renderer.render(Surface(card(9, 9)), behind, CAMERA, AMBIENT_ONLY, PICTURE)
+    np.testing.assert_array_equal(sheet.coverage, 1)
+
+
 def test_radiance_is_premultiplied(renderer: Renderer) -> None:
     lamp = Surface(disc(0.8), albedo=0.0, emission=2.0)
     sprite = renderer.render(lamp, at(0.1, 0.05, -5), CAMERA, Lighting(), PICTURE, supersample=3)
