@@ -18,6 +18,7 @@ from scenes.collage import Collage
 from scenes.disk import RotatingDisk, disk_texture
 from scenes.exact import supersampled
 from scenes.flow import check_flow
+from scenes.keys import side_by_side
 from scenes.protocol import Scene
 from scenes.renderers.compare import compare_backends
 from scenes.sliding import SlidingTexture
@@ -195,14 +196,19 @@ def _disk_errors(disk: RotatingDisk, texture: NDArray[np.float32], dark: float) 
     inside = disk.truth(0.0).object_id > 0
     keys = disk.radiance(1000, 1000 + BLOCK)
     between = 0.5 * (keys.frame[1:] + keys.frame[:-1])
-    frames = 1000 + np.arange(0, BLOCK, BLOCK // 8)
+    frames = 1000 + np.arange(0, BLOCK, BLOCK // 4)
     parts = (np.arange(8) + 0.5) / 8
 
     def off(instants: Array) -> NDArray[np.float64]:
         """The mean over these instants, given and true."""
         given = np.mean([keys.at(t) for t in instants], axis=0)
-        true = np.mean([supersampled(disk, texture, dark, t) for t in instants], axis=0)
-        return (given - true)[inside]
+        true = np.empty((len(instants), *disk.shape), np.float32)
+
+        def draw(i: int) -> None:
+            true[i] = supersampled(disk, texture, dark, instants[i])
+
+        side_by_side(draw, len(instants))
+        return (given - true.mean(axis=0))[inside]
 
     return {
         "rms at keys, %": _rms([off(keys.frame[i : i + 1]) for i in (0, 1, len(keys.frame) // 2)]),
