@@ -17,7 +17,7 @@ from scenes.catalogue import SCENES, make_scene
 from scenes.collage import Collage
 from scenes.disk import RotatingDisk, disk_texture
 from scenes.exact import supersampled
-from scenes.flow import check_flow
+from scenes.flow_check import check_flow
 from scenes.keys import side_by_side
 from scenes.protocol import Scene
 from scenes.renderers.compare import compare_backends
@@ -136,7 +136,7 @@ def bench_end_to_end(seconds: float = 2.0) -> Rows:
 
 
 def flow_table(names: Iterable[str]) -> Rows:
-    """`scenes.flow.check_flow` of scenes of the catalogue, in per cent."""
+    """`scenes.flow_check.check_flow` of scenes of the catalogue, in per cent."""
     rows = []
     for name in tqdm(list(names), desc="flow", unit="scene", leave=False):
         check = check_flow(make_scene(name, SHAPE))

@@ -1,90 +1,73 @@
-"""Is the flow right?  A picture moved along it must become the picture that comes later."""
+"""Is the optical flow true?  Frame t warped by it must be frame t + n, where the same surface is still seen.
+
+`flow_error` looks up, for every pixel of frame t, where its surface has gone n frames later, and compares the light.
+Left out is what cannot be compared: surfaces that leave the picture, are hidden by then, or lie at an edge, where a
+pixel is a mixture of two.  What turns also changes its shade; that is part of the error.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.protocol import Gaze, Scene, Truth
+from scenes.protocol import Gaze, Scene
 
-STEP = 5
-"""Frames that a point is carried on at a time, by the flow at the middle of them."""
+STEP = 2.0
+"""Frames of a step along the flow, for scenes that give no displacement themselves."""
 
-NEAR = 5
-"""Pixels: the square about a point within which only one object may be seen, or the point is left out."""
-
-BLUR = 0.7
-"""Pixels, standard deviation: what alternates from pixel to pixel cannot be read between them, right as flow may be."""
-
-Places = NDArray[np.floating]
+Array = NDArray[np.float32]
 
 
-@dataclass(frozen=True)
-class FlowCheck:
-    """error: rms of what came along the flow against what is there, share of full scale (the brightest light), both
-    pictures first blurred by `BLUR`.  sharp: the same without blur.  unmoved: blurred, had nothing been moved.
-    compared: share of the picture that was: the rest left the picture, was covered, or lies beside an object's edge.
+def displacement(scene: Scene, frame: float, frames: float, gaze: Gaze | None = None) -> Array:
+    """How far the surface seen in each pixel at a frame has moved so many frames later, (H, W, 2) [pixels].
+
+    From the scene itself where it knows (`World`), else along its flow (midpoint rule), which holds until the
+    surface is hidden.
     """
-
-    error: float
-    sharp: float
-    unmoved: float
-    compared: float
-
-
-def check_flow(scene: Scene, frame: int = 100, frames: int = 40, gaze: Gaze | None = None) -> FlowCheck:
-    """Carry every point of the picture at `frame` along the flow for so many frames, and compare its light with that at
-    the place where it comes to, read between pixels by Lanczos interpolation."""
-    y, x = np.indices(scene.shape).astype(np.float32)
-    first = scene.truth(frame, gaze)
-    alone, at = _alone(first), first
-    for since in range(0, frames, STEP):
-        step = min(STEP, frames - since)
-        here = _read(at.flow, x, y, cv2.INTER_LINEAR)
-        middle = scene.truth(frame + since + step / 2, gaze)
-        flow = _read(middle.flow, x + here[..., 0] * step / 2, y + here[..., 1] * step / 2, cv2.INTER_LINEAR)
-        x, y = x + flow[..., 0] * step, y + flow[..., 1] * step
-        at = scene.truth(frame + since + step, gaze)
-        alone &= _inside(x, y, scene.shape) & (_alone_at(at, x, y) == first.object_id)
-    full = float(first.radiance.max())
-    before, after = _blurred(first.radiance), _blurred(at.radiance)
-    pairs = {
-        "error": (before, _read(after, x, y, cv2.INTER_LANCZOS4)),
-        "sharp": (first.radiance, _read(at.radiance, x, y, cv2.INTER_LANCZOS4)),
-        "unmoved": (before, after),
-    }
-    errors = {name: _rms((there - here)[alone]) / full for name, (here, there) in pairs.items()}
-    return FlowCheck(**errors, compared=float(alone.mean()))
+    own: Any = getattr(scene, "displacement", None)
+    if own is not None:
+        return np.asarray(own(frame, frames, gaze), np.float32)
+    here = _grid(scene.shape)
+    place = here.copy()
+    count = max(1, round(abs(frames) / STEP))
+    step = frames / count
+    for k in range(count):
+        at = frame + k * step
+        half = place + np.float32(step / 2) * _read(scene.truth(at, gaze).flow, place)
+        place = place + np.float32(step) * _read(scene.truth(at + step / 2, gaze).flow, half)
+    return np.asarray(place - here, np.float32)
 
 
-def _blurred(picture: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.asarray(cv2.GaussianBlur(picture, (0, 0), BLUR), np.float32)
+def flow_error(scene: Scene, frame: float, frames: float = 40.0, gaze: Gaze | None = None) -> tuple[float, float]:
+    """(error, share): rms difference of light outside occlusions, of the scene's brightest; share of pixels compared."""
+    now, then = scene.truth(frame, gaze), scene.truth(frame + frames, gaze)
+    ahead, back = displacement(scene, frame, frames, gaze), displacement(scene, frame + frames, -frames, gaze)
+    place = _grid(scene.shape) + ahead
+    inside = (place >= 0).all(-1) & (place <= np.array(scene.shape[::-1]) - 1).all(-1)
+    returned = np.linalg.norm(ahead + _read(back, place), axis=-1) < 0.5
+    same = _read(_inner(then.object_id), place) == now.object_id + 1
+    compared = inside & returned & same & (_inner(now.object_id) > 0)
+    difference = (_read(then.radiance, place, cv2.INTER_CUBIC) - now.radiance)[compared].astype(np.float64)
+    scale = max(float(now.radiance.max()), 1e-9)
+    return float(np.sqrt(np.mean(difference**2))) / scale, float(compared.mean())
 
 
-def _alone(truth: Truth) -> NDArray[np.bool_]:
-    """Pixels with one object only about them."""
-    square, owner = np.ones((NEAR, NEAR), np.uint8), truth.object_id.astype(np.int16)
-    return cv2.erode(owner, square) == cv2.dilate(owner, square)
+def _inner(owner: NDArray[np.int32]) -> Array:
+    """Object id + 1 where all the neighbours are of the same object, else 0."""
+    names = (owner + 1).astype(np.float32)
+    kernel = np.ones((3, 3), np.uint8)
+    return np.where(cv2.erode(names, kernel) == cv2.dilate(names, kernel), names, 0).astype(np.float32)
 
 
-def _alone_at(truth: Truth, x: Places, y: Places) -> NDArray[np.int32]:
-    """The object at places, -1 where it is not alone."""
-    owner = np.where(_alone(truth), truth.object_id, -1).astype(np.float32)
-    return _read(owner, x, y, cv2.INTER_NEAREST).astype(np.int32)
+def _grid(shape: tuple[int, int]) -> Array:
+    rows, columns = np.indices(shape, np.float32)
+    return np.stack([columns, rows], -1)
 
 
-def _inside(x: Places, y: Places, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Far enough from the border to read about a place."""
-    return (x >= 2) & (x <= shape[1] - 3) & (y >= 2) & (y <= shape[0] - 3)
-
-
-def _read(picture: NDArray[np.float32], x: Places, y: Places, how: int) -> NDArray[np.float32]:
-    places = x.astype(np.float32), y.astype(np.float32)
-    return np.asarray(cv2.remap(picture, *places, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
-
-
-def _rms(difference: NDArray[np.floating]) -> float:
-    return float(np.sqrt(np.mean(np.square(difference, dtype=np.float64)))) if difference.size else float("nan")
+def _read(image: Array, place: Array, way: int = cv2.INTER_LINEAR) -> Array:
+    """The image at places between its pixels, the edge repeated."""
+    x, y = np.ascontiguousarray(place[..., 0], np.float32), np.ascontiguousarray(place[..., 1], np.float32)
+    return np.asarray(cv2.remap(image, x, y, way, borderMode=cv2.BORDER_REPLICATE), np.float32)

@@ -289,7 +289,7 @@ class World:
         picture = self._sky(frame, np.zeros(2))
         for number, body in enumerate(self.bodies):
             if body.backdrop:
-                _over(picture, self._sprite(number, frame, None), None)
+                _over(picture, self._sprite(number, frame, None), np.full_like(picture, np.inf))
         return picture
 
     def _sky(self, frame: float, offset: Floats) -> Array:
@@ -324,13 +324,16 @@ class World:
         """Radiance, depth and owner, of bodies rendered at this instant."""
         picture = self._sky(frame, _offsets(gaze, np.array([frame]))[0])
         depth = np.full(self.shape, np.inf, np.float32)
+        nearest = depth.copy()
         owner = np.zeros(self.shape, np.int32)
         for body in self._plan(int(frame // BLOCK)).order:
             sprite = self._sprite(body, frame, gaze)
-            shown = _over(picture, sprite, None if self.bodies[body].backdrop else depth)
+            shown = _over(picture, sprite, nearest)
             place = _place(sprite.window)
             depth[place][shown] = sprite.depth[shown]
             owner[place][shown] = body + 1
+            if not self.bodies[body].backdrop:
+                nearest[place][shown] = sprite.depth[shown]
         return picture, depth, owner
 
     def _sprite(self, body: int, frame: float, gaze: Gaze | None) -> Sprite:
@@ -604,12 +607,10 @@ def _compose(pictures: Array, base: Array, layers: list[_Layer], start: int, sto
             )
 
 
-def _over(picture: Array, sprite: Sprite, depth: Array | None) -> NDArray[np.bool_]:
+def _over(picture: Array, sprite: Sprite, depth: Array) -> NDArray[np.bool_]:
     """Lay a sprite over a picture, in place, but where the picture is nearer; returns where it is what is seen."""
     place = _place(sprite.window)
-    front = sprite.coverage > 0
-    if depth is not None:
-        front &= sprite.depth <= depth[place]
+    front = (sprite.coverage > 0) & (sprite.depth <= depth[place])
     covered = np.where(front, sprite.coverage, 0)
     picture[place] = np.where(front, sprite.radiance, 0) + (1 - covered) * picture[place]
     return np.asarray(covered > 0.5)

@@ -19,7 +19,7 @@ PERIOD_S = 2 * np.sqrt(2 * 0.32 / 981.0)
 
 def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Renderer | None = None) -> Scene:
     rng = np.random.default_rng(seed)
-    up = Still((0, -0.3, -0.6)) @ Bouncing(0.32, 981.0, 0.3)
+    up = Still((0, -0.42, -0.6)) @ Bouncing(0.32, 981.0, 0.3)
     beat = 1 / PERIOD_S
     bodies = [Body("torso", torso(rng), up)]
     for side, name in ((-1, "left"), (1, "right")):
@@ -28,7 +28,7 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
         arm = [capsule(0.5, 0.065, sleeve(rng), taper=0.8), sphere(0.075, 0.8, 24).moved(Still((0, 0.56, 0)))]
         leg = [capsule(0.62, 0.09, trousers(), taper=0.75), sphere(0.09, 0.08, 24).scaled((0.9, 0.8, 1.6)).moved(Still((0, 0.68, 0.06)))]
         bodies += [Body(f"{name} arm", assemble(*arm), up @ shoulder), Body(f"{name} leg", assemble(*leg), up @ hip)]
-    bodies.append(Body("rope", assemble(rope()), Still((0, 0.1, -0.6)) @ Spinning((1, 0, 0), 60 * beat, 100)))
+    bodies.append(Body("rope", assemble(rope()), Still((0, 0.0, -0.6)) @ Spinning((1, 0, 0), 60 * beat, 100)))
     return World(
         shape,
         bodies=(stage.wall(stage.mottled(rng, 0.2, 0.5)), stage.floor(stage.boards(rng), -1.02), *bodies),
