@@ -144,6 +144,7 @@ def flow_table(names: Iterable[str]) -> Rows:
             {
                 "scene": name,
                 "rms, %": 100 * check.error,
+                "shade aside, %": 100 * check.shade_aside,
                 "sharp, %": 100 * check.sharp,
                 "not moved, %": 100 * check.unmoved,
                 "compared, %": 100 * check.compared,

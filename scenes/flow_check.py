@@ -22,17 +22,22 @@ NEAR = 5
 BLUR = 0.7
 """Pixels, standard deviation: what alternates from pixel to pixel cannot be read between them, right as flow may be."""
 
+SHADE = 8.0
+"""Pixels, standard deviation: wide beside what a texture shows, narrow beside how shade falls on a body."""
+
 Places = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
 class FlowCheck:
     """error: rms of what came along the flow against what is there, share of full scale (the brightest light), both
-    pictures first blurred by `BLUR`.  sharp: the same without blur.  unmoved: blurred, had nothing been moved.
+    pictures first blurred by `BLUR`.  shade_aside: the same once what turned in the light is given its new shade, taken
+    as smooth over `SHADE` within an object.  sharp: without blur.  unmoved: blurred, had nothing been moved.
     compared: share of the picture that was: the rest left the picture, was covered, or lies beside an object's edge.
     """
 
     error: float
+    shade_aside: float
     sharp: float
     unmoved: float
     compared: float
@@ -54,8 +59,10 @@ def check_flow(scene: Scene, frame: int = 100, frames: int = 40, gaze: Gaze | No
         alone &= _inside(x, y, scene.shape) & (_alone_at(at, x, y) == first.object_id)
     full = float(first.radiance.max())
     before, after = _blurred(first.radiance), _blurred(at.radiance)
+    there = _read(after, x, y, cv2.INTER_LANCZOS4)
     pairs = {
-        "error": (before, _read(after, x, y, cv2.INTER_LANCZOS4)),
+        "error": (before, there),
+        "shade_aside": (before * _shade(before, there, first.object_id, alone), there),
         "sharp": (first.radiance, _read(at.radiance, x, y, cv2.INTER_LANCZOS4)),
         "unmoved": (before, after),
     }
@@ -65,6 +72,18 @@ def check_flow(scene: Scene, frame: int = 100, frames: int = 40, gaze: Gaze | No
 
 def _blurred(picture: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(cv2.GaussianBlur(picture, (0, 0), BLUR), np.float32)
+
+
+def _shade(
+    before: NDArray[np.float32], after: NDArray[np.float32], owner: NDArray[np.int32], compared: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Smooth ratio of both within each object: light about a pixel afterwards, over light about it before."""
+    ratio = np.ones_like(before)
+    for number in np.unique(owner[compared]):
+        mine = (compared & (owner == number)).astype(np.float32)
+        then, now = (cv2.GaussianBlur(mine * light, (0, 0), SHADE) for light in (after, before))
+        ratio = np.where((mine > 0) & (now > 0), then / np.maximum(now, 1e-9), ratio)
+    return ratio
 
 
 def _alone(truth: Truth) -> NDArray[np.bool_]:
