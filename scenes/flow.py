@@ -3,6 +3,9 @@
 `flow_error` looks up, for every pixel of frame t, where its surface has gone n frames later, and compares the light.
 Left out is what cannot be compared: surfaces that leave the picture, are hidden by then, or lie at an edge, where a
 pixel is a mixture of two.  What turns also changes its shade; that is part of the error.
+
+Both pictures are smoothed a little first: a pixel's area lets detail through that no interpolation can place (on the
+disk of the paper 2.1 % rms without, 1.2 % with; the flow is the same).
 """
 
 from __future__ import annotations
@@ -17,6 +20,9 @@ from scenes.protocol import Gaze, Scene
 
 STEP = 2.0
 """Frames of a step along the flow, for scenes that give no displacement themselves."""
+
+SMOOTHING = 0.5
+"""Standard deviation [pixels]."""
 
 Array = NDArray[np.float32]
 
@@ -41,8 +47,13 @@ def displacement(scene: Scene, frame: float, frames: float, gaze: Gaze | None = 
     return np.asarray(place - here, np.float32)
 
 
-def flow_error(scene: Scene, frame: float, frames: float = 40.0, gaze: Gaze | None = None) -> tuple[float, float]:
-    """(error, share): rms difference of light outside occlusions, of the scene's brightest; share of pixels compared."""
+def flow_error(
+    scene: Scene, frame: float, frames: float = 40.0, gaze: Gaze | None = None, smoothing: float = SMOOTHING
+) -> tuple[float, float]:
+    """(error, share): rms difference of light outside occlusions, of the scene's brightest; share of pixels compared.
+
+    smoothing   of both pictures, standard deviation [pixels]; 0 for none
+    """
     now, then = scene.truth(frame, gaze), scene.truth(frame + frames, gaze)
     ahead, back = displacement(scene, frame, frames, gaze), displacement(scene, frame + frames, -frames, gaze)
     place = _grid(scene.shape) + ahead
@@ -50,7 +61,8 @@ def flow_error(scene: Scene, frame: float, frames: float = 40.0, gaze: Gaze | No
     returned = np.linalg.norm(ahead + _read(back, place), axis=-1) < 0.5
     same = _read(_inner(then.object_id), place) == now.object_id + 1
     compared = inside & returned & same & (_inner(now.object_id) > 0)
-    difference = (_read(then.radiance, place, cv2.INTER_CUBIC) - now.radiance)[compared].astype(np.float64)
+    before, after = (_smoothed(truth.radiance, smoothing) for truth in (now, then))
+    difference = (_read(after, place, cv2.INTER_LANCZOS4) - before)[compared].astype(np.float64)
     scale = max(float(now.radiance.max()), 1e-9)
     return float(np.sqrt(np.mean(difference**2))) / scale, float(compared.mean())
 
@@ -60,6 +72,10 @@ def _inner(owner: NDArray[np.int32]) -> Array:
     names = (owner + 1).astype(np.float32)
     kernel = np.ones((3, 3), np.uint8)
     return np.where(cv2.erode(names, kernel) == cv2.dilate(names, kernel), names, 0).astype(np.float32)
+
+
+def _smoothed(picture: Array, deviation: float) -> Array:
+    return np.asarray(cv2.GaussianBlur(picture, (0, 0), deviation), np.float32) if deviation > 0 else picture
 
 
 def _grid(shape: tuple[int, int]) -> Array:

@@ -101,7 +101,9 @@ def _sampled(coverage: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def _spread(present: NDArray[np.bool_]) -> NDArray[np.intp]:
     """About SAMPLES of the places that are present, evenly from the first to the last."""
     places = np.flatnonzero(present)
-    return places[np.unique(np.linspace(0, len(places) - 1, SAMPLES).round().astype(np.intp))] if len(places) else places
+    return (
+        places[np.unique(np.linspace(0, len(places) - 1, SAMPLES).round().astype(np.intp))] if len(places) else places
+    )
 
 
 def project(view: Floats, points: Floats, focal: float, centre: tuple[float, float]) -> tuple[Floats, Floats]:

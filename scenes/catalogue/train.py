@@ -64,7 +64,14 @@ def carriage(rng: np.random.Generator) -> Surface:
 
 def locomotive() -> Surface:
     half = LENGTH / 2
-    outline = [(-half, 0.7), (half + 0.2, 0.7), (half + 0.25, 1.2), (half - 1.3, 2.7), (half - 2.6, 3.45), (-half, 3.45)]
+    outline = [
+        (-half, 0.7),
+        (half + 0.2, 0.7),
+        (half + 0.25, 1.2),
+        (half - 1.3, 2.7),
+        (half - 2.6, 3.45),
+        (-half, 3.45),
+    ]
     canvas = Canvas(1152, 352, 0.35).rectangle(0, 0.72, 1, 0.84, 0.9).rectangle(0, 0, 1, 0.14, 0.35)
     canvas.polygon([(0.74, 0.28), (0.83, 0.28), (0.9, 0.52), (0.74, 0.52)], 0.05)
     for k in range(9):
