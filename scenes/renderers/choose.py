@@ -15,9 +15,9 @@ import subprocess
 import sys
 from functools import cache
 from glob import glob
+from importlib.util import find_spec
 
 from scenes.renderers.contexts import FIX
-from scenes.renderers.embree import Embree
 from scenes.renderers.opengl import OpenGL
 from scenes.renderers.protocol import Renderer
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
@@ -39,11 +39,11 @@ def choose_renderer(wanted: str | None = None) -> Renderer:
     """A renderer, and one line in the log (INFO) that names it; a WARNING where there is no OpenGL at all.
 
     wanted: one of `BACKENDS`, or "auto" for the first that works; default: SPIKECAM_RENDERER, else "auto".
-    Errors: InputError for an unknown name, or for a named back-end that this machine cannot serve, with the fix.
+    Errors: InputError for an unknown name, or with the fix where the wanted back-end, or none at all, serves here.
     """
     name = wanted or os.environ.get(VARIABLE) or "auto"
     if name == "auto":
-        name = next(candidate for candidate in BACKENDS if _works(candidate))
+        name = _first_that_works()
     renderer = make(name)
     if name == "embree" and wanted != "embree" and os.environ.get(VARIABLE) != "embree":
         logger.warning(
@@ -58,9 +58,11 @@ def make(name: str) -> Renderer:
     """The back-end of this name in this process.  Errors: as `choose_renderer`."""
     if name not in BACKENDS:
         raise unknown_name("renderer", name, (*BACKENDS, "auto"))
-    if name == "embree":
-        return Embree()
     try:
+        if name == "embree":
+            from scenes.renderers.embree import Embree
+
+            return Embree()
         return OpenGL(name)
     except NotReadyError:
         raise
@@ -75,7 +77,7 @@ def make(name: str) -> Renderer:
 def problem(name: str) -> str | None:
     """Why a back-end does not work on this machine; None where it does.  Tried once, in a process of its own."""
     if name == "embree":
-        return None
+        return None if find_spec("embreex") else "embreex is not installed"
     if name == "egl-hardware" and not any(glob(pattern) for pattern in _CARDS):
         return f"no graphics card: none of {', '.join(_CARDS)}"
     try:
@@ -87,7 +89,7 @@ def problem(name: str) -> str | None:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
     except subprocess.TimeoutExpired:
-        return f"hangs: no triangle after {LONGEST_TRIAL_S:.0f} s"
+        return f"hangs: no triangle after {LONGEST_TRIAL_S:g} s"
     if trial.returncode == 0:
         return None
     if trial.returncode < 0:
@@ -95,8 +97,14 @@ def problem(name: str) -> str | None:
     return (trial.stderr.strip().splitlines() or ["no message"])[-1]
 
 
-def _works(name: str) -> bool:
-    reason = problem(name)
-    if reason is not None:
+def _first_that_works() -> str:
+    """Errors: InputError with every reason where none does."""
+    reasons = {}
+    for name in BACKENDS:
+        reason = problem(name)
+        if reason is None:
+            return name
         logger.debug("renderer %s is left out: %s", name, reason)
-    return reason is None
+        reasons[name] = reason
+    listed = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
+    raise InputError(f"no renderer works here ({listed}); {FIX['egl-software']}, or {FIX['embree']}")

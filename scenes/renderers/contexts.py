@@ -21,8 +21,9 @@ FIX = {
     "egl-hardware": f"{_PACKAGES} and the graphics card's driver",
     "egl-software": _PACKAGES,
     "osmesa": "install the system package libosmesa6 (Debian, Ubuntu: apt-get install -y libosmesa6)",
+    "embree": "pip install embreex (x86-64, or macOS)",
 }
-"""What to do where a kind of context cannot be had."""
+"""What to do where a back-end cannot be had."""
 
 EGL_EXTENSIONS = 0x3055
 SOFTWARE = b"EGL_MESA_device_software"

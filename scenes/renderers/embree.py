@@ -71,6 +71,7 @@ class Embree:
                 shape.albedo.texels,
                 shape.albedo.start,
                 shape.albedo.shape,
+                SHARPER,
                 towards(lighting),
                 (lighting.ambient, lighting.intensity, surface.emission),
                 sprite.radiance[rows],
@@ -146,12 +147,12 @@ def _rays(eye, turn, left, top, pixel, rows, columns, supersample):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _shade(hit, place, m, faces, normals, uv, texels, start, shape, lamp, light, radiance, coverage, depth):
+def _shade(hit, place, m, faces, normals, uv, texels, start, shape, sharper, lamp, light, radiance, coverage, depth):
     """Mean radiance and coverage of each pixel's rays, mean depth of those that hit."""
     left, top, pixel = place
     rows, columns, rays = hit.shape
     cells = round(sqrt(rays))
-    step = pixel / cells
+    height, width = shape[0, 0] * pixel / cells, shape[0, 1] * pixel / cells
     ambient, intensity, emission = light
     textured = shape[0, 0] * shape[0, 1] > 1
     albedo = texels[0]
@@ -188,8 +189,11 @@ def _shade(hit, place, m, faces, normals, uv, texels, start, shape, lamp, light,
                     vy = (m01 * uv[v0, 1] + m11 * uv[v1, 1] + m21 * uv[v2, 1]) * z
                     sx = (m00 + m10 + m20) * z
                     sy = (m01 + m11 + m21) * z
-                    footprint = abs((ux - u * sx) * (vy - v * sy) - (uy - u * sy) * (vx - v * sx)) * step * step
-                    albedo = _read(texels, start, shape, u, v, footprint)
+                    ax, ay = (ux - u * sx) * width, (vx - v * sx) * height
+                    bx, by = (uy - u * sy) * width, (vy - v * sy) * height
+                    longest = max(sqrt(max(ax * ax + ay * ay, bx * bx + by * by)), 1e-30)
+                    side = max(abs(ax * by - ay * bx) / longest, longest / 2)
+                    albedo = _read(texels, start, shape, u, v, log2(side) + sharper)
                 light_sum += albedo * (ambient + intensity * max(0.0, cosine)) + emission
                 depth_sum += z
                 count += 1
@@ -200,9 +204,8 @@ def _shade(hit, place, m, faces, normals, uv, texels, start, shape, lamp, light,
 
 
 @numba.njit(cache=True)
-def _read(texels, start, shape, u, v, footprint):
-    """Texture at (u, v), blended between the two levels that suit the footprint (a share of the texture's area)."""
-    fineness = 0.5 * log2(max(footprint * shape[0, 0] * shape[0, 1], 1e-30)) + SHARPER
+def _read(texels, start, shape, u, v, fineness):
+    """Texture at (u, v), blended between the two levels next to `fineness`."""
     fineness = min(max(fineness, 0.0), len(start) - 1.0)
     level = min(int(fineness), max(len(start) - 2, 0))
     blend = fineness - level

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,7 +47,7 @@ class OpenGL:
 
     kind    "egl-hardware", "egl-software" or "osmesa"; one process serves EGL or OSMesa, not both
     Errors: RuntimeError, ImportError and others of the libraries, where the machine cannot (`choose_renderer` says
-    it in one line); NotReadyError for use in a forked process, where OpenGL would hang.
+    it in one line); NotReadyError for use in a forked process, where OpenGL would hang, or in another thread.
     """
 
     def __init__(self, kind: str) -> None:
@@ -54,7 +55,7 @@ class OpenGL:
         from OpenGL import GL
         from pyrender.shader_program import ShaderProgram
 
-        self._gl, self._process = GL, os.getpid()
+        self._gl, self._home = GL, _here()
         library = "OSMesa" if kind == "osmesa" else "EGL"
         self.name = f"{library} ({GL.glGetString(GL.GL_RENDERER).decode()})"
         self._surface_program, self._mean_program = (
@@ -88,14 +89,17 @@ class OpenGL:
         farthest = -corners[:, 2].min()
         nearest = max(-corners[:, 2].max(), NEAREST * farthest)
         self._light(surface, uploaded, pose, matrix, lighting)
+        abilities = self._abilities(uploaded.geometry, matrix)
         sprite = blank(part)
         for tile in _tiles(part, max(1, LARGEST // supersample)):
-            self._draw(uploaded, _to_window(camera, tile, 0.999 * nearest, 1.001 * farthest), tile, supersample)
+            self._draw(
+                uploaded, _to_window(camera, tile, 0.999 * nearest, 1.001 * farthest), tile, supersample, abilities
+            )
             self._read(sprite, tile)
         return pasted(sprite, window)
 
     def close(self) -> None:
-        if self._closed or os.getpid() != self._process:
+        if self._closed or self._home != _here():
             return
         self._enter()
         self._context.end()
@@ -105,10 +109,10 @@ class OpenGL:
         """The context is current, and what belonged to surfaces that are gone is given back."""
         if self._closed:
             raise NotReadyError("this renderer is closed; make a new one with choose_renderer()")
-        if os.getpid() != self._process:
+        if self._home != _here():
             raise NotReadyError(
-                "this renderer was made before the process was forked, and OpenGL does not survive that; make one "
-                "renderer in each process, and start processes with multiprocessing.get_context('spawn')"
+                "this renderer was made in another thread, or before the process was forked, and OpenGL does not "
+                "follow; make one in each, and start processes with multiprocessing.get_context('spawn')"
             )
         self._context.make_current()
         while self._forgotten:
@@ -138,13 +142,24 @@ class OpenGL:
         gl.glUniform1f(at("levels"), float(len(uploaded.geometry.albedo.start)))
         gl.glUniform1f(at("sharper"), SHARPER)
 
-    def _draw(self, uploaded: _Uploaded, to_window: NDArray[np.float64], tile: Window, supersample: int) -> None:
+    def _abilities(self, geometry: Geometry, matrix: NDArray[np.float64]) -> list[Any]:
+        """Without back faces where they are hidden, in a closed surface seen from outside: a quarter faster."""
+        gl = self._gl
+        gl.glFrontFace(gl.GL_CW if np.linalg.det(matrix) > 0 else gl.GL_CCW)  # in the picture y points down
+        eye = np.linalg.inv(matrix)[:3, 3]
+        outside = (eye < geometry.vertices.min(axis=0)).any() or (eye > geometry.vertices.max(axis=0)).any()
+        hidden = [gl.GL_CULL_FACE] if geometry.closed and outside else []
+        return [gl.GL_SCISSOR_TEST, gl.GL_DEPTH_TEST, *hidden]
+
+    def _draw(
+        self, uploaded: _Uploaded, to_window: NDArray[np.float64], tile: Window, supersample: int, abilities: list[Any]
+    ) -> None:
         gl = self._gl
         targets = self._targets_for(tile, supersample)
         gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, targets.rays)
         gl.glViewport(0, 0, tile.columns * supersample, tile.rows * supersample)
         gl.glScissor(0, 0, tile.columns * supersample, tile.rows * supersample)
-        for ability in (gl.GL_SCISSOR_TEST, gl.GL_DEPTH_TEST):
+        for ability in abilities:
             gl.glEnable(ability)
         gl.glClearColor(0.0, 0.0, 0.0, 0.0)
         gl.glClear(gl.GL_COLOR_BUFFER_BIT | gl.GL_DEPTH_BUFFER_BIT)
@@ -153,7 +168,7 @@ class OpenGL:
         gl.glBindTexture(gl.GL_TEXTURE_2D, uploaded.texture)
         gl.glBindVertexArray(uploaded.primitive._vaid)
         gl.glDrawElements(gl.GL_TRIANGLES, uploaded.geometry.faces.size, gl.GL_UNSIGNED_INT, ctypes.c_void_p(0))
-        for ability in (gl.GL_SCISSOR_TEST, gl.GL_DEPTH_TEST):
+        for ability in abilities:
             gl.glDisable(ability)
 
         gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, targets.pixels)
@@ -242,6 +257,11 @@ class _Targets:
         gl.glDeleteFramebuffers(2, [self.rays, self.pixels])
         gl.glDeleteRenderbuffers(1, [self.depth])
         _delete_textures(self.rays_texture, self.pixels_texture)
+
+
+def _here() -> tuple[int, int]:
+    """This process, this thread."""
+    return os.getpid(), threading.get_ident()
 
 
 def _to_window(camera: Pinhole, window: Window, near: float, far: float) -> NDArray[np.float64]:

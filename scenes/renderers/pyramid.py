@@ -1,11 +1,12 @@
 """Textures that do not flicker: halvings by area, so that a ray can read at the fineness of its footprint.
 
-A ray whose footprint on the texture is a texels reads between the levels next to
+A ray steps over a texture by a parallelogram.  It reads between the levels next to
 
-    level = log2(a) / 2 + SHARPER        level l is the texture reduced by 2^l
+    level = log2(max(shortest, longest / 2)) + SHARPER        [texels]; level l is the texture reduced by 2^l
 
-Source: Williams, "Pyramidal parametrics", SIGGRAPH 1983; OpenGL's texture level, with the footprint's area in
-place of its longest side.
+longest: the longer side, shortest: area / longest.  Source: Williams, "Pyramidal parametrics", SIGGRAPH 1983; OpenGL's
+EXT_texture_filter_anisotropic.  Measured on the picture of `compare.py` at 2 x 2 rays a pixel against 16 x 16, rms of
+full scale: 1.00 %; by the area of the footprint alone 1.24 %, by its longest side alone 1.26 %, without levels 1.54 %.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from scenes.renderers.protocol import Array
 
 SHARPER = -0.5
-"""Added to the level.  The box over the rays of a pixel already filters; reading two levels bilinearly blurs again."""
+"""Added to the level: the box over a pixel's rays filters too.  The picture above: 1.10 % at -1, 1.11 % at 0."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ rows, glGenTextures of PyOpenGL 3.1.0 on Python >= 3.12), `OffscreenRenderer.del
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import sys
 import types
@@ -31,6 +32,7 @@ def import_pyrender(platform: str) -> Any:
             f"start a new process for {platform}"
         )
     os.environ[_PLATFORM] = platform
+    logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)  # or it says at each start what it lacks
     if "pyrender.viewer" not in sys.modules:
         stub: Any = types.ModuleType("pyrender.viewer")
         stub.Viewer = None

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
@@ -15,7 +16,7 @@ from scenes.renderers.pyramid import Pyramid, pyramid
 from spikecam_env.errors import InputError
 
 NEAREST = 1e-3
-"""Share of the farthest vertex's distance at which a surface begins to be seen; nearer parts are cut away."""
+"""Share of the farthest vertex's distance at which OpenGL begins to see a surface; it cuts nearer parts away."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Geometry:
     uv                 (V, 2) float64; zeros where the albedo is one value
     faces              (F, 3) int32
     albedo             the texture and its reductions; one texel where the albedo is one value
+    closed             whether the mesh bounds a volume, faces outwards: from outside only front faces are seen
     """
 
     vertices: NDArray[np.float64]
@@ -33,6 +35,7 @@ class Geometry:
     uv: NDArray[np.float64]
     faces: NDArray[np.int32]
     albedo: Pyramid
+    closed: bool
 
 
 def geometry(surface: Surface) -> Geometry:
@@ -57,6 +60,7 @@ def geometry(surface: Surface) -> Geometry:
         uv=np.array(uv, np.float64)[:, :2] if albedo.ndim == 2 else np.zeros((len(mesh.vertices), 2)),
         faces=np.array(mesh.faces, np.int32),
         albedo=pyramid(np.atleast_2d(albedo)),
+        closed=_closed(mesh),
     )
 
 
@@ -119,6 +123,12 @@ def checked(window: Window, supersample: int) -> None:
         raise InputError(f"the window has {window.rows} rows and {window.columns} columns; it needs some of each")
     if supersample < 1:
         raise InputError(f"supersample is {supersample}; it must be at least 1 ray a pixel and axis")
+
+
+def _closed(mesh: trimesh.Trimesh) -> bool:
+    """Whether it bounds a volume once the seams of texture and shading are sewn up."""
+    sewn = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    return bool(sewn.is_volume)
 
 
 def _overlap(positions: NDArray[np.float64], first: int, count: int) -> tuple[int, int]:

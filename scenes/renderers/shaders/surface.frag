@@ -11,10 +11,11 @@ in float distance_along_axis;
 out vec4 ray;  // radiance, 1, depth
 
 void main() {
-    vec2 across = dFdx(uv), down = dFdy(uv);
     vec2 size = vec2(textureSize(albedo, 0));
-    float footprint = abs(across.x * down.y - across.y * down.x) * size.x * size.y;
-    float level = clamp(0.5 * log2(max(footprint, 1e-30)) + sharper, 0.0, levels - 1.0);
+    vec2 across = dFdx(uv) * size, down = dFdy(uv) * size;
+    float longest = max(sqrt(max(dot(across, across), dot(down, down))), 1e-30);
+    float side = max(abs(across.x * down.y - across.y * down.x) / longest, longest / 2.0);
+    float level = clamp(log2(side) + sharper, 0.0, levels - 1.0);
     float cosine = dot(world_normal, towards_lamp) / max(length(world_normal), 1e-30);
     float reflected = textureLod(albedo, uv, level).r * (light.x + light.y * max(0.0, cosine));
     ray = vec4(reflected + light.z, 1.0, distance_along_axis, 0.0);
