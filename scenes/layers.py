@@ -84,7 +84,7 @@ def _sampled(coverage: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """(rows, columns) of texels that are covered: a grid of about SAMPLES a side, and the ends of its rows and columns,
     as it is at the outline that a polynomial goes wrong first."""
     solid = coverage >= min(0.99, max(float(coverage.max(initial=0)), 1e-6))
-    rows, columns = _spread(solid.any(1)), _spread(solid.any(0))
+    rows, columns = (_spread(np.asarray(solid.any(axis))) for axis in (1, 0))
     if not len(rows):
         return rows, columns
     last_row, last_column = len(solid) - 1, solid.shape[1] - 1

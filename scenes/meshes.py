@@ -278,7 +278,7 @@ def prism(outline: Sequence[tuple[float, float]], depth: float, side: Albedo = 0
 
 def _between(a: Points, b: Points, depth: float, u: Points, v: Points) -> Sequence[Points]:
     """The wall of a prism from corner a to corner b."""
-    return a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), depth * (0.5 - v)
+    return a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), depth * (v - 0.5)
 
 
 def _turned(knots: Points, albedo: Albedo, sections: int, pieces: int, straight: bool = False) -> Part:

@@ -46,7 +46,10 @@ BLOCK = 256
 LONGEST_STEP = 64
 """Frames between two keys of light, at most: what the sensor integrates in one go."""
 
-BLUR = 0.35
+SHORTEST_KEY_STEP = 16
+"""Frames between two keys of a body, at least: 2500 a second at 40 kHz."""
+
+BLUR = 0.5
 """Most that the two keys of a body may disagree on a place half-way between them, rms [pixels]."""
 
 SHADE = 0.01
@@ -475,13 +478,12 @@ def _key_step(probe: _Probe, view: Floats, focal: float, lighting: Lighting, pos
     normals = probe.normals @ np.swapaxes(pose[:, :3, :3], -1, -2)
     shade = lighting.intensity * np.maximum(normals @ lamp, 0) / max(lighting.intensity + lighting.ambient, 1e-9)
     stride = _NODES
-    while stride > 2:
+    while stride * BLOCK // _NODES > SHORTEST_KEY_STEP:
         pieces = [slice(a, a + stride + 1) for a in range(0, _NODES, stride)]
         if all(_carries(pixels[p], depth[p], facing[p], shade[p]) for p in pieces):
-            return BLOCK * stride // _NODES
+            break
         stride //= 2
-    # below the nodes' spacing motion is even: what two keys disagree on shrinks with the square of the step
-    return _power_of_two(BLOCK * stride / _NODES, BLOCK)
+    return stride * BLOCK // _NODES
 
 
 def _carries(pixels: Floats, depth: Floats, facing: Floats, shade: Floats) -> bool:

@@ -24,9 +24,8 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
     bodies = [Body(f"body {k + 1}", solid(rng), motion(rng)) for k in range(int(rng.integers(3, 8)))]
     low, high = np.sort(rng.uniform(0.05, 0.8, 2))
     wall = stage.wall((low + (high - low) * random_texture(rng, 512)).astype(np.float32), -3.0, (9.0, 9.0))
-    shake: Trajectory = (
-        Shake(0.06, highest_hz=40, seed=int(rng.integers(1 << 31))) if rng.random() < SHAKEN else AT_REST
-    )
+    shaken = Shake(0.06, highest_hz=40, seed=int(rng.integers(1 << 31)))
+    shake: Trajectory = shaken if rng.random() < SHAKEN else AT_REST
     ambient = rng.uniform(0.2, 0.5)
     towards = (float(rng.uniform(-0.8, 0.8)), float(rng.uniform(0.1, 0.9)), 0.8)
     return World(
