@@ -19,6 +19,7 @@ from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.record import Record
+from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
 from spikecam_env.errors import InputError
 
@@ -34,6 +35,7 @@ examples:
 COMMANDS: dict[str, Any] = {
     "demo": Demo,
     "record": Record,
+    "scenes": Scenes,
     "denoise": Denoise,
     "train": Train,
     "evaluate": Evaluate,
