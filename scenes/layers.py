@@ -1,0 +1,266 @@
+"""Layers: a body rendered alone at a key time, then warped to any time near it and laid over the picture.
+
+A key is a sprite: premultiplied light, coverage and depth at `DENSITY` texels a pixel.  Of each body the two keys
+around an instant are carried to it by the true motion of the points they show, and blended by time: what either
+misplaces grows with the distance in time and has opposite sign in the two, so to first order it cancels, and
+where a key is reached only that key is seen, so nothing pops.
+
+The motion of the points is summed up by a polynomial of second degree from picture to sprite,
+
+    s = C (1, u, v, u^2, u v, v^2),   (u, v): the pixel relative to the points' middle, in units of their spread
+
+fitted by least squares: exact for planes seen in parallel, and close for the dome that a ball is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Surface, Window
+
+DENSITY = float(np.sqrt(3))
+"""Texels a pixel.  A box of a texel and bilinear interpolation blur by (1 / 12 + 1 / 6) / DENSITY^2 pixels^2, and a
+pixel's area by 1 / 12: at the root of 3 they are equal."""
+
+SUPERSAMPLE = 3
+"""Rays a texel's side; 27 a pixel."""
+
+SAMPLES = 14
+"""Points of a sprite's side whose motion is followed."""
+
+RIDGE = 1e-4
+"""Weight, against one point, that keeps the turn and bend of a sprite seen in few points at rest."""
+
+Array = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Key:
+    """A body seen alone at one instant.
+
+    planes   (3, h, w) float32: light x coverage, coverage, depth x coverage
+    points   (J, 3) of the body that it shows, in the body's coordinates;  texels  (J, 2) where, x then y
+    """
+
+    planes: Array
+    points: Floats
+    texels: Floats
+
+
+def render_key(
+    renderer: Renderer, surface: Surface, pose: Floats, camera: Pinhole, lighting: Lighting, window: Window
+) -> Key:
+    """The surface at a pose in a window of the picture [pixels]."""
+    dense = Pinhole(camera.focal * DENSITY, _dense(camera.centre), camera.pose)
+    left, top = np.floor(_dense((window.left, window.top))).astype(int)
+    right, bottom = np.ceil(_dense((window.left + window.columns, window.top + window.rows))).astype(int)
+    cut = Window(int(top), int(left), int(bottom - top), int(right - left))
+    sprite = renderer.render(surface, pose, dense, lighting, cut, SUPERSAMPLE)
+    depth = np.where(sprite.coverage > 0, sprite.depth, 0).astype(np.float32)
+    planes = np.stack([sprite.radiance, sprite.coverage, sprite.coverage * depth]).astype(np.float32)
+    rows, columns = _sampled(sprite.coverage)
+    z = depth[rows, columns].astype(np.float64)
+    x = (columns + left - dense.centre[0]) / dense.focal * z
+    y = (dense.centre[1] - rows - top) / dense.focal * z
+    to_body = np.linalg.inv(pose) @ camera.pose
+    points = np.stack([x, y, -z], -1) @ to_body[:3, :3].T + to_body[:3, 3]
+    return Key(planes, points, np.stack([columns, rows], -1).astype(np.float64))
+
+
+def _dense(xy: tuple[float, float]) -> tuple[float, float]:
+    return xy[0] * DENSITY + (DENSITY - 1) / 2, xy[1] * DENSITY + (DENSITY - 1) / 2
+
+
+def _sampled(coverage: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """(rows, columns) of well covered texels on a grid over what is covered, about SAMPLES a side."""
+    solid = coverage > 0.99
+    if not solid.any():
+        solid = coverage >= max(float(coverage.max()), 1e-6)
+    rows, columns = np.flatnonzero(solid.any(1)), np.flatnonzero(solid.any(0))
+    if not len(rows):
+        return rows, columns
+    grid = np.ix_(_spread(rows), _spread(columns))
+    at = np.argwhere(solid[grid])
+    if not len(at):
+        at = np.argwhere(solid)[:1]
+        return at[:, 0], at[:, 1]
+    return grid[0][at[:, 0], 0], grid[1][0, at[:, 1]]
+
+
+def _spread(present: NDArray[np.intp]) -> NDArray[np.intp]:
+    return np.unique(np.linspace(present[0], present[-1], SAMPLES).round().astype(np.intp))
+
+
+def project(view: Floats, points: Floats, focal: float, centre: tuple[float, float]) -> tuple[Floats, Floats]:
+    """(..., J, 2) pixels and (..., J) depth of points (J, 3) under maps to the camera (..., 4, 4)."""
+    seen = points @ np.swapaxes(view[..., :3, :3], -1, -2) + view[..., None, :3, 3]
+    depth = -seen[..., 2]
+    safe = np.maximum(depth, 1e-6)
+    return np.stack([centre[0] + focal * seen[..., 0] / safe, centre[1] - focal * seen[..., 1] / safe], -1), depth
+
+
+def fit(key_pixels: Floats, pixels: Floats) -> tuple[Floats, Floats]:
+    """The polynomials that carry pixels (n, J, 2) back to texels (J, 2) of the key.
+
+    Returns the frames of reference (n, 3): middle x, y and 1 / spread; and the coefficients (n, 2, 6).
+    What points do not determine stays as it is without turn: texels = DENSITY * pixels + constant.
+    """
+    middle = pixels.mean(-2)
+    offset = pixels - middle[:, None]
+    spread = np.maximum(np.sqrt((offset**2).sum(-1).mean(-1)), 1.0)
+    u, v = np.moveaxis(offset / spread[:, None, None], -1, 0)
+    basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], -1)
+    rest = key_pixels - DENSITY * offset
+    transposed = np.swapaxes(basis, -1, -2)
+    normal = transposed @ basis + RIDGE * np.diag([0.0, 1, 1, 1, 1, 1])
+    found = np.linalg.solve(normal, transposed @ rest)
+    found[:, 1, 0] += DENSITY * spread
+    found[:, 2, 1] += DENSITY * spread
+    return np.concatenate([middle, 1 / spread[:, None]], -1), np.swapaxes(found, -1, -2)
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """A key carried to n instants: frames of reference (n, 3), coefficients (n, 2, 6) and change of depth (n,)."""
+
+    key: Key
+    reference: Array
+    coefficients: Array
+    deeper: Array
+
+
+def carry(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Carried:
+    """The key seen under maps from body to camera (n, 4, 4), with the picture's centre at `centre` (n, 2)."""
+    pixels, depth = project(view, key.points, focal, (0.0, 0.0))
+    pixels += centre[:, None]
+    _, before = project(key_view, key.points, focal, (0.0, 0.0))
+    reference, coefficients = fit(key.texels, pixels)
+    deeper = depth.mean(-1) - before.mean()
+    return Carried(key, reference.astype(np.float32), coefficients.astype(np.float32), deeper.astype(np.float32))
+
+
+def lay(
+    pictures: Array,
+    depths: Array,
+    boxes: NDArray[np.int64],
+    before: Carried,
+    after: Carried,
+    share: Array,
+    tested: bool,
+    marked: bool,
+) -> None:
+    """Lay a body over pictures (n, H, W), in place: out = light + (1 - coverage) x picture.
+
+    boxes    (n, 4) where it may be seen: top, left, bottom, right
+    share    (n,) of the later key, 0..1
+    depths   (n, H, W), of what has been laid so far; used if `tested` (hide where deeper) or `marked` (write)
+    """
+    _lay(
+        pictures,
+        depths,
+        boxes,
+        before.key.planes,
+        before.reference,
+        before.coefficients,
+        before.deeper,
+        after.key.planes,
+        after.reference,
+        after.coefficients,
+        after.deeper,
+        share,
+        tested,
+        marked,
+    )
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _row(coefficients, reference, y):  # pragma: no cover - compiled
+    """Along row y: texel = a + b x' + c x'^2 with x' = x - middle, for x and y."""
+    k = reference[2]
+    v = (y - reference[1]) * k
+    c = coefficients
+    return (
+        c[0, 0] + v * (c[0, 2] + v * c[0, 5]),
+        (c[0, 1] + v * c[0, 4]) * k,
+        c[0, 3] * k * k,
+        c[1, 0] + v * (c[1, 2] + v * c[1, 5]),
+        (c[1, 1] + v * c[1, 4]) * k,
+        c[1, 3] * k * k,
+    )
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _sample_row(planes, coefficients, reference, y, x0, x1, weight, channels, out):  # pragma: no cover - compiled
+    """Add weight x planes, bilinear, along pixels x0 .. x1 of row y to out (3, W)."""
+    height, width = planes.shape[1], planes.shape[2]
+    a, b, c, d, e, f = _row(coefficients, reference, np.float32(y))
+    flat = planes.reshape(-1)
+    size = np.int32(height * width)
+    step = np.int32(width)
+    right, bottom = np.float32(width - 1.001), np.float32(height - 1.001)
+    zero = np.float32(0)
+    for x in range(x0, x1):
+        u = np.float32(x) - reference[0]
+        s = min(max(a + u * (b + u * c), zero), right)
+        t = min(max(d + u * (e + u * f), zero), bottom)
+        i, j = np.int32(s), np.int32(t)
+        p, q = s - np.float32(i), t - np.float32(j)
+        at = j * step + i
+        w11 = p * q * weight
+        w10 = q * weight - w11
+        w01 = p * weight - w11
+        w00 = weight - w01 - q * weight
+        for channel in range(channels):
+            k = at + np.int32(channel) * size
+            out[channel, x] += w00 * flat[k] + w01 * flat[k + 1] + w10 * flat[k + step] + w11 * flat[k + step + 1]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _lay(
+    pictures,
+    depths,
+    boxes,
+    planes0,
+    reference0,
+    coefficients0,
+    deeper0,
+    planes1,
+    reference1,
+    coefficients1,
+    deeper1,
+    share,
+    tested,
+    marked,
+):  # pragma: no cover - compiled
+    row = np.zeros((3, pictures.shape[2]), np.float32)
+    one, half = np.float32(1), np.float32(0.5)
+    channels = 3 if tested or marked else 2
+    for n in range(len(pictures)):
+        top, left, bottom, right = boxes[n]
+        w = share[n]
+        deeper = (one - w) * deeper0[n] + w * deeper1[n]
+        for y in range(top, bottom):
+            row[:, left:right] = 0
+            if w < one:
+                _sample_row(planes0, coefficients0[n], reference0[n], y, left, right, one - w, channels, row)
+            if w > 0:
+                _sample_row(planes1, coefficients1[n], reference1[n], y, left, right, w, channels, row)
+            if channels == 2:
+                for x in range(left, right):
+                    pictures[n, y, x] = row[0, x] + (one - row[1, x]) * pictures[n, y, x]
+                continue
+            for x in range(left, right):
+                coverage = row[1, x]
+                if coverage <= 0:
+                    continue
+                z = row[2, x] / coverage + deeper
+                if tested and z > depths[n, y, x]:
+                    continue
+                pictures[n, y, x] = row[0, x] + (one - coverage) * pictures[n, y, x]
+                if marked and coverage > half:
+                    depths[n, y, x] = z
