@@ -12,14 +12,14 @@ import tyro
 
 @dataclass
 class Bench:
-    """Measure speed on this machine: the sensor's engines, its effects, or the online denoiser.
+    """Measure speed on this machine: the sensor's engines, its effects, the online denoiser, or the making of datasets.
 
     example:  spikecam bench sensor
     """
 
-    what: tyro.conf.Positional[Literal["sensor", "effects", "online"]]
+    what: tyro.conf.Positional[Literal["sensor", "effects", "online", "dataset"]]
     """sensor: pixel-steps a second of numpy, reference and fast.  effects: what each costs, over the base model.
-    online: denoised frames a second."""
+    online: denoised frames a second.  dataset: frames a second of scenes through the camera into files."""
     out: Path | None = None
     """Where to write the figures as JSON."""
 
@@ -27,6 +27,7 @@ class Bench:
         from denoiser.bench import bench_online
         from spikecam_env.cli.files import write_json
         from spikecam_env.cli.table import table
+        from spikecam_env.datasets.bench import bench_dataset
         from spikecam_env.sensor.bench import bench_sensor, machine
         from spikecam_env.sensor.effect_costs import bench_effects
 
@@ -35,6 +36,7 @@ class Bench:
             "sensor": bench_sensor,
             "effects": bench_effects,
             "online": bench_online,
+            "dataset": bench_dataset,
         }
         rows = benches[self.what]()
         print(table(rows))

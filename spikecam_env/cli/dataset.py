@@ -87,10 +87,9 @@ class PhmN(Making):
     """Other scenes of the catalogue; `spikecam scenes` lists them."""
 
     def run(self) -> None:
-        from spikecam_env.datasets import phm_n
+        from spikecam_env.datasets import PHM, phm_n
 
-        named = {} if self.scenes is None else {"scenes": self.scenes}
-        self.make(phm_n(**named, **self.settings()))
+        self.make(phm_n(scenes=self.scenes or PHM, **self.settings()))
 
 
 @dataclass

@@ -1,7 +1,7 @@
 """Making a dataset: what is not done yet, in this process, in several, or on a Ray cluster; the same bytes each way.
 
-A run may be killed at any time; the same call goes on where it was.  Files appear whole, and one that was not finished is
-made again from its first frame: a scene is seconds.
+A run may be killed at any time; the same call goes on where it was.  Files appear whole, and one that was not finished
+is made again from its first frame: a scene is seconds.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ _FILE_KEYS = {field.name for field in fields(Entry)} | _STATE
 
 @dataclass(frozen=True)
 class Manifest:
-    """settings: what the scenes share.  files: one a scene, in order; `bytes` and `sha256` are None until it is done."""
+    """settings: what the scenes share.  files: one a scene; `bytes` and `sha256` are None until it is done."""
 
     settings: dict[str, Any]
     files: tuple[dict[str, Any], ...]

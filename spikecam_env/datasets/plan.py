@@ -1,7 +1,7 @@
 """What a dataset is to hold.  Every byte of it follows from its plan.
 
 SPIFT_N: random scenes to train on, and others to test.  PHM_N: the ten well-designed scenes, to test.
-Source: the paper, section "Datasets" (100 random scenes, 10 well-designed ones); scenes, motions and lights are our own.
+Source: the paper, section "Datasets": 100 random scenes, 10 well-designed ones.  Scenes, motions and lights are our own.
 """
 
 from __future__ import annotations

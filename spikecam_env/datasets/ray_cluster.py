@@ -5,6 +5,7 @@ Ray is an optional package (`pip install spikecam-env[ray]`), imported when firs
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,9 +21,7 @@ RETRIES = 3
 """Times that a scene is begun again after its worker died."""
 
 
-def on_ray(
-    plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, address: str
-) -> Iterator[Written | int]:
+def on_ray(plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, address: str) -> Iterator[Written | int]:
     """Files as they are done, in any order, and with each its number of frames.
 
     address: LOCAL starts a cluster of `jobs` workers on this machine for the time of the run; else that of a cluster,
@@ -37,8 +36,10 @@ def on_ray(
             done, waiting = ray.wait(waiting)
             written = _result(ray, done[0])
             if not (folder / written.entry.path).is_file():
-                raise InputError(f"a worker wrote {written.entry.path} where this machine does not see it: "
-                                 f"{folder} must be storage that all machines of the cluster share")
+                raise InputError(
+                    f"a worker wrote {written.entry.path} where this machine does not see it: "
+                    f"{folder} must be storage that all machines of the cluster share"
+                )
             yield written
             yield plan.frames
     finally:
@@ -75,9 +76,9 @@ def _connected(address: str, jobs: int) -> ModuleType:
         raise InputError("Ray is not installed; pip install 'spikecam-env[ray]', or leave out --ray") from error
     try:
         if address == LOCAL:
-            ray.init(num_cpus=jobs, include_dashboard=False, logging_level="ERROR", log_to_driver=False)
+            ray.init(num_cpus=jobs, include_dashboard=False, logging_level=logging.ERROR, log_to_driver=False)
         else:
-            ray.init(address=address, logging_level="ERROR", log_to_driver=False)
+            ray.init(address=address, logging_level=logging.ERROR, log_to_driver=False)
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise InputError(f"no Ray cluster at {address!r}: {error}; give its address, or {LOCAL!r}") from error
     return ray

@@ -25,9 +25,9 @@ def verify(folder: str | Path, *, jobs: int = 1, progress: bool = False) -> list
     target = Path(folder)
     manifest = Manifest.read(target)
     total = sum(file["bytes"] or 0 for file in manifest.files)
-    with tqdm(total=total, desc="verify", unit="B", unit_scale=True, leave=False, disable=not progress) as bar:
-        with ThreadPoolExecutor(jobs) as readers:
-            found = list(readers.map(partial(_fault, target, bar), manifest.files))
+    bar = tqdm(total=total, desc="verify", unit="B", unit_scale=True, leave=False, disable=not progress)
+    with bar, ThreadPoolExecutor(jobs) as readers:
+        found = list(readers.map(partial(_fault, target, bar), manifest.files))
     return [line for line in found if line] + _foreign(target, {file["path"] for file in manifest.files})
 
 

@@ -2,7 +2,7 @@
 
 What is read: of the noisy stream the frames of the window; of the clean one as many frames on both sides, in steps that
 double, as it takes until every pixel of the crop has a spike before and after, or the stream ends.  Both by chunks of
-64 frames x 64 rows.
+32 frames x 16 rows.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane
 from spikecam_env.streams.hdf5 import CHUNK_FRAMES, open_recording, read_crop
+
+FIRST_REACH = 32
+"""Frames of the clean stream read on either side at first."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +49,8 @@ def read_window(
         return Window(spikes, _clean_plane(file["clean"], width, frame, across, along))
 
 
-def _clean_plane(
-    stream: h5py.Dataset, width: int, frame: int, rows: slice, columns: slice
-) -> NDArray[np.float32]:
-    reach = CHUNK_FRAMES // 2
+def _clean_plane(stream: h5py.Dataset, width: int, frame: int, rows: slice, columns: slice) -> NDArray[np.float32]:
+    reach = FIRST_REACH
     while True:
         first = max(0, (frame - reach) // CHUNK_FRAMES * CHUNK_FRAMES)
         stop = min(len(stream), -(-(frame + reach) // CHUNK_FRAMES) * CHUNK_FRAMES)

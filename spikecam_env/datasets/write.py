@@ -16,7 +16,9 @@ from scenes.protocol import Scene
 from spikecam_env.datasets.plan import Entry, Plan
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import SpikeWriter
-from spikecam_env.streams.hdf5 import CHUNK_FRAMES
+
+BLOCK = 64
+"""Frames simulated and written at a time; a multiple of the chunks of the file."""
 
 _READ_BYTES = 1 << 20
 
@@ -40,11 +42,11 @@ def write_scene(plan: Plan, entry: Entry, folder: Path) -> Iterator[int | Writte
         twin = camera.clean_twin()
         path = folder / entry.path
         path.parent.mkdir(exist_ok=True)
-        noisy, clean = (np.empty((CHUNK_FRAMES, *plan.shape), np.uint8) for _ in range(2))
+        noisy, clean = (np.empty((BLOCK, *plan.shape), np.uint8) for _ in range(2))
     attributes = {**_attributes(plan, entry), "engine": camera.engine}
     with SpikeWriter(path, plan.shape, plan.model.frame_rate_hz, **attributes) as writer:
-        for start in range(0, plan.frames, CHUNK_FRAMES):
-            count = min(CHUNK_FRAMES, plan.frames - start)
+        for start in range(0, plan.frames, BLOCK):
+            count = min(BLOCK, plan.frames - start)
             with clock.on("scene"):
                 light = scene.radiance(start, start + count)
             with clock.on("noisy"):
@@ -88,7 +90,7 @@ def _attributes(plan: Plan, entry: Entry) -> dict[str, Any]:
 
 
 def _truth(scene: Scene, instant: float) -> dict[str, Any]:
-    """Arrays by name; depth is absent where the scene is flat, poses are rows of numbers as the scene documents them."""
+    """Arrays by name; depth is absent where the scene is flat, poses are as the scene documents them."""
     truth = scene.truth(instant)
     arrays = {"radiance": truth.radiance, "flow": truth.flow, "object_id": truth.object_id}
     if truth.depth is not None:

@@ -28,8 +28,8 @@ from spikecam_env.version import __version__
 from spikecam_env.whole import beside_path
 
 FORMAT = "spikecam-recording/1"
-CHUNK_FRAMES = 64
-CHUNK_ROWS = 64
+CHUNK_FRAMES = 32
+CHUNK_ROWS = 16
 CACHE_BYTES = 1 << 24
 LIBRARY_VERSIONS = ("earliest", "v110")
 """Oldest and newest HDF5 format features in the files; fixed, so that bytes do not depend on the library's default."""
