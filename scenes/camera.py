@@ -34,13 +34,14 @@ class Camera:
 
     def pose(self, time_s: ArrayLike) -> Pose:
         """Camera to world (..., 4, 4); it looks along its -z, y up."""
-        return self._rest() @ self.shake.pose(time_s)
+        return self.rest() @ self.shake.pose(time_s)
 
     def focal(self, rows: int) -> float:
         """[pixels] for a picture of so many rows."""
         return float(rows / 2 / np.tan(np.radians(self.field_of_view_deg) / 2))
 
-    def _rest(self) -> NDArray[np.float64]:
+    def rest(self) -> NDArray[np.float64]:
+        """Camera to world (4, 4), without shake."""
         back = np.subtract(self.position, self.target)
         back = back / np.linalg.norm(back)
         right = np.cross(self.up, back)

@@ -26,6 +26,7 @@ DENSITY = float(np.sqrt(3))
 """Texels a pixel.  A box of a texel and bilinear interpolation blur by (1 / 12 + 1 / 6) / DENSITY^2 pixels^2, and a
 pixel's area by 1 / 12: at the root of 3 they are equal."""
 
+PRE=False
 SUPERSAMPLE = 3
 """Rays a texel's side; 27 a pixel."""
 
@@ -63,6 +64,11 @@ def render_key(
     sprite = renderer.render(surface, pose, dense, lighting, cut, SUPERSAMPLE)
     depth = np.where(sprite.coverage > 0, sprite.depth, 0).astype(np.float32)
     planes = np.stack([sprite.radiance, sprite.coverage, sprite.coverage * depth]).astype(np.float32)
+    if PRE: 
+        import cv2
+        w=(1/12-1/4/DENSITY**2)*DENSITY**2/2
+        k=np.array([w,1-2*w,w])
+        planes=np.stack([cv2.sepFilter2D(p,-1,k,k) for p in planes])
     rows, columns = _sampled(sprite.coverage)
     z = depth[rows, columns].astype(np.float64)
     x = (columns + left - dense.centre[0]) / dense.focal * z
@@ -132,6 +138,10 @@ class Carried:
     reference: Array
     coefficients: Array
     deeper: Array
+
+    def at(self, instants: slice) -> Carried:
+        """At some of the instants."""
+        return Carried(self.key, self.reference[instants], self.coefficients[instants], self.deeper[instants])
 
 
 def carry(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Carried:
@@ -238,7 +248,7 @@ def _lay(
     marked,
 ):  # pragma: no cover - compiled
     row = np.zeros((3, pictures.shape[2]), np.float32)
-    one, half = np.float32(1), np.float32(0.5)
+    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     channels = 3 if tested or marked else 2
     for n in range(len(pictures)):
         top, left, bottom, right = boxes[n]
@@ -252,7 +262,7 @@ def _lay(
                 _sample_row(planes1, coefficients1[n], reference1[n], y, left, right, w, channels, row)
             if channels == 2:
                 for x in range(left, right):
-                    pictures[n, y, x] = row[0, x] + (one - row[1, x]) * pictures[n, y, x]
+                    pictures[n, y, x] = row[0, x] + max(one - row[1, x], zero) * pictures[n, y, x]
                 continue
             for x in range(left, right):
                 coverage = row[1, x]
@@ -261,6 +271,6 @@ def _lay(
                 z = row[2, x] / coverage + deeper
                 if tested and z > depths[n, y, x]:
                     continue
-                pictures[n, y, x] = row[0, x] + (one - coverage) * pictures[n, y, x]
+                pictures[n, y, x] = row[0, x] + max(one - coverage, zero) * pictures[n, y, x]
                 if marked and coverage > half:
                     depths[n, y, x] = z

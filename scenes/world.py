@@ -27,7 +27,8 @@ import cv2
 import numba
 import numpy as np
 import trimesh
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from scenes.camera import Camera
 from scenes.layers import Carried, Key, carry, fit, lay, project, render_key
@@ -50,8 +51,8 @@ SHADE = 0.01
 """Most that shading half-way may differ from the mean of both keys, rms of full light."""
 
 TURN = 0.12
-"""Most that the direction of sight turns about a body from key to key [radians]; what comes round the edge
-is the square of it: 0.3 pixels on a ball of radius 40."""
+"""Most that a surface's slant to the line of sight changes from key to key, rms of its cosine: a ball may turn by
+0.2 radians, and what comes round its edge is 2 % of its radius."""
 
 PROBES = 256
 """Points of a body's surface that stand for it in the plan."""
@@ -277,8 +278,7 @@ class World:
         """The background as seen at a frame."""
         if np.ndim(self.background) == 0:
             return np.full(self.shape, float(self.background) * self.light, np.float32)
-        rest = self.camera.pose(0.0)[:3, :3] if isinstance(self.camera.shake, Still) else self.camera._rest()[:3, :3]
-        now = self._pinhole(np.array(frame)).pose[:3, :3]
+        rest, now = self.camera.rest()[:3, :3], self._pinhole(np.array(frame)).pose[:3, :3]
         tile = self._tile
         flip = np.diag([1.0, -1.0, -1.0])
         to_ray = np.linalg.inv(_intrinsic(self._focal, np.asarray(self._centre) - offset))
@@ -335,16 +335,15 @@ class World:
         centre = np.asarray(self._centre)
         y, x = np.indices(self.shape, np.float64)
         here = np.stack([x, y], -1)
-        ray = np.stack([(here - (centre - _offsets(gaze, np.array([frame]))[0])) / self._focal], 0)[0]
-        ray = np.stack([ray[..., 0], -ray[..., 1], -np.ones(self.shape)], -1)
+        across = (here - centre + _offsets(gaze, np.array([frame]))[0]) / self._focal
+        ray = np.stack([across[..., 0], -across[..., 1], -np.ones(self.shape)], -1)
         moved = np.empty_like(here)
         later = centre - _offsets(gaze, np.array([frame + by]))[0]
         inverse = np.linalg.inv(then)
         for number in np.unique(owner):
             mine = owner == number
             if number == 0:
-                point, carry_on = ray[mine], inverse[:3, :3] @ now[:3, :3]
-                seen = point @ carry_on.T
+                seen = ray[mine] @ (inverse[:3, :3] @ now[:3, :3]).T
             else:
                 body = self.bodies[number - 1]
                 start, end = (self._body_pose(body, np.array(f)) for f in (frame, frame + by))
@@ -373,9 +372,7 @@ class World:
     def _draw(self) -> Renderer:
         if self.renderer is not None:
             return self.renderer
-        from scenes.renderers import shared_renderer
-
-        return shared_renderer()
+        return _renderer_of_process(getpid())
 
     def _pinhole(self, frame: Floats) -> Pinhole:
         return Pinhole(self._focal, self._centre, self.camera.pose(frame / self.frame_rate_hz))
@@ -389,3 +386,274 @@ class World:
 
     def _probe(self, body: int) -> _Probe:
         return self._kept.get("probe", body, len(self.bodies), lambda: _probe(self.bodies[body].surface.mesh))
+
+
+# -- the plan of a block ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What follows from the motion in a block.
+
+    steps    frames between the keys of each body
+    speed    fastest point in the picture [pixels/frame]
+    order    bodies from the back to the front
+    tested   bodies whose depth is compared with what lies there;  marked: those that are compared with
+    still    camera and backdrops do not move
+    """
+
+    steps: tuple[int, ...]
+    speed: float
+    order: tuple[int, ...]
+    tested: frozenset[int]
+    marked: frozenset[int]
+    still: bool
+
+
+def _plan_block(world: World, block: int) -> _Plan:
+    frames = np.arange(_NODES + 1) * (BLOCK / _NODES) + block * BLOCK
+    centre = np.broadcast_to(world._centre, (len(frames), 2))
+    steps, ranges, boxes, speeds, resting = [], [], [], [_sky_speed(world, frames)], []
+    for number, body in enumerate(world.bodies):
+        probe, view = world._probe(number), world._view(body, frames)
+        steps.append(_key_step(probe, view, world._focal, world.lighting, world._body_pose(body, frames)))
+        pixels, depth = project(view, probe.extreme, world._focal, (0.0, 0.0))
+        box = _extent(probe.extreme, view, world._focal, centre)
+        ranges.append((depth.min(), depth.max()))
+        boxes.append((*box[:, :2].min(0), *box[:, 2:].max(0)))
+        seen = ((box[:, 0] < world.shape[0]) & (box[:, 2] > 0) & (box[:, 1] < world.shape[1]) & (box[:, 3] > 0)).any()
+        near = np.linalg.norm(np.diff(pixels, axis=0), axis=-1)[(depth[:-1] > 0) & (depth[1:] > 0)]
+        speeds.append(float(near.max(initial=0.0)) * _NODES / BLOCK if seen else 0.0)
+        resting.append(np.ptp(view, axis=0).max() == 0)
+    backdrops = [n for n, body in enumerate(world.bodies) if body.backdrop]
+    others = sorted((n for n, body in enumerate(world.bodies) if not body.backdrop), key=lambda n: -ranges[n][1])
+    pairs = [
+        (back, front)
+        for place, front in enumerate(others)
+        for back in others[:place]
+        if ranges[back][0] < ranges[front][1] and _overlap(boxes[back], boxes[front])
+    ]
+    return _Plan(
+        steps=tuple(steps),
+        speed=max(speeds),
+        order=(*backdrops, *others),
+        tested=frozenset(front for _, front in pairs),
+        marked=frozenset(back for back, _ in pairs),
+        still=speeds[0] == 0 and all(resting[n] for n in backdrops),
+    )
+
+
+def _key_step(probe: _Probe, view: Floats, focal: float, lighting: Lighting, pose: Floats) -> int:
+    """The longest step, a power of two, at which two keys stand for all between; view, pose (NODES + 1, 4, 4)."""
+    pixels, depth = project(view, probe.points, focal, (0.0, 0.0))
+    eye = np.linalg.inv(view)[:, :3, 3]
+    sight = eye[:, None] - probe.points
+    sight /= np.maximum(np.linalg.norm(sight, axis=-1, keepdims=True), 1e-9)
+    facing = np.einsum("njk,jk->nj", sight, probe.normals)
+    lamp = np.asarray(lighting.towards) / max(float(np.linalg.norm(lighting.towards)), 1e-9)
+    normals = probe.normals @ np.swapaxes(pose[:, :3, :3], -1, -2)
+    shade = lighting.intensity * np.maximum(normals @ lamp, 0) / max(lighting.intensity + lighting.ambient, 1e-9)
+    stride = _NODES
+    while stride > 2:
+        pieces = [slice(a, a + stride + 1) for a in range(0, _NODES, stride)]
+        if all(_carries(pixels[p], depth[p], facing[p], shade[p]) for p in pieces):
+            return BLOCK * stride // _NODES
+        stride //= 2
+    # below the nodes' spacing motion is even: what two keys disagree on shrinks with the square of the step
+    return _power_of_two(BLOCK * stride / _NODES, BLOCK)
+
+
+def _carries(pixels: Floats, depth: Floats, facing: Floats, shade: Floats) -> bool:
+    """Whether the ends stand for the middle."""
+    middle = len(pixels) // 2
+    if np.sqrt(((facing[-1] - facing[0]) ** 2).mean()) > TURN:
+        return False
+    shown = (facing[middle] > 0.05) & (depth > 0).all(0)
+    if shown.sum() < 3:
+        return True
+    ends = pixels[[0, -1]][:, shown]
+    residuals = []
+    for end in ends:
+        reference, found = fit(end, pixels[middle : middle + 1, shown])
+        u, v = ((pixels[middle, shown] - reference[0, :2]) * reference[0, 2]).T
+        basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v])
+        residuals.append((found[0] @ basis).T - end)
+    apart = np.sqrt(((residuals[0] - residuals[1]) ** 2).sum(-1).mean())
+    shading = shade[middle, shown] - (shade[0, shown] + shade[-1, shown]) / 2
+    return bool(apart <= BLUR and np.sqrt((shading**2).mean()) <= SHADE)
+
+
+def _sky_speed(world: World, frames: Floats) -> float:
+    """Of the background by camera shake [pixels/frame]."""
+    ahead = world.camera.pose(frames / world.frame_rate_hz)[:, :3, :3]
+    turned = np.linalg.norm(np.diff(ahead, axis=0), axis=(1, 2)).max() / np.sqrt(2)
+    return float(turned) * float(np.hypot(world._focal, max(world.shape) / 2)) * _NODES / BLOCK
+
+
+_NODES = 32
+"""Instants at which a block's motion is looked at."""
+
+
+# -- a body's shape, for the plan ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Probe:
+    """Points (J, 3) of the surface with normals, and those farthest out in many directions (E, 3)."""
+
+    points: Floats
+    normals: Floats
+    extreme: Floats
+
+
+def _probe(mesh: trimesh.Trimesh) -> _Probe:
+    points, faces, *_ = trimesh.sample.sample_surface(mesh, PROBES, seed=0)
+    corners = trimesh.triangles.points_to_barycentric(mesh.triangles[faces], points)
+    normals = (np.asarray(mesh.vertex_normals)[mesh.faces[faces]] * corners[..., None]).sum(1)
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-9)
+    vertices = np.asarray(mesh.vertices, np.float64)
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(PROBES)
+    z = 1 - (2 * np.arange(PROBES) + 1) / PROBES
+    around = np.sqrt(1 - z * z)
+    directions = np.stack([around * np.cos(turn), around * np.sin(turn), z], -1)
+    return _Probe(np.asarray(points), normals, vertices[np.unique((vertices @ directions.T).argmax(0))])
+
+
+def _extent(extreme: Floats, view: Floats, focal: float, centre: Floats) -> NDArray[np.int64]:
+    """Boxes (n, 4) of pixels around what these points span: top, left, bottom, right; wide if some are behind."""
+    pixels, depth = project(view, extreme, focal, (0.0, 0.0))
+    pixels = pixels + centre[:, None]
+    low, high = pixels.min(1), pixels.max(1)
+    slack = 3 + 0.01 * (high - low)
+    box = np.concatenate([low - slack, high + slack], -1)[:, [1, 0, 3, 2]]
+    ahead = depth > 1e-3 * np.abs(depth).max(1, keepdims=True)
+    box[~ahead.all(1)] = [-_FAR, -_FAR, _FAR, _FAR]
+    box[~ahead.any(1)] = 0
+    return np.clip(np.round(box), -_FAR, _FAR).astype(np.int64)
+
+
+_FAR = 1 << 20
+"""[pixels]"""
+
+
+# -- composition -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Pictures first .. last of a layer, between two keys; share (n,) is the later key's."""
+
+    first: int
+    last: int
+    before: Carried
+    after: Carried
+    share: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Layer:
+    parts: list[_Part]
+    boxes: NDArray[np.int64]
+    tested: bool
+    marked: bool
+
+
+def _compose(pictures: Array, base: Array, layers: list[_Layer], start: int, stop: int) -> None:
+    """Pictures start .. stop: the base, and the layers over it."""
+    here = pictures[start:stop]
+    here[:] = base if len(base) == 1 else base[start:stop]
+    deep = any(layer.tested or layer.marked for layer in layers)
+    depths = np.full(here.shape if deep else (1, 1, 1), np.inf, np.float32)
+    for layer in layers:
+        for part in layer.parts:
+            first, last = max(part.first, start), min(part.last, stop)
+            if first >= last:
+                continue
+            mine, of_part = slice(first - start, last - start), slice(first - part.first, last - part.first)
+            lay(
+                here[mine],
+                depths[mine] if deep else depths,
+                layer.boxes[first:last],
+                part.before.at(of_part),
+                part.after.at(of_part),
+                part.share[of_part],
+                layer.tested,
+                layer.marked,
+            )
+
+
+def _over(picture: Array, sprite: Sprite, depth: Array | None) -> NDArray[np.bool_]:
+    """Lay a sprite over a picture, in place, but where the picture is nearer; returns where it is what is seen."""
+    place = _place(sprite.window)
+    front = sprite.coverage > 0
+    if depth is not None:
+        front &= sprite.depth <= depth[place]
+    covered = np.where(front, sprite.coverage, 0)
+    picture[place] = np.where(front, sprite.radiance, 0) + (1 - covered) * picture[place]
+    return np.asarray(covered > 0.5)
+
+
+def _place(window: Window) -> tuple[slice, slice]:
+    return slice(window.top, window.top + window.rows), slice(window.left, window.left + window.columns)
+
+
+# -- small things ----------------------------------------------------------------------------------------------
+
+
+class _Kept:
+    """Results kept for the next call; what is asked for least recently goes first."""
+
+    def __init__(self) -> None:
+        self._of: dict[str, OrderedDict[Hashable, Any]] = {}
+
+    def get(self, kind: str, name: Hashable, most: int, make: Callable[[], T]) -> T:
+        kept = self._of.setdefault(kind, OrderedDict())
+        if name not in kept:
+            kept[name] = make()
+            while len(kept) > max(most, 1):
+                kept.popitem(last=False)
+        kept.move_to_end(name)
+        return kept[name]
+
+
+@lru_cache(maxsize=1)
+def _renderer_of_process(process: int) -> Renderer:
+    """Chosen once a process; a context does not survive a fork."""
+    from scenes.renderers.embree import Embree
+
+    return Embree()
+
+
+@lru_cache(maxsize=1)
+def _pool(process: int) -> ThreadPoolExecutor:
+    """Threads do not survive a fork, hence one pool a process; it starts them as they are needed."""
+    return ThreadPoolExecutor(max_workers=64, thread_name_prefix="scenes-world")
+
+
+def _offsets(gaze: Gaze | None, frames: Floats) -> Floats:
+    """(n, 2) pan and tilt at frames [pixels]."""
+    if gaze is None:
+        return np.zeros((len(frames), 2))
+    return np.array([gaze.at(float(frame)) for frame in frames])
+
+
+def _power_of_two(at_most: float, highest: int) -> int:
+    step = highest
+    while step > max(at_most, 1):
+        step //= 2
+    return step
+
+
+def _overlap(a: tuple[int, ...], b: tuple[int, ...]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def _intrinsic(focal: float, centre: Floats) -> Floats:
+    return np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])
+
+
+def _pose_numbers(pose: Floats) -> tuple[float, ...]:
+    return (*map(float, pose[:3, 3]), *map(float, Rotation.from_matrix(pose[:3, :3]).as_quat()))
+
+
+_AT_REST = Gaze.fixed(0.0, 0.0)

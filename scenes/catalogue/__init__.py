@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from scenes.catalogue import collage, disk
+from scenes.catalogue import collage, disk, tumble
 from scenes.exposure import expose
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer
@@ -21,6 +21,7 @@ from spikecam_env.errors import unknown_name
 SCENES: dict[str, Callable[..., Scene]] = {
     "collage": collage.scene,
     "disk": disk.scene,
+    "tumble": tumble.scene,
 }
 
 METERED_ROWS = 60
