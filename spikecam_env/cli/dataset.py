@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -30,6 +30,8 @@ class Making:
     """Frames between ground truths (radiance, flow, object number, depth, poses); 0: none."""
     mean_interval: float = 10.0
     """Exposure: frames between spikes, on average over the picture."""
+    renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
+    """Back-end that draws; auto: the best there is, and the same again when a run goes on."""
     camera: Camera = field(default_factory=Camera)
     jobs: int = 1
     """Worker processes on this machine, or workers of a local Ray cluster."""
@@ -45,6 +47,7 @@ class Making:
             "truth_every": self.truth_every,
             "mean_interval": self.mean_interval,
             "model": self.camera.load(),
+            "renderer": self.renderer,
         }
 
     def make(self, plan: Plan) -> None:
@@ -52,7 +55,9 @@ class Making:
         from spikecam_env.datasets import build
 
         built = build(plan, self.out, jobs=self.jobs, ray=self.ray, progress=True)
-        print(f"{self.out}: {built.made} scenes made, {built.kept} were there; {built.bytes / 1e9:.3g} GB")
+        print(
+            f"{self.out}: {built.made} scenes made, {built.kept} were there; {built.bytes / 1e9:.3g} GB ({built.renderer})"
+        )
         if built.seconds:
             spent = ", ".join(f"{what} {s:.3g}" for what, s in sorted(built.seconds.items(), key=lambda i: -i[1]))
             print(f"seconds over all workers: {spent}")
@@ -83,7 +88,7 @@ class PhmN(Making):
     example:  spikecam dataset phm-n --out phm --jobs 2
     """
 
-    scenes: tuple[str, ...] | None = None
+    scenes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...", help_behavior_hint="(default: the ten)")] = ()
     """Other scenes of the catalogue; `spikecam scenes` lists them."""
 
     def run(self) -> None:

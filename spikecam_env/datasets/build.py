@@ -11,7 +11,7 @@ import os
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from spikecam_env.datasets.manifest import NAME, Manifest
 from spikecam_env.datasets.plan import Entry, Plan
 from spikecam_env.datasets.processes import on_processes
 from spikecam_env.datasets.ray_cluster import on_ray
+from spikecam_env.datasets.renderer import AUTO, first_that_works
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
 
@@ -30,8 +31,10 @@ UNFINISHED = ".*.partial.*"
 
 @dataclass(frozen=True)
 class Built:
-    """What a run did: files made and files that were there, and where the time went, over all workers [s]."""
+    """What a run did: with which renderer, files made and files that were there, bytes of both, and where the time
+    went, over all workers [s]."""
 
+    renderer: str
     made: int
     kept: int
     bytes: int
@@ -53,6 +56,7 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     except OSError as error:
         raise InputError(f"cannot use {target} as a folder for a dataset: {error.strerror}") from error
     with _alone_in(target):
+        plan = _with_renderer(plan, target)
         manifest = _begun(plan, target)
         _clear_unfinished(target)
         manifest.write(target)
@@ -60,6 +64,14 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
             return _make_missing(plan, target, manifest, jobs, ray, progress)
         finally:
             _clear_unfinished(target)
+
+
+def _with_renderer(plan: Plan, folder: Path) -> Plan:
+    """The back-end that the dataset was begun with, else the best there is, where the choice is ours."""
+    if plan.renderer != AUTO:
+        return plan
+    begun = (folder / NAME).exists()
+    return replace(plan, renderer=Manifest.read(folder).settings["renderer"] if begun else first_that_works())
 
 
 def _begun(plan: Plan, folder: Path) -> Manifest:
@@ -93,7 +105,7 @@ def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: 
                 seconds.update(news.seconds)
             else:
                 bar.update(news)
-    return Built(len(missing), len(done), sum(file["bytes"] for file in manifest.files), dict(seconds))
+    return Built(plan.renderer, len(missing), len(done), sum(file["bytes"] for file in manifest.files), dict(seconds))
 
 
 def _at_work(

@@ -1,18 +1,21 @@
 """What a dataset is to hold.  Every byte of it follows from its plan.
 
 SPIFT_N: random scenes to train on, and others to test.  PHM_N: the ten well-designed scenes, to test.
-Source: the paper, section "Datasets": 100 random scenes, 10 well-designed ones.  Scenes, motions and lights are our own.
+Source: the paper, section "Datasets": 100 random scenes, 10 well-designed ones; ours are of our own making.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from scenes.catalogue import SCENES, make_scene, random_world
 from scenes.protocol import Scene
+from scenes.renderers.choose import BACKENDS
+from spikecam_env.datasets.renderer import AUTO, renderer_of_process
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.sensor import checked_frames, checked_seed, checked_shape
@@ -47,6 +50,7 @@ class Plan:
     frames         of each recording
     truth_every    frames between ground truths, at frames 0, truth_every, ...; 0: none
     mean_interval  between spikes, over the picture [frames]: the exposure
+    renderer       back-end that draws: one of `scenes.renderers.choose.BACKENDS`, or "auto" for the best there is
     Errors: InputError for no entries, an unknown scene, and numbers that are not positive.
     """
 
@@ -58,6 +62,7 @@ class Plan:
     truth_every: int = 100
     mean_interval: float = 10.0
     model: SensorModel = field(default_factory=SensorModel.preset)
+    renderer: str = AUTO
 
     def __post_init__(self) -> None:
         if not self.entries:
@@ -67,6 +72,8 @@ class Plan:
                 raise unknown_name("scene", entry.scene, (RANDOM, *SCENES))
         if not (np.isfinite(self.mean_interval) and self.mean_interval >= 1):
             raise InputError(f"mean_interval is {self.mean_interval}; it must be 1 frame or more, e.g. 10")
+        if self.renderer not in (AUTO, *BACKENDS):
+            raise unknown_name("renderer", self.renderer, (AUTO, *BACKENDS))
         checked_seed(self.truth_every, "truth_every")
         checked_seed(self.seed)
         checked_frames(self.frames)
@@ -74,11 +81,13 @@ class Plan:
 
     def scene(self, entry: Entry) -> Scene:
         """The scene of an entry."""
-        where = (self.shape, entry.scene_seed, self.mean_interval, self.model.frame_rate_hz)
-        if entry.scene == RANDOM:
-            shape, seed, mean_interval, frame_rate_hz = where
-            return random_world(seed, shape, mean_interval, frame_rate_hz)
-        return make_scene(entry.scene, *where)
+        return (random_world if entry.scene == RANDOM else partial(make_scene, entry.scene))(
+            shape=self.shape,
+            seed=entry.scene_seed,
+            mean_interval=self.mean_interval,
+            frame_rate_hz=self.model.frame_rate_hz,
+            renderer=renderer_of_process(self.renderer),
+        )
 
     def settings(self) -> dict[str, Any]:
         """What the scenes share, as plain values."""
@@ -90,6 +99,7 @@ class Plan:
             "truth_every": self.truth_every,
             "mean_interval": self.mean_interval,
             "model": self.model.toml(),
+            "renderer": self.renderer,
         }
 
 

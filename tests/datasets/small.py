@@ -17,7 +17,9 @@ def small_plan(frames: int = 200, **settings) -> Plan:
         Entry("train/001.h5", "collage", 21, 22),
         Entry("test/disk.h5", "disk", 31, 32),
     )
-    return Plan("small", entries, shape=SHAPE, frames=frames, **{"seed": 3, "truth_every": 50, **settings})
+    return Plan(
+        "small", entries, shape=SHAPE, frames=frames, **{"seed": 3, "truth_every": 50, "renderer": "embree", **settings}
+    )
 
 
 def bytes_in(folder: Path) -> dict[str, bytes]:

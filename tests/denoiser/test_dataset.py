@@ -22,6 +22,7 @@ PLAN = Plan(
     shape=(32, 48),
     frames=FRAMES,
     truth_every=0,
+    renderer="embree",
 )
 
 
