@@ -55,9 +55,8 @@ class Making:
         from spikecam_env.datasets import build
 
         built = build(plan, self.out, jobs=self.jobs, ray=self.ray, progress=True)
-        print(
-            f"{self.out}: {built.made} scenes made, {built.kept} were there; {built.bytes / 1e9:.3g} GB ({built.renderer})"
-        )
+        size = f"{built.bytes / 1e9:.3g} GB"
+        print(f"{self.out}: {built.made} scenes made, {built.kept} were there, {size} (renderer: {built.renderer})")
         if built.seconds:
             spent = ", ".join(f"{what} {s:.3g}" for what, s in sorted(built.seconds.items(), key=lambda i: -i[1]))
             print(f"seconds over all workers: {spent}")
