@@ -16,21 +16,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Surface, Window
 
-DENSITY = float(np.sqrt(3))
-"""Texels a pixel.  A box of a texel and bilinear interpolation blur by (1 / 12 + 1 / 6) / DENSITY^2 pixels^2, and a
-pixel's area by 1 / 12: at the root of 3 they are equal."""
+DENSITY = 3
+"""Texels a pixel, one ray each.  On the scene `tumble` 0.8 % rms off 16 x 16 supersampling where things move; 1.0 % at
+2.5, 1.2 % at 2 (four rays a texel there)."""
 
-PRE=False
-SUPERSAMPLE = 3
-"""Rays a texel's side; 27 a pixel."""
+_BLUR = (DENSITY**2 / 12 - 1 / 4) / 2
+_FILTER = np.array([_BLUR, 1 - 2 * _BLUR, _BLUR])
+"""A texel's box and bilinear interpolation blur by (1 / 12 + 1 / 6) / DENSITY^2 pixels^2; this makes up the 1 / 12 of a
+pixel's area."""
 
-SAMPLES = 14
+SAMPLES = 10
 """Points of a sprite's side whose motion is followed."""
 
 RIDGE = 1e-4
@@ -61,14 +63,10 @@ def render_key(
     left, top = np.floor(_dense((window.left, window.top))).astype(int)
     right, bottom = np.ceil(_dense((window.left + window.columns, window.top + window.rows))).astype(int)
     cut = Window(int(top), int(left), int(bottom - top), int(right - left))
-    sprite = renderer.render(surface, pose, dense, lighting, cut, SUPERSAMPLE)
+    sprite = renderer.render(surface, pose, dense, lighting, cut, 1)
     depth = np.where(sprite.coverage > 0, sprite.depth, 0).astype(np.float32)
     planes = np.stack([sprite.radiance, sprite.coverage, sprite.coverage * depth]).astype(np.float32)
-    if PRE: 
-        import cv2
-        w=(1/12-1/4/DENSITY**2)*DENSITY**2/2
-        k=np.array([w,1-2*w,w])
-        planes=np.stack([cv2.sepFilter2D(p,-1,k,k) for p in planes])
+    planes = np.stack([cv2.sepFilter2D(plane, -1, _FILTER, _FILTER) for plane in planes])
     rows, columns = _sampled(sprite.coverage)
     z = depth[rows, columns].astype(np.float64)
     x = (columns + left - dense.centre[0]) / dense.focal * z
@@ -188,46 +186,34 @@ def lay(
     )
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _row(coefficients, reference, y):  # pragma: no cover - compiled
-    """Along row y: texel = a + b x' + c x'^2 with x' = x - middle, for x and y."""
-    k = reference[2]
-    v = (y - reference[1]) * k
-    c = coefficients
-    return (
-        c[0, 0] + v * (c[0, 2] + v * c[0, 5]),
-        (c[0, 1] + v * c[0, 4]) * k,
-        c[0, 3] * k * k,
-        c[1, 0] + v * (c[1, 2] + v * c[1, 5]),
-        (c[1, 1] + v * c[1, 4]) * k,
-        c[1, 3] * k * k,
-    )
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _locate(coefficients, reference, height, width, y, left, right, at, across, down):  # pragma: no cover - compiled
+    """Where pixels left .. right of row y lie in a key: the texel at their upper left, and how far they are past it."""
+    c, k = coefficients, reference[2]
+    v = (np.float32(y) - reference[1]) * k
+    a, b, bend = c[0, 0] + v * (c[0, 2] + v * c[0, 5]), (c[0, 1] + v * c[0, 4]) * k, c[0, 3] * k * k
+    d, e, sag = c[1, 0] + v * (c[1, 2] + v * c[1, 5]), (c[1, 1] + v * c[1, 4]) * k, c[1, 3] * k * k
+    zero, last_x, last_y = np.float32(0), np.float32(width - 1.001), np.float32(height - 1.001)
+    for x in range(left, right):
+        u = np.float32(x) - reference[0]
+        s = min(max(a + u * (b + u * bend), zero), last_x)
+        t = min(max(d + u * (e + u * sag), zero), last_y)
+        i, j = np.int32(s), np.int32(t)
+        at[x] = j * np.int32(width) + i
+        across[x] = s - np.float32(i)
+        down[x] = t - np.float32(j)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def _sample_row(planes, coefficients, reference, y, x0, x1, weight, channels, out):  # pragma: no cover - compiled
-    """Add weight x planes, bilinear, along pixels x0 .. x1 of row y to out (3, W)."""
-    height, width = planes.shape[1], planes.shape[2]
-    a, b, c, d, e, f = _row(coefficients, reference, np.float32(y))
-    flat = planes.reshape(-1)
-    size = np.int32(height * width)
-    step = np.int32(width)
-    right, bottom = np.float32(width - 1.001), np.float32(height - 1.001)
-    zero = np.float32(0)
-    for x in range(x0, x1):
-        u = np.float32(x) - reference[0]
-        s = min(max(a + u * (b + u * c), zero), right)
-        t = min(max(d + u * (e + u * f), zero), bottom)
-        i, j = np.int32(s), np.int32(t)
-        p, q = s - np.float32(i), t - np.float32(j)
-        at = j * step + i
-        w11 = p * q * weight
-        w10 = q * weight - w11
-        w01 = p * weight - w11
-        w00 = weight - w01 - q * weight
-        for channel in range(channels):
-            k = at + np.int32(channel) * size
-            out[channel, x] += w00 * flat[k] + w01 * flat[k + 1] + w10 * flat[k + step] + w11 * flat[k + step + 1]
+def _add(plane, width, at, across, down, left, right, weight, row):  # pragma: no cover - compiled
+    """Add weight x plane, bilinear, to pixels left .. right of a row."""
+    one = np.float32(1)
+    for x in range(left, right):
+        k, p, q = at[x], across[x], down[x]
+        below = k + np.uint32(width)
+        upper = plane[k] * (one - p) + plane[k + np.uint32(1)] * p
+        lower = plane[below] * (one - p) + plane[below + np.uint32(1)] * p
+        row[x] += weight * (upper * (one - q) + lower * q)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -247,30 +233,46 @@ def _lay(
     tested,
     marked,
 ):  # pragma: no cover - compiled
-    row = np.zeros((3, pictures.shape[2]), np.float32)
+    columns = pictures.shape[2]
+    light, cover, depth = np.zeros(columns, np.float32), np.zeros(columns, np.float32), np.zeros(columns, np.float32)
+    at = np.zeros(columns, np.uint32)
+    across, down = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
-    channels = 3 if tested or marked else 2
+    deep = tested or marked
+    flat0, flat1 = planes0.reshape(3, -1), planes1.reshape(3, -1)
     for n in range(len(pictures)):
         top, left, bottom, right = boxes[n]
         w = share[n]
         deeper = (one - w) * deeper0[n] + w * deeper1[n]
         for y in range(top, bottom):
-            row[:, left:right] = 0
+            light[left:right] = 0
+            cover[left:right] = 0
+            depth[left:right] = 0
             if w < one:
-                _sample_row(planes0, coefficients0[n], reference0[n], y, left, right, one - w, channels, row)
-            if w > 0:
-                _sample_row(planes1, coefficients1[n], reference1[n], y, left, right, w, channels, row)
-            if channels == 2:
+                height, width = planes0.shape[1:]
+                _locate(coefficients0[n], reference0[n], height, width, y, left, right, at, across, down)
+                _add(flat0[0], width, at, across, down, left, right, one - w, light)
+                _add(flat0[1], width, at, across, down, left, right, one - w, cover)
+                if deep:
+                    _add(flat0[2], width, at, across, down, left, right, one - w, depth)
+            if w > zero:
+                height, width = planes1.shape[1:]
+                _locate(coefficients1[n], reference1[n], height, width, y, left, right, at, across, down)
+                _add(flat1[0], width, at, across, down, left, right, w, light)
+                _add(flat1[1], width, at, across, down, left, right, w, cover)
+                if deep:
+                    _add(flat1[2], width, at, across, down, left, right, w, depth)
+            row = pictures[n, y]
+            if not deep:
                 for x in range(left, right):
-                    pictures[n, y, x] = row[0, x] + max(one - row[1, x], zero) * pictures[n, y, x]
+                    row[x] = light[x] + max(one - cover[x], zero) * row[x]
                 continue
             for x in range(left, right):
-                coverage = row[1, x]
-                if coverage <= 0:
+                if cover[x] <= zero:
                     continue
-                z = row[2, x] / coverage + deeper
+                z = depth[x] / cover[x] + deeper
                 if tested and z > depths[n, y, x]:
                     continue
-                pictures[n, y, x] = row[0, x] + max(one - coverage, zero) * pictures[n, y, x]
-                if marked and coverage > half:
+                row[x] = light[x] + max(one - cover[x], zero) * row[x]
+                if marked and cover[x] > half:
                     depths[n, y, x] = z

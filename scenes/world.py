@@ -33,6 +33,7 @@ from scipy.spatial.transform import Rotation
 from scenes.camera import Camera
 from scenes.layers import Carried, Key, carry, fit, lay, project, render_key
 from scenes.protocol import Gaze, Truth
+from scenes.renderers.choose import choose_renderer
 from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
 from scenes.trajectories import Still, Trajectory
 from spikecam_env.errors import InputError
@@ -421,9 +422,9 @@ def _plan_block(world: World, block: int) -> _Plan:
         box = _extent(probe.extreme, view, world._focal, centre)
         ranges.append((depth.min(), depth.max()))
         boxes.append((*box[:, :2].min(0), *box[:, 2:].max(0)))
-        seen = ((box[:, 0] < world.shape[0]) & (box[:, 2] > 0) & (box[:, 1] < world.shape[1]) & (box[:, 3] > 0)).any()
-        near = np.linalg.norm(np.diff(pixels, axis=0), axis=-1)[(depth[:-1] > 0) & (depth[1:] > 0)]
-        speeds.append(float(near.max(initial=0.0)) * _NODES / BLOCK if seen else 0.0)
+        seen = (box[:, 0] < world.shape[0]) & (box[:, 2] > 0) & (box[:, 1] < world.shape[1]) & (box[:, 3] > 0)
+        moved = np.linalg.norm(np.diff(pixels, axis=0), axis=-1)[seen[:-1] | seen[1:]]
+        speeds.append(float(moved.max(initial=0.0)) * _NODES / BLOCK)
         resting.append(np.ptp(view, axis=0).max() == 0)
     backdrops = [n for n, body in enumerate(world.bodies) if body.backdrop]
     others = sorted((n for n, body in enumerate(world.bodies) if not body.backdrop), key=lambda n: -ranges[n][1])
@@ -497,6 +498,10 @@ _NODES = 32
 # -- a body's shape, for the plan ------------------------------------------------------------------------------
 
 
+_DIRECTIONS = 100
+"""In which a body's farthest points are sought: on a ball they stand in for its outline to 2 %."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Probe:
     """Points (J, 3) of the surface with normals, and those farthest out in many directions (E, 3)."""
@@ -512,8 +517,8 @@ def _probe(mesh: trimesh.Trimesh) -> _Probe:
     normals = (np.asarray(mesh.vertex_normals)[mesh.faces[faces]] * corners[..., None]).sum(1)
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-9)
     vertices = np.asarray(mesh.vertices, np.float64)
-    turn = np.pi * (1 + np.sqrt(5)) * np.arange(PROBES)
-    z = 1 - (2 * np.arange(PROBES) + 1) / PROBES
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(_DIRECTIONS)
+    z = 1 - (2 * np.arange(_DIRECTIONS) + 1) / _DIRECTIONS
     around = np.sqrt(1 - z * z)
     directions = np.stack([around * np.cos(turn), around * np.sin(turn), z], -1)
     return _Probe(np.asarray(points), normals, vertices[np.unique((vertices @ directions.T).argmax(0))])
@@ -524,7 +529,7 @@ def _extent(extreme: Floats, view: Floats, focal: float, centre: Floats) -> NDAr
     pixels, depth = project(view, extreme, focal, (0.0, 0.0))
     pixels = pixels + centre[:, None]
     low, high = pixels.min(1), pixels.max(1)
-    slack = 3 + 0.01 * (high - low)
+    slack = 3 + 0.02 * (high - low)
     box = np.concatenate([low - slack, high + slack], -1)[:, [1, 0, 3, 2]]
     ahead = depth > 1e-3 * np.abs(depth).max(1, keepdims=True)
     box[~ahead.all(1)] = [-_FAR, -_FAR, _FAR, _FAR]
@@ -619,9 +624,7 @@ class _Kept:
 @lru_cache(maxsize=1)
 def _renderer_of_process(process: int) -> Renderer:
     """Chosen once a process; a context does not survive a fork."""
-    from scenes.renderers.embree import Embree
-
-    return Embree()
+    return choose_renderer()
 
 
 @lru_cache(maxsize=1)

@@ -12,16 +12,48 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from scenes.catalogue import collage, disk, tumble
+from scenes.catalogue import (
+    ball,
+    car,
+    collage,
+    cook,
+    dice,
+    disk,
+    doll,
+    fan,
+    fly,
+    hand,
+    jump,
+    poker,
+    random_bodies,
+    text,
+    top,
+    train,
+    tumble,
+)
 from scenes.exposure import expose
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer
 from spikecam_env.errors import unknown_name
 
 SCENES: dict[str, Callable[..., Scene]] = {
+    "ball": ball.scene,
+    "car": car.scene,
     "collage": collage.scene,
+    "cook": cook.scene,
+    "dice": dice.scene,
     "disk": disk.scene,
+    "doll": doll.scene,
+    "fan": fan.scene,
+    "fly": fly.scene,
+    "hand": hand.scene,
+    "jump": jump.scene,
+    "poker": poker.scene,
+    "text": text.scene,
+    "top": top.scene,
+    "train": train.scene,
     "tumble": tumble.scene,
+    "random": random_bodies.scene,
 }
 
 METERED_ROWS = 60
@@ -58,4 +90,4 @@ def random_world(
     renderer: Renderer | None = None,
 ) -> Scene:
     """Textured objects in random rigid motion before a background, as in SPIFT; the whole follows from the seed."""
-    return make_scene("collage", shape, seed, mean_interval, frame_rate_hz, renderer)
+    return make_scene("random", shape, seed, mean_interval, frame_rate_hz, renderer)
