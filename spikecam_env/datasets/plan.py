@@ -7,12 +7,11 @@ Source: the paper, section "Datasets": 100 random scenes, 10 well-designed ones;
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from scenes.catalogue import SCENES, make_scene, random_world
+from scenes.catalogue import SCENES, make_scene
 from scenes.protocol import Scene
 from scenes.renderers.choose import BACKENDS
 from spikecam_env.datasets.renderer import AUTO, renderer_of_process
@@ -21,7 +20,7 @@ from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.sensor import checked_frames, checked_seed, checked_shape
 
 RANDOM = "random"
-"""Name of the scenes that `scenes.catalogue.random_world` draws."""
+"""The scene of the catalogue that its seed draws."""
 
 PHM = ("ball", "cook", "dice", "doll", "fan", "fly", "hand", "jump", "poker", "top")
 
@@ -31,7 +30,7 @@ class Entry:
     """One scene, and the camera it is recorded with.
 
     path        of its file in the dataset's folder; its first part is the split, "train" or "test"
-    scene       RANDOM, or a name of `scenes.catalogue.SCENES`
+    scene       its name in `scenes.catalogue.SCENES`
     scene_seed  of what the scene leaves to chance
     unit_seed   of the camera: its fixed pattern, starting phases and temporal noise
     """
@@ -68,8 +67,8 @@ class Plan:
         if not self.entries:
             raise InputError(f"a {self.kind} dataset of no scenes; ask for 1 or more")
         for entry in self.entries:
-            if entry.scene != RANDOM and entry.scene not in SCENES:
-                raise unknown_name("scene", entry.scene, (RANDOM, *SCENES))
+            if entry.scene not in SCENES:
+                raise unknown_name("scene", entry.scene, SCENES)
         if not (np.isfinite(self.mean_interval) and self.mean_interval >= 1):
             raise InputError(f"mean_interval is {self.mean_interval}; it must be 1 frame or more, e.g. 10")
         if self.renderer not in (AUTO, *BACKENDS):
@@ -81,7 +80,8 @@ class Plan:
 
     def scene(self, entry: Entry) -> Scene:
         """The scene of an entry."""
-        return (random_world if entry.scene == RANDOM else partial(make_scene, entry.scene))(
+        return make_scene(
+            entry.scene,
             shape=self.shape,
             seed=entry.scene_seed,
             mean_interval=self.mean_interval,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import os
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -17,6 +18,7 @@ from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
 
 LOCAL = "local"
+ANSWER_S = 10.0
 RETRIES = 3
 """Times that a scene is begun again after its worker died."""
 
@@ -25,7 +27,8 @@ def on_ray(plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, addr
     """Files as they are done, in any order, and with each its number of frames.
 
     address: LOCAL starts a cluster of `jobs` workers on this machine for the time of the run; else that of a cluster,
-    where the package is installed and `folder` is storage that all machines share.
+    where the package is installed and `folder` is storage that all machines share.  A cluster that asks for a token wants
+    it set up for this process too, as Ray's documentation says.
     Errors: what a worker raised; InputError without Ray, without that cluster, and if workers keep dying.
     """
     ray = _connected(address, jobs)
@@ -68,12 +71,24 @@ def _result(ray: ModuleType, reference: object) -> Written:
     return written
 
 
+def _check_answers(address: str) -> None:
+    """Ray itself asks for minutes before it gives up."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not colon:
+        return
+    try:
+        socket.create_connection((host, int(port)), timeout=ANSWER_S).close()
+    except (OSError, ValueError) as error:
+        raise InputError(f"no Ray cluster answers at {address!r} ({error}); give host:port, auto or {LOCAL}") from error
+
+
 def _connected(address: str, jobs: int) -> ModuleType:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray
     except ImportError as error:
         raise InputError("Ray is not installed; pip install 'spikecam-env[ray]', or leave out --ray") from error
+    _check_answers(address)
     try:
         if address == LOCAL:
             ray.init(num_cpus=jobs, include_dashboard=False, logging_level=logging.ERROR, log_to_driver=False)

@@ -20,6 +20,13 @@ def test_two_workers_one_killed_write_the_bytes_of_one_process(tmp_path: Path, w
     assert bytes_in(tmp_path) == whole
 
 
+@pytest.mark.parametrize("address", ["127.0.0.1:9", "head:x", "ray://127.0.0.1:9"])
+def test_an_address_without_a_cluster_is_refused_at_once(tmp_path: Path, address: str) -> None:
+    plan = small_plan()
+    with pytest.raises(InputError, match=f"no Ray cluster answers at '{address}'"):
+        next(on_ray(plan, tmp_path, plan.entries, 2, address))
+
+
 def test_without_ray_the_message_says_what_to_install(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "ray", None)
     plan = small_plan()
