@@ -11,18 +11,21 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from spikecam_env.datasets.build import build
+from spikecam_env.datasets.build import Built, build
 from spikecam_env.datasets.plan import Plan, phm_n
 from spikecam_env.datasets.verify import verify
 
 ALONE = 2
 """Scenes of the run in one process."""
 
+PARTS = ("scene", "noisy", "clean", "file", "truth", "digest", "start")
+
 
 def bench_dataset(plan: Plan | None = None, jobs: int | None = None) -> list[dict[str, Any]]:
     """Make a dataset and verify it; default: the PHM-like scenes, 1000 frames each at 250 x 400, one process a core.
 
-    Columns: run, scenes, frames/s (wall clock, start of the processes included), and the share of the workers' time
+    Columns: run, scenes, frames/s (wall clock, start of the processes included), processor time a frame [ms] (which
+    other work on the machine changes little; starting the processes not included), and the share of the workers' time
     on each part: scene (light), noisy and clean (camera and twin), file (packing and writing), truth, digest (SHA-256),
     start (making the scene, exposure, compiling or loading what is compiled).
     Rows: one process (first scenes only), all processes, verify.
@@ -36,18 +39,21 @@ def bench_dataset(plan: Plan | None = None, jobs: int | None = None) -> list[dic
             out = f"{folder}/{workers}-{len(part.entries)}"
             begin = time.perf_counter()
             built = build(part, out, jobs=workers, progress=True)
-            rows.append(_row(name, part, time.perf_counter() - begin, built.seconds))
+            rows.append(_row(name, part, time.perf_counter() - begin, built))
         begin = time.perf_counter()
         faults = verify(out, jobs=jobs)
-        rows.append(_row(f"verify: {len(faults)} faults", plan, time.perf_counter() - begin, {}))
+        rows.append(_row(f"verify: {len(faults)} faults", plan, time.perf_counter() - begin, None))
     return rows
 
 
-def _row(name: str, plan: Plan, wall_s: float, seconds: dict[str, float]) -> dict[str, Any]:
+def _row(name: str, plan: Plan, wall_s: float, built: Built | None) -> dict[str, Any]:
+    seconds = built.seconds if built else {}
     total = sum(seconds.values())
-    shares = {
-        part: f"{seconds[part] / total:.0%}" if part in seconds else None
-        for part in ("scene", "noisy", "clean", "file", "truth", "digest", "start")
+    frames = len(plan.entries) * plan.frames
+    return {
+        "run": name,
+        "scenes": len(plan.entries),
+        "frames/s": frames / wall_s,
+        "processor ms/frame": 1e3 * built.processor_s / frames if built else None,
+        **{part: f"{seconds[part] / total:.0%}" if part in seconds else None for part in PARTS},
     }
-    scenes = len(plan.entries)
-    return {"run": name, "scenes": scenes, "frames/s": scenes * plan.frames / wall_s, **shares}

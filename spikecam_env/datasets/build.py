@@ -31,14 +31,15 @@ UNFINISHED = ".*.partial.*"
 
 @dataclass(frozen=True)
 class Built:
-    """What a run did: with which renderer, files made and files that were there, bytes of both, and where the time
-    went, over all workers [s]."""
+    """What a run did: with which renderer, files made and files that were there, bytes of both; over all
+    workers, where the time went [s] and processor time [s]."""
 
     renderer: str
     made: int
     kept: int
     bytes: int
     seconds: dict[str, float]
+    processor_s: float
 
 
 def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = None, progress: bool = False) -> Built:
@@ -93,6 +94,7 @@ def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: 
     done = {file["path"] for file in manifest.files if file["sha256"] is not None}
     missing = tuple(entry for entry in plan.entries if entry.path not in done)
     seconds: Counter[str] = Counter()
+    processor_s = 0.0
     frames = plan.frames * len(plan.entries)
     bar = tqdm(
         total=frames, initial=plan.frames * len(done), desc=plan.kind, unit="frame", leave=False, disable=not progress
@@ -103,9 +105,17 @@ def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: 
                 manifest = manifest.with_file(news)
                 manifest.write(folder)
                 seconds.update(news.seconds)
+                processor_s += news.processor_s
             else:
                 bar.update(news)
-    return Built(plan.renderer, len(missing), len(done), sum(file["bytes"] for file in manifest.files), dict(seconds))
+    return Built(
+        plan.renderer,
+        len(missing),
+        len(done),
+        sum(file["bytes"] for file in manifest.files),
+        dict(seconds),
+        processor_s,
+    )
 
 
 def _at_work(

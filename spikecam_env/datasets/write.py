@@ -25,17 +25,18 @@ _READ_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Written:
-    """A file that is there: its entry, its size, its SHA-256, and where the time went [s]."""
+    """A file that is there: its entry, its size, its SHA-256, where the time went [s], and processor time [s]."""
 
     entry: Entry
     size: int
     sha256: str
     seconds: dict[str, float]
+    processor_s: float
 
 
 def write_scene(plan: Plan, entry: Entry, folder: Path) -> Iterator[int | Written]:
     """Record one entry into `folder`; gives the number of frames done, piece by piece, and at the end the file."""
-    clock = _Clock()
+    clock, begun = _Clock(), time.process_time()
     with clock.on("start"):
         scene = plan.scene(entry)
         camera = SpikeSensor(plan.model, plan.shape, entry.unit_seed, engine="auto")
@@ -62,7 +63,7 @@ def write_scene(plan: Plan, entry: Entry, folder: Path) -> Iterator[int | Writte
             yield count
     with clock.on("digest"):
         digest = sha256_of(path)
-    yield Written(entry, path.stat().st_size, digest, clock.seconds)
+    yield Written(entry, path.stat().st_size, digest, clock.seconds, time.process_time() - begun)
 
 
 def truth_frames(plan: Plan, start: int, stop: int) -> range:
