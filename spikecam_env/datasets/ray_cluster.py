@@ -27,8 +27,8 @@ def on_ray(plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, addr
     """Files as they are done, in any order, and with each its number of frames.
 
     address: LOCAL starts a cluster of `jobs` workers on this machine for the time of the run; else that of a cluster,
-    where the package is installed and `folder` is storage that all machines share.  A cluster that asks for a token wants
-    it set up for this process too, as Ray's documentation says.
+    where the package is installed and `folder` is storage that all machines share.  A cluster that asks for a token
+    wants it set up for this process too, as Ray's documentation says.
     Errors: what a worker raised; InputError without Ray, without that cluster, and if workers keep dying.
     """
     ray = _connected(address, jobs)
