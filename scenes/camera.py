@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.trajectories import Pose, Still, Trajectory, Vector
+from scenes.trajectories import AT_REST, Pose, Trajectory, Vector
 from spikecam_env.errors import InputError
 
 
@@ -22,7 +22,7 @@ class Camera:
     position: Vector = (0.0, 0.0, 3.0)
     target: Vector = (0.0, 0.0, 0.0)
     field_of_view_deg: float = 40.0
-    shake: Trajectory = Still()
+    shake: Trajectory = AT_REST
     up: Vector = (0.0, 1.0, 0.0)
 
     def __post_init__(self) -> None:

@@ -11,7 +11,9 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from scenes.flow import displacement
 from scenes.protocol import Gaze, Scene, Truth
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
@@ -60,3 +62,7 @@ class Exposed:
         """The scene's truth, its radiance scaled."""
         truth = self.scene.truth(frame, gaze)
         return dataclasses.replace(truth, radiance=truth.radiance * np.float32(self.gain))
+
+    def displacement(self, frame: float, frames: float, gaze: Gaze | None = None) -> NDArray[np.float32]:
+        """As `scenes.flow.displacement` has it."""
+        return displacement(self.scene, frame, frames, gaze)

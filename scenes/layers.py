@@ -81,23 +81,29 @@ def _dense(xy: tuple[float, float]) -> tuple[float, float]:
 
 
 def _sampled(coverage: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """(rows, columns) of well covered texels on a grid over what is covered, about SAMPLES a side."""
-    solid = coverage > 0.99
-    if not solid.any():
-        solid = coverage >= max(float(coverage.max()), 1e-6)
-    rows, columns = np.flatnonzero(solid.any(1)), np.flatnonzero(solid.any(0))
+    """(rows, columns) of texels that are covered: a grid of about SAMPLES a side, and the ends of its rows and columns,
+    as it is at the outline that a polynomial goes wrong first."""
+    solid = coverage >= min(0.99, max(float(coverage.max(initial=0)), 1e-6))
+    rows, columns = _spread(solid.any(1)), _spread(solid.any(0))
     if not len(rows):
         return rows, columns
-    grid = np.ix_(_spread(rows), _spread(columns))
-    at = np.argwhere(solid[grid])
-    if not len(at):
-        at = np.argwhere(solid)[:1]
-        return at[:, 0], at[:, 1]
-    return grid[0][at[:, 0], 0], grid[1][0, at[:, 1]]
+    last_row, last_column = len(solid) - 1, solid.shape[1] - 1
+    across, down = solid[rows], solid[:, columns]
+    inner = np.nonzero(across[:, columns])
+    return (
+        np.concatenate([rows[inner[0]], rows, rows, down.argmax(0), last_row - down[::-1].argmax(0)]),
+        np.concatenate(
+            [columns[inner[1]], across.argmax(1), last_column - across[:, ::-1].argmax(1), columns, columns]
+        ),
+    )
 
 
-def _spread(present: NDArray[np.intp]) -> NDArray[np.intp]:
-    return np.unique(np.linspace(present[0], present[-1], SAMPLES).round().astype(np.intp))
+def _spread(present: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """About SAMPLES of the places that are present, evenly from the first to the last."""
+    places = np.flatnonzero(present)
+    return (
+        places[np.unique(np.linspace(0, len(places) - 1, SAMPLES).round().astype(np.intp))] if len(places) else places
+    )
 
 
 def project(view: Floats, points: Floats, focal: float, centre: tuple[float, float]) -> tuple[Floats, Floats]:
@@ -130,7 +136,8 @@ def fit(key_pixels: Floats, pixels: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """A key carried to n instants: frames of reference (n, 3), coefficients (n, 2, 6) and change of depth (n,)."""
+    """A key carried to n instants: frames of reference (n, 3) and coefficients (n, 2, 6) as `fit` gives them, and the
+    change of depth, (n, 3) on (1, u, v)."""
 
     key: Key
     reference: Array
@@ -148,8 +155,15 @@ def carry(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats
     pixels += centre[:, None]
     _, before = project(key_view, key.points, focal, (0.0, 0.0))
     reference, coefficients = fit(key.texels, pixels)
-    deeper = depth.mean(-1) - before.mean()
-    return Carried(key, reference.astype(np.float32), coefficients.astype(np.float32), deeper.astype(np.float32))
+    u, v = np.moveaxis((pixels - reference[:, None, :2]) * reference[:, 2, None, None], -1, 0)
+    basis = np.stack([np.ones_like(u), u, v], -1)
+    transposed = np.swapaxes(basis, -1, -2)
+    deeper = np.linalg.solve(
+        transposed @ basis + RIDGE * np.diag([0.0, 1, 1]), transposed @ (depth - before)[..., None]
+    )
+    return Carried(
+        key, reference.astype(np.float32), coefficients.astype(np.float32), deeper[..., 0].astype(np.float32)
+    )
 
 
 def lay(
@@ -243,6 +257,7 @@ def _lay(
     for n in range(len(pictures)):
         top, left, bottom, right = boxes[n]
         w = share[n]
+        middle_x, middle_y, k = reference0[n] if w < one else reference1[n]
         deeper = (one - w) * deeper0[n] + w * deeper1[n]
         for y in range(top, bottom):
             light[left:right] = 0
@@ -267,10 +282,11 @@ def _lay(
                 for x in range(left, right):
                     row[x] = light[x] + max(one - cover[x], zero) * row[x]
                 continue
+            nearer = deeper[0] + deeper[2] * (np.float32(y) - middle_y) * k
             for x in range(left, right):
                 if cover[x] <= zero:
                     continue
-                z = depth[x] / cover[x] + deeper
+                z = depth[x] / cover[x] + nearer + deeper[1] * (np.float32(x) - middle_x) * k
                 if tested and z > depths[n, y, x]:
                     continue
                 row[x] = light[x] + max(one - cover[x], zero) * row[x]

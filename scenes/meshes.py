@@ -11,8 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -85,7 +87,7 @@ def from_file(
     if not Path(path).is_file():
         raise InputError(f"no mesh file {path}; give the path of an obj, stl, ply or glb file")
     try:
-        mesh = trimesh.load(path, force="mesh")
+        mesh: Any = trimesh.load(str(path), force="mesh")
     except Exception as error:
         raise InputError(f"{path} cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
     return from_mesh(mesh, texture, size)
@@ -110,7 +112,7 @@ def from_mesh(
 
 def picture(path: str | PathLike[str]) -> Texture:
     """A picture file as linear grey in [0, 1], (h, w) float32; 8 and 16 bit are taken as sRGB."""
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if Path(path).is_file() else None
+    image: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if Path(path).is_file() else None
     if image is None:
         raise InputError(f"no picture can be read from {path}; give the path of a png, jpg or tif file")
     if np.issubdtype(image.dtype, np.integer):
@@ -155,7 +157,9 @@ def sheet(points: Callable[[Points, Points], Sequence[Points]], shape: tuple[int
     return Part(vertices, _unit(normals.reshape(-1, 3)), uv, faces, albedo)
 
 
-def lathe(profile: Sequence[tuple[float, float]], albedo: Albedo = 0.8, sections: int = 64, smooth: bool = True) -> Part:
+def lathe(
+    profile: Sequence[tuple[float, float]], albedo: Albedo = 0.8, sections: int = 64, smooth: bool = True
+) -> Part:
     """A profile of (radius, height), from the bottom up along the outside, turned about y.
 
     The texture goes round once, from the bottom to the top of the profile.  smooth: a curve through the points
@@ -236,7 +240,7 @@ def rectangle(width: float, height: float, albedo: Albedo = 0.8, cells: int = 1)
 
 def box(extents: tuple[float, float, float], albedo: Albedo | Sequence[Albedo] = 0.8, cells: int = 1) -> list[Part]:
     """Six rectangles: front (+z), right (+x), back, left, top (+y), bottom; an albedo for all or for each."""
-    sides = list(albedo) if isinstance(albedo, (list, tuple)) else [albedo] * 6
+    sides: list[Any] = list(albedo) if isinstance(albedo, (list, tuple)) else [albedo] * 6
     if len(sides) != 6:
         raise InputError(f"a box got {len(sides)} albedos; it takes one, or six")
     width, height, depth = extents
@@ -245,7 +249,7 @@ def box(extents: tuple[float, float, float], albedo: Albedo | Sequence[Albedo] =
     parts = []
     for (about_x, about_y), (across, up, out), side in zip(turns, sizes, sides, strict=True):
         face = rectangle(across, up, side, cells)
-        parts.append(_placed(replace(face, vertices=face.vertices + [0, 0, out / 2]), about_x, about_y))
+        parts.append(_placed(replace(face, vertices=face.vertices + np.array([0, 0, out / 2])), about_x, about_y))
     return parts
 
 
@@ -265,17 +269,16 @@ def prism(outline: Sequence[tuple[float, float]], depth: float, side: Albedo = 0
         Part(front * [1, 1, -1], -ahead, uv, triangles[:, ::-1], face),
     ]
     for a, b in zip(corners, np.roll(corners, -1, 0), strict=True):
-        parts.append(
-            sheet(
-                lambda u, v, a=a, b=b: (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), depth * (0.5 - v)),
-                (1, 1),
-                side,
-            )
-        )
+        parts.append(sheet(partial(_between, a, b, depth), (1, 1), side))
     return parts
 
 
 # -- helpers ---------------------------------------------------------------------------------------------------
+
+
+def _between(a: Points, b: Points, depth: float, u: Points, v: Points) -> Sequence[Points]:
+    """The wall of a prism from corner a to corner b."""
+    return a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), depth * (0.5 - v)
 
 
 def _turned(knots: Points, albedo: Albedo, sections: int, pieces: int, straight: bool = False) -> Part:
@@ -312,7 +315,7 @@ def _surface(part: Part) -> Surface:
 
 
 def _atlas(albedos: Sequence[Albedo]) -> tuple[Texture, list[NDArray[np.float64]]]:
-    """All in one texture, shelf by shelf, with a margin of repeated edge; and each one's place (u, v, width, height)."""
+    """All in one texture, shelf by shelf, each with a margin of its edge; and the places (u, v, width, height)."""
     tiles = {id(a): np.full((4, 4), a, np.float32) if np.ndim(a) == 0 else np.asarray(a, np.float32) for a in albedos}
     order = sorted(tiles, key=lambda name: -tiles[name].shape[0])
     width = max(256, *(tile.shape[1] + 2 * _MARGIN for tile in tiles.values()))

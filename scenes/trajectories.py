@@ -209,6 +209,9 @@ class Repeating(Motion):
         return self.motion.pose((np.asarray(time_s, np.float64) - self.start_s) % self.period_s + self.start_s)
 
 
+AT_REST = Still()
+"""At the origin."""
+
 _SINES = 5
 
 

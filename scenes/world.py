@@ -2,7 +2,7 @@
 
     World(
         shape=(250, 400),
-        bodies=(Body("ball", surface, Ballistic((-1, 0, 0), (8, 2, 0), gravity=(0, -9.81, 0)) @ Spinning((0, 0, 1), 900)),),
+        bodies=(Body("ball", surface, Ballistic((-1, 0, 0), (8, 2, 0), gravity=(0, -9.81, 0)) @ Spinning(Z, 900)),),
         camera=Camera((0, 0, 3)),
         background=0.1,
     )
@@ -20,6 +20,7 @@ from collections.abc import Callable, Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from os import getpid
 from typing import Any, TypeVar
 
@@ -35,7 +36,7 @@ from scenes.layers import Carried, Key, carry, fit, lay, project, render_key
 from scenes.protocol import Gaze, Truth
 from scenes.renderers.choose import choose_renderer
 from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
-from scenes.trajectories import Still, Trajectory
+from scenes.trajectories import AT_REST, Trajectory
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -74,7 +75,7 @@ class Body:
 
     name: str
     surface: Surface
-    trajectory: Trajectory = Still()
+    trajectory: Trajectory = AT_REST
     backdrop: bool = False
 
 
@@ -97,8 +98,8 @@ class World:
 
     shape: tuple[int, int]
     bodies: tuple[Body, ...]
-    camera: Camera = Camera()
-    lighting: Lighting = Lighting()
+    camera: Camera = field(default_factory=Camera)
+    lighting: Lighting = field(default_factory=Lighting)
     background: float | Array = 0.1
     light: float = 1.0
     frame_rate_hz: float = 40_000.0
@@ -198,9 +199,7 @@ class World:
         count = min(numba.get_num_threads(), len(frames))
         cuts = np.linspace(0, len(frames), count + 1).astype(int)
         pool = _pool(getpid())
-        return [
-            pool.submit(_compose, pictures, base, layers, int(a), int(b)) for a, b in zip(cuts, cuts[1:], strict=False)
-        ]
+        return [pool.submit(_compose, pictures, base, layers, int(a), int(b)) for a, b in pairwise(cuts)]
 
     def _layer(self, plan: _Plan, body: int, frames: Floats, offset: Floats, gaze: Gaze | None) -> _Layer:
         """A body's keys around the frames, carried to each of them."""
@@ -238,7 +237,10 @@ class World:
         name = (body, pose.tobytes(), camera.pose.tobytes(), window)
         surface = self.bodies[body].surface
         key = self._kept.get(
-            "key", name, 4 * len(self.bodies) + 8, lambda: render_key(self._draw, surface, pose, camera, self._lit, window)
+            "key",
+            name,
+            4 * len(self.bodies) + 8,
+            lambda: render_key(self._draw, surface, pose, camera, self._lit, window),
         )
         return key, view
 
@@ -272,7 +274,7 @@ class World:
         picture = self._sky(frame, np.zeros(2))
         for number, body in enumerate(self.bodies):
             if body.backdrop:
-                _over(picture, self._sprite(number, frame, None), None)
+                _over(picture, self._sprite(number, frame, None), np.full_like(picture, np.inf))
         return picture
 
     def _sky(self, frame: float, offset: Floats) -> Array:
@@ -307,13 +309,16 @@ class World:
         """Radiance, depth and owner, of bodies rendered at this instant."""
         picture = self._sky(frame, _offsets(gaze, np.array([frame]))[0])
         depth = np.full(self.shape, np.inf, np.float32)
+        nearest = depth.copy()
         owner = np.zeros(self.shape, np.int32)
         for body in self._plan(int(frame // BLOCK)).order:
             sprite = self._sprite(body, frame, gaze)
-            shown = _over(picture, sprite, None if self.bodies[body].backdrop else depth)
+            shown = _over(picture, sprite, nearest)
             place = _place(sprite.window)
             depth[place][shown] = sprite.depth[shown]
             owner[place][shown] = body + 1
+            if not self.bodies[body].backdrop:
+                nearest[place][shown] = sprite.depth[shown]
         return picture, depth, owner
 
     def _sprite(self, body: int, frame: float, gaze: Gaze | None) -> Sprite:
@@ -328,9 +333,7 @@ class World:
             return Sprite(Window(0, 0, 0, 0), nothing, nothing, nothing)
         return self._draw.render(self.bodies[body].surface, pose, camera, self._lit, window, TRUTH_SUPERSAMPLE)
 
-    def _displaced(
-        self, owner: NDArray[np.int32], depth: Array, frame: float, by: float, gaze: Gaze | None
-    ) -> Floats:
+    def _displaced(self, owner: NDArray[np.int32], depth: Array, frame: float, by: float, gaze: Gaze | None) -> Floats:
         """(H, W, 2): where what is seen at a frame has gone `by` frames later."""
         now, then = (self._pinhole(np.array(f)).pose for f in (frame, frame + by))
         centre = np.asarray(self._centre)
@@ -412,7 +415,7 @@ class _Plan:
 
 
 def _plan_block(world: World, block: int) -> _Plan:
-    frames = np.arange(_NODES + 1) * (BLOCK / _NODES) + block * BLOCK
+    frames: Floats = block * BLOCK + np.linspace(0.0, BLOCK, _NODES + 1, dtype=np.float64)
     centre = np.broadcast_to(world._centre, (len(frames), 2))
     steps, ranges, boxes, speeds, resting = [], [], [], [_sky_speed(world, frames)], []
     for number, body in enumerate(world.bodies):
@@ -587,12 +590,10 @@ def _compose(pictures: Array, base: Array, layers: list[_Layer], start: int, sto
             )
 
 
-def _over(picture: Array, sprite: Sprite, depth: Array | None) -> NDArray[np.bool_]:
+def _over(picture: Array, sprite: Sprite, depth: Array) -> NDArray[np.bool_]:
     """Lay a sprite over a picture, in place, but where the picture is nearer; returns where it is what is seen."""
     place = _place(sprite.window)
-    front = sprite.coverage > 0
-    if depth is not None:
-        front &= sprite.depth <= depth[place]
+    front = (sprite.coverage > 0) & (sprite.depth <= depth[place])
     covered = np.where(front, sprite.coverage, 0)
     picture[place] = np.where(front, sprite.radiance, 0) + (1 - covered) * picture[place]
     return np.asarray(covered > 0.5)

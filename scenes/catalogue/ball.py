@@ -9,7 +9,7 @@ from scenes.meshes import assemble, sphere
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer
 from scenes.textures import Texture
-from scenes.trajectories import Ballistic, Bouncing, Repeating, Spinning, Still
+from scenes.trajectories import Ballistic, Bouncing, Repeating, Spinning
 from scenes.world import Body, World
 
 
@@ -73,4 +73,6 @@ def stitched(size: int = 256) -> Texture:
     longitude = 2 * np.pi * (np.arange(2 * size) + 0.5) / (2 * size)
     latitude = np.pi / 2 - np.pi * (np.arange(size) + 0.5) / size
     away = np.abs(latitude[:, None] - 0.75 * np.sin(2 * longitude)[None])
-    return (0.65 + 0.35 * np.clip(1 - away / 0.09, 0, 1) - 0.5 * (away > 0.3) * (latitude[:, None] > 0)).astype(np.float32)
+    return (0.65 + 0.35 * np.clip(1 - away / 0.09, 0, 1) - 0.5 * (away > 0.3) * (latitude[:, None] > 0)).astype(
+        np.float32
+    )

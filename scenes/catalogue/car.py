@@ -19,7 +19,17 @@ SPEED = 31.0
 
 WHEEL = 0.33
 
-OUTLINE = [(-2.1, 0.3), (2.05, 0.3), (2.15, 0.5), (2.1, 0.78), (1.1, 0.95), (0.45, 1.42), (-0.9, 1.46), (-1.75, 1.0), (-2.15, 0.95)]
+OUTLINE = [
+    (-2.1, 0.3),
+    (2.05, 0.3),
+    (2.15, 0.5),
+    (2.1, 0.78),
+    (1.1, 0.95),
+    (0.45, 1.42),
+    (-0.9, 1.46),
+    (-1.75, 1.0),
+    (-2.15, 0.95),
+]
 
 
 def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Renderer | None = None) -> Scene:
@@ -74,4 +84,6 @@ def rim() -> Texture:
         canvas.rectangle(0, low, 1, high, 0.1)
         for k in range(5):
             canvas.rectangle((k + 0.25) / 5, low, (k + 0.7) / 5, high, 0.85)
-    return canvas.rectangle(0, 0.27, 1, 0.29, 0.8).rectangle(0, 0.71, 1, 0.73, 0.8).rectangle(0, 0, 1, 0.07, 0.7).texture()
+    return (
+        canvas.rectangle(0, 0.27, 1, 0.29, 0.8).rectangle(0, 0.71, 1, 0.73, 0.8).rectangle(0, 0, 1, 0.07, 0.7).texture()
+    )

@@ -29,10 +29,24 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
         bodies=(
             stage.wall(tiles(rng)),
             Body("pan", assemble(lathe(PAN, stage.mottled(rng, 0.08, 0.3, 256), smooth=False), handle), swing),
-            Body("pancake", assemble(cake), Still((-0.25, -0.3, 0.2)) @ Bouncing(0.85, 981.0, 0.2) @ Spinning((1, 0.1, 0.4), 800, 20)),
-            Body("tomato", assemble(slice_), Still((0.35, -0.35, 0.3)) @ Bouncing(1.0, 981.0, 0.4) @ Spinning((0.4, 1, 0.8), 1100, 70)),
-            Body("carrot", assemble(carrot), Still((-0.75, -0.35, 0.1)) @ Bouncing(1.1, 981.0, 0.75) @ Spinning((0.2, 0, 1), 900, 40)),
-            Body("egg", assemble(egg), Still((0.85, -0.3, -0.2)) @ Bouncing(0.9, 981.0, 0.05) @ Spinning((1, 0, 1), 600)),
+            Body(
+                "pancake",
+                assemble(cake),
+                Still((-0.25, -0.3, 0.2)) @ Bouncing(0.85, 981.0, 0.2) @ Spinning((1, 0.1, 0.4), 800, 20),
+            ),
+            Body(
+                "tomato",
+                assemble(slice_),
+                Still((0.35, -0.35, 0.3)) @ Bouncing(1.0, 981.0, 0.4) @ Spinning((0.4, 1, 0.8), 1100, 70),
+            ),
+            Body(
+                "carrot",
+                assemble(carrot),
+                Still((-0.75, -0.35, 0.1)) @ Bouncing(1.1, 981.0, 0.75) @ Spinning((0.2, 0, 1), 900, 40),
+            ),
+            Body(
+                "egg", assemble(egg), Still((0.85, -0.3, -0.2)) @ Bouncing(0.9, 981.0, 0.05) @ Spinning((1, 0, 1), 600)
+            ),
         ),
         camera=stage.camera(1.6),
         frame_rate_hz=frame_rate_hz,

@@ -10,7 +10,7 @@ from scenes.meshes import assemble, box
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer
 from scenes.textures import Texture
-from scenes.trajectories import Ballistic, Bouncing, Repeating, Spinning, Still
+from scenes.trajectories import Ballistic, Bouncing, Repeating, Spinning
 from scenes.world import Body, World
 
 PIPS = {

@@ -13,14 +13,30 @@ from scenes.textures import Texture
 from scenes.trajectories import Spinning, Still, Swinging
 from scenes.world import Body, World
 
-OUTLINE = [(0.0, 0.0), (0.33, 0.0), (0.43, 0.25), (0.45, 0.5), (0.36, 0.85), (0.27, 1.0), (0.31, 1.2), (0.24, 1.42), (0.0, 1.5)]
+OUTLINE = [
+    (0.0, 0.0),
+    (0.33, 0.0),
+    (0.43, 0.25),
+    (0.45, 0.5),
+    (0.36, 0.85),
+    (0.27, 1.0),
+    (0.31, 1.2),
+    (0.24, 1.42),
+    (0.0, 1.5),
+]
 
 
 def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Renderer | None = None) -> Scene:
     rng = np.random.default_rng(seed)
     bodies = []
     for number, (x, z, size, rpm, sway) in enumerate(
-        [(-0.35, -0.3, 1.0, 1100, 9), (0.5, 0.1, 0.68, -1700, 12), (1.1, 0.25, 0.45, 2300, 15), (-1.1, -0.6, 0.72, -800, 10)], 1
+        [
+            (-0.35, -0.3, 1.0, 1100, 9),
+            (0.5, 0.1, 0.68, -1700, 12),
+            (1.1, 0.25, 0.45, 2300, 15),
+            (-1.1, -0.6, 0.72, -800, 10),
+        ],
+        1,
     ):
         bodies.append(
             Body(

@@ -24,9 +24,7 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
         side.moved(Still(turn=(0, 0, 360 * k / BLADES))) for k in range(BLADES) for side in blade(painted(rng, k))
     ]
     rings = [torus(radius, 0.014, 0.75, 72).moved(upright) for radius in (0.3, 0.62, 0.93)]
-    spokes = [
-        capsule(0.68, 0.011, 0.75, 12).moved(Still(turn=(0, 0, 45 * k)) @ Still((0, 0.25, 0))) for k in range(8)
-    ]
+    spokes = [capsule(0.68, 0.011, 0.75, 12).moved(Still(turn=(0, 0, 45 * k)) @ Still((0, 0.25, 0))) for k in range(8)]
     stand = [
         capsule(1.1, 0.06, 0.4).moved(Still((0, -1.25, 0))),
         lathe([(0.0, -0.1), (0.16, -0.1), (0.16, 0.1), (0.0, 0.1)], 0.25, smooth=False).moved(upright),

@@ -10,7 +10,7 @@ from scenes.meshes import Part, assemble, capsule, sheet, sphere
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer
 from scenes.textures import Texture, blobs
-from scenes.trajectories import Path, Spinning, Still, Swinging, Vibrating
+from scenes.trajectories import Path, Still, Swinging, Vibrating
 from scenes.world import Body, World
 
 BEAT_HZ = 70.0

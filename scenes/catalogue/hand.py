@@ -41,7 +41,11 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
 
 def wrinkled(rng: np.random.Generator) -> Texture:
     canvas = Canvas(512, 256, 0.72).picture(stage.mottled(rng, 0.6, 0.85, 256), 0, 0, 1, 1)
-    for line in ([(-0.12, 0.42), (0.0, 0.38), (0.12, 0.43)], [(-0.12, 0.52), (0.02, 0.47), (0.12, 0.5)], [(0.09, 0.4), (0.04, 0.65)]):
+    for line in (
+        [(-0.12, 0.42), (0.0, 0.38), (0.12, 0.43)],
+        [(-0.12, 0.52), (0.02, 0.47), (0.12, 0.5)],
+        [(0.09, 0.4), (0.04, 0.65)],
+    ):
         for shift in (0.0, 1.0):
             canvas.line([(x + shift, y) for x, y in line], 0.01, 0.4)
     return canvas.texture()

@@ -19,16 +19,19 @@ PERIOD_S = 2 * np.sqrt(2 * 0.32 / 981.0)
 
 def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Renderer | None = None) -> Scene:
     rng = np.random.default_rng(seed)
-    up = Still((0, -0.3, -0.6)) @ Bouncing(0.32, 981.0, 0.3)
+    up = Still((0, -0.42, -0.6)) @ Bouncing(0.32, 981.0, 0.3)
     beat = 1 / PERIOD_S
     bodies = [Body("torso", torso(rng), up)]
     for side, name in ((-1, "left"), (1, "right")):
         shoulder = Still((side * 0.21, 0.55, 0), (0, 0, -side * 100)) @ Swinging((0, 0, -side), 50, beat, 0.3)
         hip = Still((side * 0.1, 0.06, 0), (0, 0, -side * 162)) @ Swinging((0, 0, -side), -14, beat, 0.3)
         arm = [capsule(0.5, 0.065, sleeve(rng), taper=0.8), sphere(0.075, 0.8, 24).moved(Still((0, 0.56, 0)))]
-        leg = [capsule(0.62, 0.09, trousers(), taper=0.75), sphere(0.09, 0.08, 24).scaled((0.9, 0.8, 1.6)).moved(Still((0, 0.68, 0.06)))]
+        leg = [
+            capsule(0.62, 0.09, trousers(), taper=0.75),
+            sphere(0.09, 0.08, 24).scaled((0.9, 0.8, 1.6)).moved(Still((0, 0.68, 0.06))),
+        ]
         bodies += [Body(f"{name} arm", assemble(*arm), up @ shoulder), Body(f"{name} leg", assemble(*leg), up @ hip)]
-    bodies.append(Body("rope", assemble(rope()), Still((0, 0.1, -0.6)) @ Spinning((1, 0, 0), 60 * beat, 100)))
+    bodies.append(Body("rope", assemble(rope()), Still((0, 0.0, -0.6)) @ Spinning((1, 0, 0), 60 * beat, 100)))
     return World(
         shape,
         bodies=(stage.wall(stage.mottled(rng, 0.2, 0.5)), stage.floor(stage.boards(rng), -1.02), *bodies),
@@ -81,7 +84,12 @@ def face() -> Texture:
 
 
 def sleeve(rng: np.random.Generator) -> Texture:
-    return Canvas(128, 192, 0.72).picture(stage.mottled(rng, 0.62, 0.82, 64), 0, 0, 1, 0.7).rectangle(0, 0.65, 1, 1, 0.3).texture()
+    return (
+        Canvas(128, 192, 0.72)
+        .picture(stage.mottled(rng, 0.62, 0.82, 64), 0, 0, 1, 0.7)
+        .rectangle(0, 0.65, 1, 1, 0.3)
+        .texture()
+    )
 
 
 def trousers() -> Texture:

@@ -64,7 +64,8 @@ def _pip(canvas: Canvas, suit: str, x: float, y: float, size: float, grey: float
         for side in (-1, 1):
             canvas.ellipse(x + side * 0.42 * wide, y + lobe * tall, 0.43 * wide, 0.43 * size, grey)
         canvas.polygon(
-            [(x - 0.83 * wide, y + 0.6 * lobe * tall), (x, y + point * tall), (x + 0.83 * wide, y + 0.6 * lobe * tall)], grey
+            [(x - 0.83 * wide, y + 0.6 * lobe * tall), (x, y + point * tall), (x + 0.83 * wide, y + 0.6 * lobe * tall)],
+            grey,
         )
     if suit != "heart":
         canvas.polygon([(x, y), (x + 0.35 * wide, y + tall), (x - 0.35 * wide, y + tall)], grey)
@@ -75,7 +76,10 @@ def back() -> Texture:
     for i in range(9):
         for j in range(13):
             canvas.polygon(
-                [(0.1 * i + 0.1 + dx * 0.035, 0.07 * j + 0.08 + dy * 0.026) for dx, dy in ((0, -1), (1, 0), (0, 1), (-1, 0))],
+                [
+                    (0.1 * i + 0.1 + dx * 0.035, 0.07 * j + 0.08 + dy * 0.026)
+                    for dx, dy in ((0, -1), (1, 0), (0, 1), (-1, 0))
+                ],
                 0.75,
             )
     return canvas.texture()

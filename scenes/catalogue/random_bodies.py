@@ -9,7 +9,7 @@ from scenes.meshes import Part, assemble, box, capsule, lathe, sphere, torus
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Lighting, Renderer, Surface
 from scenes.textures import Texture, random_texture
-from scenes.trajectories import Chain, Shake, Spinning, Still, Trajectory, Vibrating
+from scenes.trajectories import AT_REST, Chain, Shake, Spinning, Still, Trajectory, Vector, Vibrating
 from scenes.world import Body, World
 
 FASTEST_HZ, SLOWEST_HZ = 40.0, 4.0
@@ -24,7 +24,9 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
     bodies = [Body(f"body {k + 1}", solid(rng), motion(rng)) for k in range(int(rng.integers(3, 8)))]
     low, high = np.sort(rng.uniform(0.05, 0.8, 2))
     wall = stage.wall((low + (high - low) * random_texture(rng, 512)).astype(np.float32), -3.0, (9.0, 9.0))
-    shake: Trajectory = Shake(0.06, highest_hz=40, seed=int(rng.integers(1 << 31))) if rng.random() < SHAKEN else Still()
+    shake: Trajectory = (
+        Shake(0.06, highest_hz=40, seed=int(rng.integers(1 << 31))) if rng.random() < SHAKEN else AT_REST
+    )
     ambient = rng.uniform(0.2, 0.5)
     towards = (float(rng.uniform(-0.8, 0.8)), float(rng.uniform(0.1, 0.9)), 0.8)
     return World(
@@ -44,9 +46,10 @@ def motion(rng: np.random.Generator) -> Trajectory:
     for _ in range(2):
         frequency = float(np.exp(rng.uniform(np.log(SLOWEST_HZ), np.log(FASTEST_HZ))))
         reach = rng.normal(size=3) * [1, 0.7, 0.5] * rng.uniform(0.1, 0.6)
-        where = where @ Vibrating(tuple(map(float, reach)), frequency, rng.random())
-    axis = tuple(map(float, rng.normal(size=3)))
-    return where @ Spinning(axis, float(rng.uniform(-FASTEST_RPM, FASTEST_RPM)), rng.uniform(0, 360))
+        where = where @ Vibrating(_vector(reach), frequency, rng.random())
+    return where @ Spinning(
+        _vector(rng.normal(size=3)), float(rng.uniform(-FASTEST_RPM, FASTEST_RPM)), rng.uniform(0, 360)
+    )
 
 
 def solid(rng: np.random.Generator) -> Surface:
@@ -57,8 +60,8 @@ def solid(rng: np.random.Generator) -> Surface:
         stretch = rng.uniform(0.6, 1.2, 3)
         return assemble(sphere(size, grey(rng), 60).scaled(stretch))
     if kind == 1:
-        extents = tuple(map(float, size * rng.uniform(0.6, 2.0, 3)))
-        return assemble(*box(extents, [grey(rng) for _ in range(6)], 4))  # type: ignore[arg-type]
+        extents = _vector(size * rng.uniform(0.6, 2.0, 3))
+        return assemble(*box(extents, [grey(rng) for _ in range(6)], 4))
     if kind == 2:
         return assemble(torus(size, size * rng.uniform(0.2, 0.5), grey(rng), 64))
     if kind == 3:
@@ -79,3 +82,7 @@ def grey(rng: np.random.Generator) -> Texture:
     """A random texture between two greys that differ."""
     low, high = rng.uniform(0.03, 0.35), rng.uniform(0.5, 0.98)
     return (low + (high - low) * random_texture(rng, 256)).astype(np.float32)
+
+
+def _vector(values: np.ndarray) -> Vector:
+    return float(values[0]), float(values[1]), float(values[2])

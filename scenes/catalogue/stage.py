@@ -9,7 +9,7 @@ from scenes.camera import Camera
 from scenes.drawing import Canvas
 from scenes.meshes import assemble, rectangle
 from scenes.textures import Texture, fractal_noise
-from scenes.trajectories import Still, Trajectory
+from scenes.trajectories import AT_REST, Still, Trajectory
 from scenes.world import Body
 
 GRAVITY = (0.0, -981.0, 0.0)
@@ -19,10 +19,12 @@ UNITS_SEEN = 2.0
 """Height of what the camera sees at the origin; 3.2 across at 250 x 400."""
 
 
-def camera(above: float = 0.8, distance: float = 6.0, shake: Trajectory = Still()) -> Camera:
+def camera(above: float = 0.8, distance: float = 6.0, shake: Trajectory = AT_REST) -> Camera:
     """Looks at the origin from a little above."""
     far = float(np.hypot(above, distance))
-    return Camera((0, above, distance), field_of_view_deg=float(np.degrees(2 * np.arctan(UNITS_SEEN / 2 / far))), shake=shake)
+    return Camera(
+        (0, above, distance), field_of_view_deg=float(np.degrees(2 * np.arctan(UNITS_SEEN / 2 / far))), shake=shake
+    )
 
 
 def floor(texture: Texture, height: float = -0.85, depth: float = 5.0) -> Body:
@@ -36,7 +38,9 @@ def wall(texture: Texture, depth: float = -2.5, size: tuple[float, float] = (12.
     return Body("wall", assemble(rectangle(*size, texture)), Still((0, 1.0, depth)), backdrop=True)
 
 
-def boards(rng: np.random.Generator, rows: int = 10, size: int = 1024, dark: float = 0.3, bright: float = 0.55) -> Texture:
+def boards(
+    rng: np.random.Generator, rows: int = 10, size: int = 1024, dark: float = 0.3, bright: float = 0.55
+) -> Texture:
     """Wooden boards: grain along x, a dark joint between two."""
     grain = np.repeat(rng.random((rows * 24, 8)), size // 8, axis=1).astype(np.float32)
     fine = fractal_noise(rng, size)[: rows * 24]

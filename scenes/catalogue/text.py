@@ -8,7 +8,7 @@ from scenes.catalogue import stage
 from scenes.drawing import Canvas
 from scenes.meshes import assemble, disc, lathe
 from scenes.protocol import Scene
-from scenes.renderers.protocol import Renderer
+from scenes.renderers.protocol import Lighting, Renderer
 from scenes.textures import Texture
 from scenes.trajectories import Spinning, Still
 from scenes.world import Body, World
@@ -28,6 +28,7 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
             Body("wheel", assemble(plate), Still((0.78, 0.0, 0.1), (0, -14, 0)) @ Spinning((0, 0, 1), 1500)),
         ),
         camera=stage.camera(0.3),
+        lighting=Lighting(0.6, 0.4),
         frame_rate_hz=frame_rate_hz,
         renderer=renderer,
     )

@@ -13,7 +13,19 @@ from scenes.textures import Texture
 from scenes.trajectories import Spinning, Still
 from scenes.world import Body, World
 
-OUTLINE = [(0.0, 0.0), (0.05, 0.06), (0.2, 0.2), (0.5, 0.48), (0.55, 0.58), (0.48, 0.68), (0.2, 0.75), (0.075, 0.82), (0.06, 1.05), (0.07, 1.15), (0.0, 1.18)]
+OUTLINE = [
+    (0.0, 0.0),
+    (0.05, 0.06),
+    (0.2, 0.2),
+    (0.5, 0.48),
+    (0.55, 0.58),
+    (0.48, 0.68),
+    (0.2, 0.75),
+    (0.075, 0.82),
+    (0.06, 1.05),
+    (0.07, 1.15),
+    (0.0, 1.18),
+]
 
 
 def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Renderer | None = None) -> Scene:
@@ -24,7 +36,9 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
     ):
         motion = Still((x, -0.84, z)) @ Spinning((0, 1, 0), nod, rng.uniform(0, 360)) @ Still(turn=(0, 0, tilt))
         tops.append(
-            Body(f"top {number}", assemble(lathe(OUTLINE, painted(rng)).scaled(size)), motion @ Spinning((0, 1, 0), rpm))
+            Body(
+                f"top {number}", assemble(lathe(OUTLINE, painted(rng)).scaled(size)), motion @ Spinning((0, 1, 0), rpm)
+            )
         )
     return World(
         shape,

@@ -64,11 +64,18 @@ def carriage(rng: np.random.Generator) -> Surface:
 
 def locomotive() -> Surface:
     half = LENGTH / 2
-    outline = [(-half, 0.7), (half + 0.2, 0.7), (half + 0.25, 1.2), (half - 1.3, 2.7), (half - 2.6, 3.45), (-half, 3.45)]
-    canvas = Canvas(1152, 352, 0.6).rectangle(0, 0.72, 1, 0.84, 0.9).rectangle(0, 0, 1, 0.14, 0.35)
+    outline = [
+        (-half, 0.7),
+        (half + 0.2, 0.7),
+        (half + 0.25, 1.2),
+        (half - 1.3, 2.7),
+        (half - 2.6, 3.45),
+        (-half, 3.45),
+    ]
+    canvas = Canvas(1152, 352, 0.35).rectangle(0, 0.72, 1, 0.84, 0.9).rectangle(0, 0, 1, 0.14, 0.35)
     canvas.polygon([(0.74, 0.28), (0.83, 0.28), (0.9, 0.52), (0.74, 0.52)], 0.05)
     for k in range(9):
-        canvas.rectangle(0.06 + 0.035 * k, 0.25, 0.083 + 0.035 * k, 0.55, 0.25)
+        canvas.rectangle(0.06 + 0.035 * k, 0.25, 0.083 + 0.035 * k, 0.55, 0.1)
     canvas.text("SPIKE 7", 0.55, 0.42, 0.14, 0.95).disc(0.945, 0.7, 0.05, 0.98)
     return assemble(*prism(outline, 2.4, 0.55, canvas.texture()))
 

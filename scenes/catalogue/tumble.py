@@ -25,7 +25,9 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
                 Still((0, 0, -1.5)),
                 backdrop=True,
             ),
-            Body("disk", assemble(disc(0.62, disk_texture(rng))), Still((-0.75, 0.1, -0.4)) @ Spinning((0, 0, 1), 2000)),
+            Body(
+                "disk", assemble(disc(0.62, disk_texture(rng))), Still((-0.75, 0.1, -0.4)) @ Spinning((0, 0, 1), 2000)
+            ),
             Body(
                 "ball",
                 assemble(sphere(0.33, dead_leaves(rng, 512), 76)),
