@@ -13,6 +13,7 @@ from spikecam_env.cli.bench import Bench
 from spikecam_env.cli.blind_trial import BlindTrial
 from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.campaign import Campaign
+from spikecam_env.cli.dataset import Dataset
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
 from spikecam_env.cli.diagnose import Diagnose
@@ -36,6 +37,7 @@ COMMANDS: dict[str, Any] = {
     "demo": Demo,
     "record": Record,
     "scenes": Scenes,
+    "dataset": Dataset,
     "denoise": Denoise,
     "train": Train,
     "evaluate": Evaluate,
