@@ -27,7 +27,7 @@ from spikecam_env.gap.candidates import candidate, chosen, testable
 from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, judged, misfit, normal, residual, values_of
 from spikecam_env.gap.evidence import evidence_of
-from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
+from spikecam_env.gap.fit import Fit, confirmed, fit, gain, rejoined
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.parameters import off_nominal
@@ -202,7 +202,7 @@ def search(
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
         sure, rest = settle(fits, partial(confirmed, case, now, here, values))
         rounds.append(Round(now, base, predicted, spread, count, rho, left_over, (*sure, *rest)))
-        if not sure or sure[0].misfit > left_over - GAIN:
+        if not sure or gain(case, now, here, values, sure[0]) < GAIN:
             break
         best = sure[0]
         earlier = [r.fits[0].name for r in rounds[:-1]]

@@ -150,7 +150,7 @@ def _fit_twins(
     power = 2.0 if what.square else 1.0
     base = within(model, case.base)
     parameters = bounded(name, parameters)
-    only = None if expected is None else concerned(case, name, null, measured, expected)
+    only = None if expected is None else concerned(case, [name], null, measured, expected)
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
         predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
@@ -180,7 +180,7 @@ def _fit_twins(
         if near or turn == TURNS - 1:
             break
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
-        only = concerned(case, name, null, measured, (predicted - null.mean) * factor**power)
+        only = concerned(case, [name], null, measured, (predicted - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
     scaled = null.mean + moved * (predicted - null.mean)
@@ -200,10 +200,10 @@ def _fit_twins(
     )
 
 
-def concerned(case: Case, name: str, null: Null, measured: Array, effect: Array) -> list[int] | None:
-    """Recordings on which an effect shows, or something has to be explained, by index; None for all.
+def concerned(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int] | None:
+    """Recordings on which effects show, or something has to be explained, by index; None for all.
 
-    With those that the refit rests on, unless the effect leaves steady uniform light alone: the refit takes up its
+    With those that the refit rests on, unless the effects leave steady uniform light alone: the refit takes up their
     mean, and the others are judged by that refit.
     """
     seen = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean))) > 5 * null.noise
@@ -211,7 +211,7 @@ def concerned(case: Case, name: str, null: Null, measured: Array, effect: Array)
     which = {i for i, c in enumerate(case.conditions) if c.name in shows}
     if not which:
         return None
-    if which & rests_on(case) or not candidate(name).only_contrast:
+    if which & rests_on(case) or not all(candidate(name).only_contrast for name in names):
         which |= rests_on(case)
     return sorted(which) if len(which) < len(case.conditions) else None
 
@@ -246,21 +246,28 @@ def _gauss_newton(
 
 def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, count: int = 4) -> Fit:
     """The fit simulated anew with other draws, its unit settled once more: for the gate."""
-    added = [e for e in found.model.effects if e not in model.effects]
-    frames = [e for e in added if not is_pattern(e.name)]
-    if not frames:
+    added = [e.name for e in found.model.effects if e not in model.effects]
+    if added and all(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, null.mean)
         rho, left = judged(null, measured, predicted, UNITS)
         return replace(found, predicted=predicted, rho=rho, misfit=left)
-    only = concerned(case, found.name, null, measured, found.predicted - null.mean)
+    only = concerned(case, added or [found.name], null, measured, found.predicted - null.mean)
     _, refits = predict(case, found.model, within(found.model, found.base), null, 1, 200, only)
     base = settled(found.model, within(found.model, found.base), case.base, refits)
     values, _ = simulated(case, found.model, base, null, count, 300, only)
     predicted, spread = values.mean(axis=0), spread_of(null, values)
-    if len(frames) < len(added):
+    if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)
     rho, left = judged(null, measured, predicted, count, spread)
     return replace(found, predicted=predicted, spread=spread, count=count, base=base, rho=rho, misfit=left)
+
+
+def gain(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit) -> float:
+    """Misfit that a confirmed candidate removes, over `model` simulated by the same draws."""
+    if is_pattern(found.name):
+        return judged(null, measured, null.mean, UNITS)[1] - found.misfit
+    instead = replace(found, model=model, base=within(model, case.base))
+    return confirmed(case, model, null, measured, instead, found.count).misfit - found.misfit
 
 
 def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Sequence[str]) -> Fit:

@@ -277,7 +277,7 @@ def _simulated(case: Case, model: SensorModel, null: Null, name: str, parameters
         if then == now:
             break
         now = then
-        only = concerned(case, name, null, null.mean, shift * null.noise * factor**power)
+        only = concerned(case, [name], null, null.mean, shift * null.noise * factor**power)
         shift = _shift(case, model, null, name, now, 1, only)
     return Template(name, now, shift)
 
