@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 from os import getpid
+from threading import get_ident
 from typing import Any, TypeVar
 
 import cv2
@@ -379,7 +380,7 @@ class World:
     def _draw(self) -> Renderer:
         if self.renderer is not None:
             return self.renderer
-        return _renderer_of_process(getpid())
+        return _renderer_of(getpid(), get_ident())
 
     def _pinhole(self, frame: Floats) -> Pinhole:
         return Pinhole(self._focal, self._centre, self.camera.pose(frame / self.frame_rate_hz))
@@ -624,9 +625,9 @@ class _Kept:
         return kept[name]
 
 
-@lru_cache(maxsize=1)
-def _renderer_of_process(process: int) -> Renderer:
-    """Chosen once a process; a context does not survive a fork."""
+@lru_cache(maxsize=64)
+def _renderer_of(process: int, thread: int) -> Renderer:
+    """Chosen once a thread, as OpenGL's contexts belong to the thread and process that made them."""
     return choose_renderer()
 
 
