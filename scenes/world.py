@@ -146,10 +146,10 @@ class World:
         frames = self._key_frames(start, stop, gaze)
         pictures = np.empty((len(frames), *self.shape), np.float32)
         work: list[Future[None]] = []
-        for block in range(int(frames[0] // BLOCK), int(frames[-1] // BLOCK) + 1):
-            first, last = np.searchsorted(frames, [block * BLOCK, (block + 1) * BLOCK])
+        for piece in range(int(frames[0] // _PIECE), int(frames[-1] // _PIECE) + 1):
+            first, last = np.searchsorted(frames, [piece * _PIECE, (piece + 1) * _PIECE])
             if first < last:
-                work += self._paint(block, frames[first:last], gaze, pictures[first:last])
+                work += self._paint(piece * _PIECE // BLOCK, frames[first:last], gaze, pictures[first:last])
         for part in work:
             part.result()
         return Keyframes(frames, pictures)
@@ -227,7 +227,7 @@ class World:
             ]
             if not carried:
                 continue
-            if len(ends) == 2 and len(carried) == 1:
+            if carried[0].key is carried[-1].key:
                 share = np.zeros_like(share)
             parts.append(_Part(int(first), int(last), carried[0], carried[-1], share))
         return _Layer(parts, boxes, body in plan.tested, body in plan.marked)
@@ -496,6 +496,9 @@ def _sky_speed(world: World, frames: Floats) -> float:
     turned = np.linalg.norm(np.diff(ahead, axis=0), axis=(1, 2)).max() / np.sqrt(2)
     return float(turned) * float(np.hypot(world._focal, max(world.shape) / 2)) * _NODES / BLOCK
 
+
+_PIECE = 64
+"""Frames that are painted together; while threads paint some, the next bodies are rendered."""
 
 _NODES = 32
 """Instants at which a block's motion is looked at."""
