@@ -254,34 +254,41 @@ def _lay(
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     deep = tested or marked
     flat0, flat1 = planes0.reshape(3, -1), planes1.reshape(3, -1)
-    for n in range(len(pictures)):
-        top, left, bottom, right = boxes[n]
-        w = share[n]
-        middle_x, middle_y, k = reference0[n] if w < one else reference1[n]
-        deeper = (one - w) * deeper0[n] + w * deeper1[n]
-        for y in range(top, bottom):
-            light[left:right] = 0
-            cover[left:right] = 0
-            depth[left:right] = 0
-            if w < one:
-                height, width = planes0.shape[1:]
-                _locate(coefficients0[n], reference0[n], height, width, y, left, right, at, across, down)
-                _add(flat0[0], width, at, across, down, left, right, one - w, light)
-                _add(flat0[1], width, at, across, down, left, right, one - w, cover)
-                if deep:
-                    _add(flat0[2], width, at, across, down, left, right, one - w, depth)
-            if w > zero:
-                height, width = planes1.shape[1:]
-                _locate(coefficients1[n], reference1[n], height, width, y, left, right, at, across, down)
-                _add(flat1[0], width, at, across, down, left, right, w, light)
-                _add(flat1[1], width, at, across, down, left, right, w, cover)
-                if deep:
-                    _add(flat1[2], width, at, across, down, left, right, w, depth)
+    resting = _resting(boxes, reference0, coefficients0, share)
+    for y in range(boxes[:, 0].min(), boxes[:, 2].max()):
+        held = False
+        for n in range(len(pictures)):
+            top, left, bottom, right = boxes[n]
+            if y < top or y >= bottom or left >= right:
+                held = False
+                continue
+            w = share[n]
+            if not (held and resting[n]):
+                light[left:right] = 0
+                cover[left:right] = 0
+                depth[left:right] = 0
+                if w < one:
+                    height, width = planes0.shape[1:]
+                    _locate(coefficients0[n], reference0[n], height, width, y, left, right, at, across, down)
+                    _add(flat0[0], width, at, across, down, left, right, one - w, light)
+                    _add(flat0[1], width, at, across, down, left, right, one - w, cover)
+                    if deep:
+                        _add(flat0[2], width, at, across, down, left, right, one - w, depth)
+                if w > zero:
+                    height, width = planes1.shape[1:]
+                    _locate(coefficients1[n], reference1[n], height, width, y, left, right, at, across, down)
+                    _add(flat1[0], width, at, across, down, left, right, w, light)
+                    _add(flat1[1], width, at, across, down, left, right, w, cover)
+                    if deep:
+                        _add(flat1[2], width, at, across, down, left, right, w, depth)
+            held = True
             row = pictures[n, y]
             if not deep:
                 for x in range(left, right):
                     row[x] = light[x] + max(one - cover[x], zero) * row[x]
                 continue
+            middle_x, middle_y, k = reference0[n] if w < one else reference1[n]
+            deeper = (one - w) * deeper0[n] + w * deeper1[n]
             nearer = deeper[0] + deeper[2] * (np.float32(y) - middle_y) * k
             for x in range(left, right):
                 if cover[x] <= zero:
@@ -292,3 +299,18 @@ def _lay(
                 row[x] = light[x] + max(one - cover[x], zero) * row[x]
                 if marked and cover[x] > half:
                     depths[n, y, x] = z
+
+
+@numba.njit(nogil=True, cache=True)
+def _resting(boxes, reference, coefficients, share):  # pragma: no cover - compiled
+    """Whether a body is seen just as at the instant before: its rows need not be read again."""
+    resting = np.zeros(len(boxes), np.bool_)
+    for n in range(1, len(boxes)):
+        resting[n] = (
+            share[n] == 0
+            and share[n - 1] == 0
+            and (boxes[n] == boxes[n - 1]).all()
+            and (reference[n] == reference[n - 1]).all()
+            and (coefficients[n] == coefficients[n - 1]).all()
+        )
+    return resting

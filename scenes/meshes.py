@@ -158,7 +158,7 @@ def sheet(points: Callable[[Points, Points], Sequence[Points]], shape: tuple[int
 
 
 def lathe(
-    profile: Sequence[tuple[float, float]], albedo: Albedo = 0.8, sections: int = 64, smooth: bool = True
+    profile: Sequence[tuple[float, float]], albedo: Albedo = 0.8, sections: int = 48, smooth: bool = True
 ) -> Part:
     """A profile of (radius, height), from the bottom up along the outside, turned about y.
 
@@ -176,7 +176,7 @@ def lathe(
                 for piece, low, high in zip(pieces, length, length[1:], strict=False)
             )
         )
-    return _turned(knots, albedo, sections, 6 * (len(knots) - 1))
+    return _turned(knots, albedo, sections, 4 * (len(knots) - 1))
 
 
 def joined(*parts: Part) -> Part:

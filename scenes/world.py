@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 from os import getpid
+from threading import get_ident
 from typing import Any, TypeVar
 
 import cv2
@@ -145,10 +146,10 @@ class World:
         frames = self._key_frames(start, stop, gaze)
         pictures = np.empty((len(frames), *self.shape), np.float32)
         work: list[Future[None]] = []
-        for block in range(int(frames[0] // BLOCK), int(frames[-1] // BLOCK) + 1):
-            first, last = np.searchsorted(frames, [block * BLOCK, (block + 1) * BLOCK])
+        for piece in range(int(frames[0] // _PIECE), int(frames[-1] // _PIECE) + 1):
+            first, last = np.searchsorted(frames, [piece * _PIECE, (piece + 1) * _PIECE])
             if first < last:
-                work += self._paint(block, frames[first:last], gaze, pictures[first:last])
+                work += self._paint(piece * _PIECE // BLOCK, frames[first:last], gaze, pictures[first:last])
         for part in work:
             part.result()
         return Keyframes(frames, pictures)
@@ -243,7 +244,7 @@ class World:
             ]
             if not carried:
                 continue
-            if len(ends) == 2 and len(carried) == 1:
+            if carried[0].key is carried[-1].key:
                 share = np.zeros_like(share)
             parts.append(_Part(int(first), int(last), carried[0], carried[-1], share))
         return _Layer(parts, boxes, body in plan.tested, body in plan.marked)
@@ -396,7 +397,7 @@ class World:
     def _draw(self) -> Renderer:
         if self.renderer is not None:
             return self.renderer
-        return _renderer_of_process(getpid())
+        return _renderer_of(getpid(), get_ident())
 
     def _pinhole(self, frame: Floats) -> Pinhole:
         return Pinhole(self._focal, self._centre, self.camera.pose(frame / self.frame_rate_hz))
@@ -512,6 +513,9 @@ def _sky_speed(world: World, frames: Floats) -> float:
     turned = np.linalg.norm(np.diff(ahead, axis=0), axis=(1, 2)).max() / np.sqrt(2)
     return float(turned) * float(np.hypot(world._focal, max(world.shape) / 2)) * _NODES / BLOCK
 
+
+_PIECE = 64
+"""Frames that are painted together; while threads paint some, the next bodies are rendered."""
 
 _NODES = 32
 """Instants at which a block's motion is looked at."""
@@ -641,9 +645,9 @@ class _Kept:
         return kept[name]
 
 
-@lru_cache(maxsize=1)
-def _renderer_of_process(process: int) -> Renderer:
-    """Chosen once a process; a context does not survive a fork."""
+@lru_cache(maxsize=64)
+def _renderer_of(process: int, thread: int) -> Renderer:
+    """Chosen once a thread, as OpenGL's contexts belong to the thread and process that made them."""
     return choose_renderer()
 
 

@@ -32,7 +32,7 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
     rng = np.random.default_rng(seed)
     tops = []
     for number, (x, z, size, tilt, nod, rpm) in enumerate(
-        [(-0.25, -0.3, 1.1, 14, 320, 2200), (0.8, 0.2, 0.7, -18, -500, 3200), (-1.05, 0.1, 0.55, 20, 640, 3600)], 1
+        [(-0.25, -0.3, 1.1, 14, 320, 1500), (0.8, 0.2, 0.7, -18, -500, 2000), (-1.05, 0.1, 0.55, 20, 640, 2400)], 1
     ):
         motion = Still((x, -0.84, z)) @ Spinning((0, 1, 0), nod, rng.uniform(0, 360)) @ Still(turn=(0, 0, tilt))
         tops.append(

@@ -30,7 +30,7 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
             ),
             Body(
                 "ball",
-                assemble(sphere(0.33, dead_leaves(rng, 512), 76)),
+                assemble(sphere(0.33, dead_leaves(rng, 512), 80)),
                 Repeating(Ballistic((-1.7, 0.42, 0.35), (12, 0, 0)), 0.28) @ Spinning((0.2, 1, 0.1), 300),
             ),
             Body(
@@ -40,7 +40,7 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
             ),
             Body(
                 "box",
-                assemble(*box((0.5, 0.5, 0.5), [rectangles(rng, 256) for _ in range(6)], 12)),
+                assemble(*box((0.5, 0.5, 0.5), [rectangles(rng, 256) for _ in range(6)], 16)),
                 Repeating(Ballistic((1.9, -0.45, 0.6), (-8, 0, 0)), 0.48) @ Spinning((0.3, 1, 0.5), 1200),
             ),
             Body(

@@ -13,7 +13,7 @@ from spikecam_env.errors import InputError
 
 SHAPE = (60, 96)
 FINEST = 1.0
-"""Pixels of smoothing at this small shape, where letters are six pixels high; docs/scenes.md: 250 x 400 with less."""
+"""Pixels of smoothing at this small shape, where letters are six pixels high; docs/scenes.md has 250 x 400."""
 
 
 @pytest.fixture(scope="module")
