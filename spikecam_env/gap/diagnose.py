@@ -38,7 +38,7 @@ from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_
 from spikecam_env.gap.structure import structure
 from spikecam_env.gap.templates import Screened, Templates, bounds, load, model_null, screen
 from spikecam_env.gap.words import sentence
-from spikecam_env.gap.world import observed, shown
+from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -156,20 +156,30 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
     kept = [i for i in kept if conditions[i].v_d == common]
     part = replace(campaign, recordings=tuple(campaign.recordings[i] for i in kept))
     conditions = [conditions[i] for i in kept]
-    if sum(c.kind in ("dark", "flat", "picture") and c.use == "fit" for c in conditions) < 2:
-        raise InputError(f"{campaign.folder} has fewer than two static recordings of known light to refit the unit by")
-    seen = observed(part, conditions)
-    return case_of(campaign.shape, conditions, [o for o in seen if o is not None], seed, jobs, campaign.frame_rate_hz)
+    if not refittable(conditions):
+        raise InputError(
+            f"{campaign.folder} has fewer than two static recordings of known light to refit the unit by (two of use "
+            "fit are needed, or unknown static scenes and nothing else)"
+        )
+    seen = [o for o in observed(part, conditions) if o is not None]
+    conditions = [
+        replace(c, level=float(o.rate.mean())) if c.kind == "unknown" else c
+        for c, o in zip(conditions, seen, strict=True)
+    ]
+    return case_of(campaign.shape, conditions, seen, seed, jobs, campaign.frame_rate_hz)
+
+
+def refittable(conditions: Sequence[Shown]) -> bool:
+    """Whether there are two recordings to refit the unit by, or nothing but scenes."""
+    scenes = bool(conditions) and all(c.kind == "unknown" for c in conditions)
+    return scenes or sum(c.kind in KNOWN and c.use == "fit" for c in conditions) >= 2
 
 
 def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     """The case without recordings that contradict the others, where enough is left to refit the unit by."""
     bad = {r for c in contradictions for r in c.recordings}
     keep = [i for i, c in enumerate(case.conditions) if c.name not in bad]
-    enough = sum(
-        case.conditions[i].kind in ("dark", "flat", "picture") and case.conditions[i].use == "fit" for i in keep
-    )
-    if not bad or enough < 2:
+    if not bad or not refittable([case.conditions[i] for i in keep]):
         return case
     return case_of(
         case.shape,
