@@ -62,20 +62,25 @@ def _quantisation(k: NDArray[np.int64], interval: Array, white: float) -> tuple[
     return out[0].reshape(steps.shape), out[1].reshape(steps.shape)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sum_harmonics(k, interval, white, out):  # type: ignore[no-untyped-def]
+    """cos(m x) and exp(-m^2 y) by recurrence over m."""
     for i in range(k.size):
-        turn = 2 * np.pi * (k[i] * interval[i] % 1.0)
+        now = np.cos(2 * np.pi * (k[i] * interval[i] % 1.0))
         rate = 2 * np.pi**2 * k[i] * interval[i] ** 2
+        first = np.exp(-rate * white)
+        before, cosine, decayed, factor = 1.0, now, first, first
         value, slope = 0.5, 0.0
         for m in range(1, _HARMONICS + 1):
-            decay = m * m * rate * white
-            if decay > 30.0:
+            if decayed < 1e-13:
                 break
-            near = 8 * np.cos(m * turn) * np.exp(-decay) / (2 * np.pi**2 * m * m)
-            far = 2 * np.cos(2 * m * turn) * np.exp(-2 * decay) / (2 * np.pi**2 * m * m)
+            near = 8 * cosine * decayed / (2 * np.pi**2 * m * m)
+            far = 2 * (2 * cosine * cosine - 1) * decayed * decayed / (2 * np.pi**2 * m * m)
             value += far - near
             slope += m * m * rate * (near - 2 * far)
+            factor *= first * first
+            decayed *= factor
+            before, cosine = cosine, 2 * now * cosine - before
         out[0, i] = value
         out[1, i] = slope
 

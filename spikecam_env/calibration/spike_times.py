@@ -87,14 +87,12 @@ def _scan(words, first_word, last_word, ks, ends, square, terms):  # type: ignor
                     terms[pixel, i] = n - 2 * k
 
 
-@njit(inline="always")
+@njit(cache=True, nogil=True)
 def second_differences(t, n, k):  # type: ignore[no-untyped-def]
     """Sum of (t_(i+2k) - 2 t_(i+k) + t_i)^2 over the n spike times at the start of t."""
-    total = np.float64(0.0)
-    for start in range(0, n - 2 * k, 4096):  # in blocks, so that int64 sums vectorise and cannot overflow
-        part = np.int64(0)
-        for j in range(start, min(start + 4096, n - 2 * k)):
-            d = np.int64(t[j + 2 * k]) - 2 * np.int64(t[j + k]) + np.int64(t[j])
-            part += d * d
-        total += part
-    return total
+    first, middle, last = t[: n - 2 * k], t[k : n - k], t[2 * k : n]  # views: indices that cannot wrap vectorise
+    total = np.int64(0)
+    for i in range(n - 2 * k):
+        d = np.int64(last[i]) - 2 * np.int64(middle[i]) + np.int64(first[i])
+        total += d * d
+    return np.float64(total)

@@ -84,10 +84,10 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
     lengths = np.zeros(LENGTHS + 1, np.int64)
     late, odd = np.zeros(len(packed)), np.zeros(len(packed), np.int32)
     _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths, late, odd)
-    spikes = unpack_frames(packed, shape)
+    by_row = _rows_in_words(packed, shape)
     row = np.zeros((len(packed), shape[0]), np.int32)
     coincidences = np.zeros((LAGS, 2))
-    _neighbours(_rows_in_words(packed, spikes), shape[0], row, coincidences)
+    _neighbours(by_row, shape[0], row, coincidences)
     count, first, last = ends.T
     return Observation(
         shape,
@@ -100,25 +100,33 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
         blocks,
         row.sum(axis=1, dtype=np.int32),
         row,
-        _columns(spikes),
+        _columns(by_row, shape),
         coincidences,
-        _film(spikes) if film else None,
+        _film(unpack_frames(packed, shape)) if film else None,
         late,
         odd,
     )
 
 
-def _rows_in_words(packed: NDArray[np.uint8], spikes: NDArray[np.uint8]) -> NDArray[np.uint64]:
+def _rows_in_words(packed: NDArray[np.uint8], shape: tuple[int, int]) -> NDArray[np.uint64]:
     """(F, rows * words) bits with every row of pixels in words of its own."""
-    if spikes.shape[2] % 64 == 0:
+    if shape[1] % 64 == 0:
         return as_words(packed)
-    padded = np.pad(spikes, ((0, 0), (0, 0), (0, -spikes.shape[2] % 64)))
-    return np.packbits(padded, axis=2, bitorder="little").reshape(len(spikes), -1).view(np.uint64)
+    padded = np.pad(unpack_frames(packed, shape), ((0, 0), (0, 0), (0, -shape[1] % 64)))
+    return np.packbits(padded, axis=2, bitorder="little").reshape(len(padded), -1).view(np.uint64)
 
 
-def _columns(spikes: NDArray[np.uint8]) -> NDArray[np.int32]:
-    kind = np.uint8 if spikes.shape[1] < 256 else np.uint16
-    return np.add.reduce(spikes, axis=1, dtype=kind).astype(np.int32)
+_SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64)[:, 0]
+"""(256,) the eight bits of a byte as eight bytes of a word, which add up side by side."""
+
+
+def _columns(by_row: NDArray[np.uint64], shape: tuple[int, int]) -> NDArray[np.int32]:
+    """(F, W) spikes of each column, frame by frame."""
+    each = by_row.shape[1] * 8 // shape[0]
+    sums = np.zeros((-(-shape[0] // 255), len(by_row), each), np.uint64)
+    _add_rows(by_row.view(np.uint8), shape[0], _SPREAD, sums)
+    parts = sums.view(np.uint8)[..., : shape[1]]
+    return parts[0].astype(np.int32) if len(parts) == 1 else parts.sum(axis=0, dtype=np.int32)
 
 
 def _film(spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -169,8 +177,9 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late, odd):  #
                 squares += np.int64(d[i]) * d[i]
                 short += d[i] < least
                 long += d[i] > most
-                if d[i] < least or d[i] > most:
-                    odd[t[i + 1]] += 1
+            if short + long:
+                for i in range(n - 1):
+                    odd[t[i + 1]] += d[i] < least or d[i] > most
             for i in range(n - 1):
                 late[t[i + 1]] += d[i] - mean
             for i in range(n - 2):
@@ -180,6 +189,17 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late, odd):  #
             inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
             moments[p, 1] = (products - mean * inner) / (n - 2) + mean * mean
             moments[p, 2], moments[p, 3] = short, long
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _add_rows(octets, rows, spread, sums):  # type: ignore[no-untyped-def]
+    """octets: (F, rows * each) uint8; sums: (parts, F, each), 255 rows a part, the most a byte can count."""
+    parts, frames, each = sums.shape
+    for part in range(parts):
+        for f in range(frames):
+            for r in range(255 * part, min(255 * (part + 1), rows)):
+                for b in range(each):
+                    sums[part, f, b] += spread[octets[f, r * each + b]]
 
 
 @njit(cache=True, nogil=True, boundscheck=False)

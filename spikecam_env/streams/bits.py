@@ -77,8 +77,9 @@ def times_of(bits: NDArray[np.uint64], times: NDArray[np.int32]) -> int:
     n = 0
     for block in range(bits.size):
         word = bits[block]
-        while word:
-            times[n] = 64 * block + np.int32(lowest(word))
-            n += 1
+        count = np.int64(ones(word))
+        for i in range(count):
+            times[n + i] = 64 * block + np.int32(lowest(word))
             word &= word - _Q(1)
+        n += count
     return n

@@ -1,0 +1,67 @@
+"""Detection limits of the catalogue's effects, from the diagnosis' own templates.
+
+    python -m benchmarks.detection_limits          prints the table and writes it into tests/hidden_world/limits.toml
+
+Limit: the strength at which the statistic that shows the effect best stands CLEAR noises off, in 64 x 64 pixels and
+8000 frames of the standard design; the alarm, over some 600 statistics, rings from about 4.2.  Effects in time are
+scaled from their template; those of the pattern, whose statistics are not in proportion, are searched for by drawing
+units.  The base model's own effects are not among them: they are hidden from `ideal`.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from spikecam_env.gap.candidates import candidate, is_pattern
+from spikecam_env.gap.fit import bounded, with_effect, with_pattern
+from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.sensor import CATALOGUE
+from tests.hidden_world.catalogue import CATALOGUE as HIDDEN
+
+CLEAR = 6.0
+TABLE = Path(__file__).parents[1] / "tests/hidden_world/limits.toml"
+
+
+def measured() -> dict[str, float]:
+    """Strength by name; of an effect with several shapes the middle one."""
+    by_name: dict[str, list[float]] = {}
+    for entry in load().entries:
+        power = 0.5 if candidate(entry.name).square else 1.0
+        peak = float(np.abs(entry.shift).max())
+        strength = abs(entry.parameters[CATALOGUE[entry.name].strength])
+        by_name.setdefault(entry.name, []).append(strength * (CLEAR / peak) ** power)
+    limits = {name: float(np.median(values)) for name, values in by_name.items() if name in HIDDEN}
+    return limits | of_pattern([name for name in limits if is_pattern(name)], limits)
+
+
+def of_pattern(names: list[str], near: dict[str, float]) -> dict[str, float]:
+    """Strength by name from which units drawn with the effect stand CLEAR noises off, to 10 %."""
+    case, model, null = standard_case()
+    found = {}
+    for name in names:
+        key = CATALOGUE[name].strength
+        for strength in near[name] * np.geomspace(0.02, 5.0, 60):
+            tried = with_effect(model, name, bounded(name, {key: strength}))
+            shift = (with_pattern(case, tried, null, null.mean) - null.mean) / null.noise
+            found[name] = float(strength)
+            if np.abs(shift).max() > CLEAR:
+                break
+    return found
+
+
+def written(text: str, limits: dict[str, float]) -> str:
+    """limits.toml with these values in it."""
+    for name, value in limits.items():
+        entry = re.compile(rf"(\[{name}\]\nparameter = \"\w+\"\nlimit = )\S+")
+        text = entry.sub(lambda m, v=value: f"{m[1]}{v:.2g}", text)  # type: ignore[misc]
+    return text
+
+
+if __name__ == "__main__":
+    values = measured()
+    for name, value in values.items():
+        print(f"{name:28s} {value:.2g}")
+    TABLE.write_text(written(TABLE.read_text(encoding="utf-8"), values), encoding="utf-8")
