@@ -29,6 +29,7 @@ from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, misfit
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
 from spikecam_env.gap.floor import floor_of_halves
+from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
@@ -121,6 +122,8 @@ def diagnose(
     rounds: list[Round] = []
     if adjusted(deviates(null, values)).min() < ALARM:
         with timed("candidates"):
+            if case.scenes_only:
+                templates = templates or own_templates(case, start, null, names)
             rounds = search(case, start, null, values, names, templates or load())
     with timed("verdict"):
         found = concluded(

@@ -223,6 +223,7 @@ _STRUCTURE = {
     "time_scale_frames": "Time scale [frames]",
     "history": "Depends on earlier spikes",
     "neighbours": "Depends on neighbours",
+    "clock": "Differs where intervals are whole numbers of frames",
     "where": "Where",
     "when": "When",
     "best_candidate": "Nearest candidate",

@@ -182,7 +182,7 @@ def build(folder: Path, *, jobs: int = 1, only: Sequence[str] | None = None) -> 
         label = "-".join([name, *(f"{k}={v:g}" for k, v in parameters.items() if k != CATALOGUE[name].strength)])
         path = folder / f"{label}.npz"
         if not path.exists():
-            entry = _simulated(case, model, null, name, parameters)
+            entry = simulated(case, model, null, name, parameters)
             with whole_file(path) as beside, beside.open("wb") as file:
                 np.savez(file, parameters=json.dumps(entry.parameters), shift=entry.shift)
         with np.load(path) as made:
@@ -256,7 +256,8 @@ def starts(name: str) -> list[dict[str, float]]:
     return [{**extra, **default, **dict(zip(shapes, values, strict=True))} for values in product(*shapes.values())]
 
 
-def _simulated(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Template:
+def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Template:
+    """A candidate's template on a campaign, at a strength where it shows clearly."""
     strength = CATALOGUE[name].strength
     power = 2.0 if candidate(name).square else 1.0
     now = bounded(name, parameters)
