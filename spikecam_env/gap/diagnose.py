@@ -30,6 +30,7 @@ from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.own_templates import own_templates
+from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
@@ -104,7 +105,19 @@ def diagnose(
     timed = _stages(stages, progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     assumed = model if isinstance(model, SensorModel) else SensorModel.load(model)
+    assumed = replace(assumed, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(assumed, candidates, exclude)
+    asked = {
+        "model_name": assumed.name if isinstance(model, SensorModel) else str(model),
+        "candidates": None if candidates is None else tuple(candidates),
+        "exclude": tuple(exclude),
+        "stages": stages,
+    }
+    if not any(r.spikes for r in measured.recordings):
+        with timed("maps"):
+            found = diagnose_maps(measured, assumed, candidates=candidates, exclude=exclude, seed=seed, jobs=jobs)
+        found = replace(found, **asked)  # type: ignore[arg-type]
+        return replace(found, sentence=sentence(found))
     with timed("read"):
         case = read_case(measured, seed, jobs)
     with timed("audit"):
@@ -141,11 +154,8 @@ def diagnose(
         found,
         gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
-        model_name=assumed.name if isinstance(model, SensorModel) else str(model),
-        candidates=None if candidates is None else tuple(candidates),
-        exclude=tuple(exclude),
         evidence=evidence,
-        stages=stages,
+        **asked,  # type: ignore[arg-type]
     )
     return replace(found, sentence=sentence(found))
 

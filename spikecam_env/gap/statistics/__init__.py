@@ -48,6 +48,8 @@ FLOORS: dict[tuple[str, str], float] = {
     ("moving", "left"): 5e-3,
     ("pattern", ""): 0.02,
     ("pattern", "silent"): 1.0,
+    ("texture", ""): 0.02,
+    ("texture", "field"): 2e-3,
     ("intervals", ""): 1.0,
     ("timing", ""): 0.01,
     ("clock", ""): 0.02,
