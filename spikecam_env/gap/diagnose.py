@@ -29,9 +29,9 @@ from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, misfit
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
 from spikecam_env.gap.floor import floor_of_halves
-from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import Missing, missing
+from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
 from spikecam_env.gap.refit import BaseFit, within

@@ -122,7 +122,9 @@ def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Maps:
         if r.rates is not None and condition.kind in KNOWN:
             maps.append(RateMap(condition, r.rate()))
     if not maps:
-        raise InputError(f"{campaign.folder} has neither spikes nor rates in known, steady light: nothing can be tested")
+        raise InputError(
+            f"{campaign.folder} has neither spikes nor rates in known, steady light: nothing can be tested"
+        )
     dark = _dark_of(maps)
     level = float(np.median(dark)) if dark is not None else 0.0
     response = {m.shown.name: float(np.median(m.rate)) - level for m in maps if m.shown.kind != "dark"}
@@ -292,7 +294,9 @@ def _moved(state: State, what: tuple[str, str], step: float) -> State:
     """A parameter changed by a step, of its logarithm or in its own unit."""
     name, key = what
     if not name:
-        return replace(state, factors={**state.factors, key: float(np.clip(state.factors[key] * np.exp(step), 1e-3, 1e3))})
+        return replace(
+            state, factors={**state.factors, key: float(np.clip(state.factors[key] * np.exp(step), 1e-3, 1e3))}
+        )
     effect = next(e for e in state.model.effects if e.name == name)
     old = effect.parameters()
     new = old[key] + step if key in _SHARES else old[key] * np.exp(step)
@@ -308,8 +312,9 @@ def _step(
     noise = np.where(np.abs(rho) > 1e-9, np.abs(gap) / np.maximum(np.abs(rho), 1e-9), null.noise)
     w = np.where(use, (HEAVY + 1) / (HEAVY + rho**2) / noise**2, 0.0)
     square = jacobian.T @ (w[:, None] * jacobian) + 1e-9 * np.eye(jacobian.shape[1])
-    step = np.linalg.solve(square + damping * np.diag(np.diag(square)), jacobian.T @ (w * gap))
-    return step, np.linalg.inv(square)
+    step: Array = np.linalg.solve(square + damping * np.diag(np.diag(square)), jacobian.T @ (w * gap))
+    covariance: Array = np.linalg.inv(square)
+    return step, covariance
 
 
 def concluded(
@@ -346,11 +351,8 @@ def concluded(
                       not bool(use[j]))
             for j, k in enumerate(null.keys)
         ),
-        ranking=tuple(
-            _ranked(t, was[0].misfit, accepted and t is r[0])
-            for was, r, accepted in (*((a, b, True) for a, b in itertools.pairwise(rounds)), (rounds[-1], rejected, False))
-            for t in r
-        ) if rounds else (),
+        ranking=tuple(_ranked(t, was[0].misfit, t is r[0] and r is not rejected)
+                      for was, r in itertools.pairwise([*rounds, rejected]) for t in r),
         not_testable=tuple((n, _lack(n)) for n in names if n not in tested),
         bounds=(), patched=patched, model_name=model.name, campaign=str(campaign.folder), seed=case.seed, stages={},
         evidence=_evidence(case, given, last),

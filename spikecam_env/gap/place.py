@@ -91,7 +91,8 @@ def when(case: Case) -> str:
             votes.append(second > first)
         halves = [strongest_line(spectrum(part)) for part in (o.frame[:half], o.frame[half:])]
         (_a, first_line), (_b, second_line) = halves
-        if o.frames >= LEAST_FRAMES and max(first_line, second_line) > 60 and max(first_line, second_line) > 6 * min(first_line, second_line):
+        louder, quieter = max(first_line, second_line), min(first_line, second_line)
+        if o.frames >= LEAST_FRAMES and louder > 60 and louder > 6 * quieter:
             votes.append(second_line > first_line)
         blocks = o.blocks[:-1] if o.frames % BLOCKS else o.blocks
         votes += _jump(blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))

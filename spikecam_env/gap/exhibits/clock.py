@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import ideal_second_difference
-from spikecam_env.gap.evidence import Array, Panel, takes
+from spikecam_env.gap.evidence import Panel, takes
 from spikecam_env.gap.observe import Observation
 from spikecam_env.gap.result import Evidence
 
@@ -16,6 +17,8 @@ CAPTION = (
     "Pixels of a scene by how far their mean interval is from a whole number of frames. A pixel that integrates freely "
     "knows nothing of frames: counts go evenly through 0, and noise is the same on both sides of it."
 )
+
+Array = NDArray[np.float64]
 
 _COUNTED = np.linspace(-0.05, 0.05, 21)
 _NOISY = np.array([-0.5, -0.3, -0.15, -0.08, -0.04, -0.02, 0.0, 0.02, 0.04, 0.08, 0.15, 0.3, 0.5])
@@ -44,7 +47,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             )  # fmt: skip
 
 
-def _off(o: Observation) -> tuple[Array, Array]:
+def _off(o: Observation) -> tuple[NDArray[np.bool_], Array]:
     """(P,) which pixels count, and how far their interval is from whole."""
     good = (o.times.count > 8) & (o.times.rate < 0.8)
     interval = 1.0 / np.where(good, o.times.rate, 1.0)

@@ -1,4 +1,4 @@
-"""Whether spikes of a scene follow the read-out's clock: what pixels do whose interval is nearly a whole number of frames.
+"""Whether spikes of a scene follow the read-out's clock: pixels whose interval is nearly a whole number of frames.
 
 A camera whose pixels integrate freely knows nothing of frames: as many pixels fall near a whole interval as light puts
 there, and their noise is that of the others.  Reveals resets and comparators that are coupled to the read-out

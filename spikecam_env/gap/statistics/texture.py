@@ -24,9 +24,9 @@ _WINDOW = 5
 def statistics(rate: Array) -> dict[str, float]:
     """Of a map (H, W); nothing where its median is 0.
 
-    fine: log spread of pixels about the mean of their neighbourhood, outliers clipped.  grain q: quantiles of that, in its spreads.
-    smooth: log spread of the neighbourhoods.  field r c: relative mean of a ninth of the array.  across n, down n:
-    correlation of pixels n apart.  q: log quantiles over the median, of maps without negative rates.
+    fine: log spread of pixels about the mean of their neighbourhood, outliers clipped.  grain q: quantiles of
+    that, in its spreads.  smooth: log spread of the neighbourhoods.  field r c: relative mean of a ninth of the array.
+    across n, down n: correlation of pixels n apart.  q: log quantiles over the median, of maps without negative rates.
     """
     middle = float(np.median(rate))
     if middle <= 0:
