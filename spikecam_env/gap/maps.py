@@ -58,7 +58,7 @@ _NUDGE = 0.1
 
 @dataclass(frozen=True)
 class RateMap:
-    """One recording of rates.  rate: (H, W) [spikes/frame]."""
+    """One recording of rates.  rate: (H, W) [spikes/frame], spread within a count."""
 
     shown: Shown
     rate: Array
@@ -120,7 +120,7 @@ def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Maps:
     for r in campaign.recordings:
         condition = shown(r)
         if r.rates is not None and condition.kind in KNOWN:
-            maps.append(RateMap(condition, r.rate()))
+            maps.append(RateMap(condition, spread_evenly(r.rate(), r.frames)))
     if not maps:
         raise InputError(
             f"{campaign.folder} has neither spikes nor rates in known, steady light: nothing can be tested"
@@ -129,6 +129,11 @@ def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Maps:
     level = float(np.median(dark)) if dark is not None else 0.0
     response = {m.shown.name: float(np.median(m.rate)) - level for m in maps if m.shown.kind != "dark"}
     return Maps(campaign.shape, tuple(maps), response, level, seed, jobs)
+
+
+def spread_evenly(rate: Array, frames: int) -> Array:
+    """Rates spread within a count: of ten spikes a pixel in the dark, quantiles else say which whole number it is."""
+    return rate + (np.random.default_rng(frames).random(rate.shape) - 0.5) / frames
 
 
 def _dark_of(maps: Sequence[RateMap]) -> Array | None:
@@ -157,7 +162,8 @@ def unit_maps(model: SensorModel, case: Maps, number: int) -> tuple[RateMap, ...
         light = m.shown.picture.reshape(case.shape) / max(m.shown.level, 1e-12)
         rate = dark + gain * light * case.response.get(m.shown.name, 0.0)
         counts = np.floor(m.shown.frames * rate + rng.random(case.shape))
-        made.append(RateMap(m.shown, np.clip(counts / m.shown.frames, 0.0, 1.0)))
+        rate = np.clip(counts / m.shown.frames, 0.0, 1.0)
+        made.append(RateMap(m.shown, spread_evenly(rate, m.shown.frames)))
     return tuple(made)
 
 
@@ -312,9 +318,8 @@ def _step(
     noise = np.where(np.abs(rho) > 1e-9, np.abs(gap) / np.maximum(np.abs(rho), 1e-9), null.noise)
     w = np.where(use, (HEAVY + 1) / (HEAVY + rho**2) / noise**2, 0.0)
     square = jacobian.T @ (w[:, None] * jacobian) + 1e-9 * np.eye(jacobian.shape[1])
-    step: Array = np.linalg.solve(square + damping * np.diag(np.diag(square)), jacobian.T @ (w * gap))
-    covariance: Array = np.linalg.inv(square)
-    return step, covariance
+    step = np.linalg.solve(square + damping * np.diag(np.diag(square)), jacobian.T @ (w * gap))
+    return np.asarray(step, np.float64), np.asarray(np.linalg.inv(square), np.float64)
 
 
 def concluded(

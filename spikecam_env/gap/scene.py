@@ -31,7 +31,7 @@ EXACT = 3e-4
 """Relative error of rates from which light is corrected."""
 
 _BINS = 12
-_TURNS = 3
+_TURNS = 6
 
 
 def simulate_seen(
