@@ -18,6 +18,7 @@ class Candidate:
 
     family: effects of one family act on the same thing.  fitted: parameters, the strength first.
     shapes: values of other parameters to start from.  square: statistics go with the square of the strength.
+    only_contrast: it changes nothing in light that is steady and uniform.
     needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
     """
 
@@ -26,6 +27,7 @@ class Candidate:
     shapes: dict[str, tuple[float, ...]] = field(default_factory=dict)
     square: bool = False
     needs: Needs = lambda shown: None
+    only_contrast: bool = False
     experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 
 
@@ -74,7 +76,7 @@ CANDIDATES: dict[str, Candidate] = {
     "synchronous_reset": Candidate("reset", ("fraction",), needs=_steady),
     "incomplete_reset": Candidate("reset", ("fraction", "tau_us"), {"tau_us": (50.0, 250.0, 1250.0)}, needs=_levels),
     "photodiode_lag": Candidate(
-        "lag", ("fraction", "tau_us"), {"tau_us": (150.0, 600.0, 2500.0, 10000.0)}, needs=_moving
+        "lag", ("fraction", "tau_us"), {"tau_us": (150.0, 600.0, 2500.0, 10000.0)}, needs=_moving, only_contrast=True
     ),
     "light_flicker": Candidate(
         "light", ("modulation",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
@@ -106,10 +108,10 @@ CANDIDATES: dict[str, Candidate] = {
     "row_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_even),
     "column_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_even),
     "vignetting": Candidate("optics", ("falloff",), needs=_even),
-    "optical_blur": Candidate("optics", ("sigma_pixels",), square=True, needs=_edges),
+    "optical_blur": Candidate("optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
     "crosstalk": Candidate("coupling", ("kick",), needs=_steady),
     "blooming": Candidate("coupling", ("share",), needs=_bright),
-    "readout_skew": Candidate("readout", ("span",), needs=_moving),
+    "readout_skew": Candidate("readout", ("span",), needs=_moving, only_contrast=True),
     "missed_spikes": Candidate("readout", ("probability",), needs=_steady),
     "spurious_spikes": Candidate("readout", ("probability",), needs=_steady),
     "afterpulsing": Candidate("readout", ("probability",), {"delay_frames": (1, 2, 3, 4, 6)}, needs=_steady),

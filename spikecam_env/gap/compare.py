@@ -24,7 +24,8 @@ HEAVY = 8.0
 class Null:
     """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns.
 
-    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.
+    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  weight: (S,) how much each says
+    of its own: what several recordings tell of one fixed pattern is told once.
     """
 
     keys: tuple[Key, ...]
@@ -32,6 +33,7 @@ class Null:
     sd: Array
     floor: Array
     twins: int
+    weight: Array | float = 1.0
 
     @property
     def noise(self) -> Array:
@@ -77,11 +79,42 @@ def adjusted(z: Array) -> Array:
     return out
 
 
-def residual(null: Null, measured: Array, predicted: Array, twins: int) -> Array:
-    """(S,) measured less predicted in noise; `predicted` is a mean over `twins`, good to TOLERANCE of its effect."""
+def residual(null: Null, measured: Array, predicted: Array, twins: int, spread: Array | None = None) -> Array:
+    """(S,) measured less predicted in noise; `predicted` is a mean over `twins`, good to TOLERANCE of its effect.
+
+    spread: (S,) standard deviation of a campaign's statistics under the prediction; default the null's.
+    """
     effect = predicted - null.mean
-    noise = np.sqrt(null.sd**2 * (1.0 + 1.0 / twins) + null.floor**2 + (TOLERANCE * effect) ** 2)
+    sd = null.sd if spread is None else spread
+    noise = np.sqrt(sd**2 * (1.0 + 1.0 / twins) + null.floor**2 + (TOLERANCE * effect) ** 2)
     return np.nan_to_num((measured - predicted) / noise)
+
+
+def judged(
+    null: Null, measured: Array, predicted: Array, twins: int, spread: Array | None = None
+) -> tuple[Array, float]:
+    """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squares of what is left, and the price of
+    noise wider than the null's, without which a prediction would win by being vague."""
+    rho = residual(null, measured, predicted, twins, spread)
+    sd = null.sd if spread is None else spread
+    wider = (sd**2 + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2) / (null.sd**2 + null.floor**2)
+    return rho, misfit(rho, null.weight) + float((null.weight * np.log(wider)).sum())
+
+
+def spread_of(null: Null, values: Array) -> Array:
+    """(S,) standard deviation of statistics under a model with an effect, from its twins (n, S), at least the null's.
+
+    An effect of rare events makes statistics noisier than the null knows.  Few twins tell that badly: what they say
+    of one statistic counts half, the other half is what they say of the same one over all recordings.
+    """
+    if len(values) < 2:
+        return null.sd
+    own = values.var(axis=0, ddof=1)
+    of = {kind: i for i, kind in enumerate(dict.fromkeys((k.group, k.name) for k in null.keys))}
+    kind = np.array([of[k.group, k.name] for k in null.keys])
+    known = np.maximum(null.sd**2, 1e-300)
+    inflation = np.bincount(kind, own / known) / np.bincount(kind)
+    return np.asarray(np.sqrt(np.maximum(known, 0.5 * own + 0.5 * known * inflation[kind])))
 
 
 def scale_of(
@@ -90,13 +123,15 @@ def scale_of(
     """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
 
     gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.
-    Under a heavy-tailed loss there are many minima: it is followed down from every ratio that many statistics agree on.
+    Only statistics on which the simulated effect is clear of its own noise count: the noise of the others would drag
+    the scale to 0 (regression dilution).  Under a heavy-tailed loss there are many minima: it is followed down from
+    every ratio that many statistics agree on.
     """
-    size = np.abs(effect) / np.sqrt(of_gap + of_effect)
-    clear = (size > min(3.0, 0.5 * float(size.max()))) & (effect != 0)
+    clear = is_clear(effect, of_gap + of_effect)
     if not clear.any():
         return 0.0, np.inf
-    starts = np.unique(np.quantile(gap[clear] / effect[clear], [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95]))
+    gap, effect, of_gap, of_effect = gap[clear], effect[clear], of_gap[clear], of_effect[clear]
+    starts = np.unique(np.quantile(gap / effect, [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95]))
     best = (np.inf, 0.0, np.inf)
     for start in starts:
         scale, total = float(start), 0.0
@@ -111,6 +146,13 @@ def scale_of(
     return best[1], best[2]
 
 
-def misfit(rho: Array) -> float:
-    """Heavy-tailed sum of squares: of order S for noise alone."""
-    return float(np.sum((HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))
+def is_clear(effect: Array, variance: Array) -> NDArray[np.bool_]:
+    """(S,) whether an effect stands clear of noise on a statistic, or, where it does on none, half as well as on its
+    best."""
+    size = np.abs(effect) / np.sqrt(variance)
+    return np.asarray((size > min(3.0, 0.5 * float(size.max()))) & (effect != 0))
+
+
+def misfit(rho: Array, weight: Array | float = 1.0) -> float:
+    """Heavy-tailed sum of squares: of the order of the weights' sum for noise alone."""
+    return float(np.sum(weight * (HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.gap.audit import Contradiction, audit
 from spikecam_env.gap.candidates import candidate, chosen, testable
 from spikecam_env.gap.case import Case, case_of
-from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, misfit, normal, residual, values_of
+from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, judged, misfit, normal, residual, values_of
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
 from spikecam_env.gap.floor import floor_of_halves
@@ -48,6 +48,9 @@ Array = NDArray[np.float64]
 ALARM = 0.02
 """Adjusted p-value below which there is a discrepancy at all."""
 
+SURE = 0.002
+"""Adjusted p-value below which a discrepancy is unknown where no candidate takes it up; above, it may be chance."""
+
 TRIED = 5
 """Candidates fitted a round, the best by their templates."""
 
@@ -57,14 +60,11 @@ MOST = 3
 GATE = 0.005
 """Adjusted p-value of what a named effect leaves, below which something is left."""
 
-GAIN = 25.0
-"""Misfit that a further effect has to remove to be added."""
+GAIN = 20.0
+"""Misfit that an effect has to remove to be added."""
 
 UNEXPLAINED = 0.08
 """Share of the evidence that may stay unexplained when something is named."""
-
-CLOSE = 40.0
-"""Difference of misfits, one twin each, up to which candidates are simulated anew to compare them."""
 
 SEPARATED = 9.0
 """Difference of misfits from which one candidate is told from another (likelihood ratio of 90)."""
@@ -77,8 +77,10 @@ class Round:
     model: SensorModel
     base: BaseFit
     predicted: Array
+    spread: Array
     count: int
     rho: Array
+    misfit: float
     fits: tuple[Fit, ...]
 
 
@@ -209,42 +211,50 @@ def search(
 ) -> list[Round]:
     """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps."""
     rounds: list[Round] = []
-    now, base, predicted, count = model, within(model, case.base), null.mean, null.twins
+    now, base, predicted, spread, count = model, within(model, case.base), null.mean, null.sd, null.twins
     while len(rounds) < MOST:
-        rho = residual(null, values, predicted, count)
+        rho = residual(null, values, predicted, count, spread)
         if rounds and not alarmed(null, rho):
             break
-        here = standing_on(null, predicted)
+        here = standing_on(null, predicted, spread)
+        left_over = judged(here, values, predicted, count)[1]
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left, line_of(case))
-        tried = worth_fitting(screened, misfit(rho))
+        tried = worth_fitting(screened, left_over)
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
-        fits.sort(key=lambda f: f.misfit)
-        finalists = [f for f in fits if f.misfit < fits[0].misfit + CLOSE][:3]
-        sure = [confirmed(case, now, here, values, f) for f in finalists]
-        sure.sort(key=lambda f: f.misfit)
-        rounds.append(Round(now, base, predicted, count, rho, (*sure, *(f for f in fits if f not in finalists))))
-        if not sure or sure[0].misfit > misfit(rho) - (GAIN if now is not model else SEPARATED):
+        sure, rest = settle(fits, partial(confirmed, case, now, here, values))
+        rounds.append(Round(now, base, predicted, spread, count, rho, left_over, (*sure, *rest)))
+        if not sure or sure[0].misfit > left_over - GAIN:
             break
         best = sure[0]
         earlier = [r.fits[0].name for r in rounds[:-1]]
         if earlier:
             best = rejoined(case, model, null, values, best, earlier)
         rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
-        now, base, predicted, count = best.model, best.base, best.predicted, best.count
-    rounds.append(Round(now, base, predicted, count, residual(null, values, predicted, count), ()))
+        now, base, predicted, spread, count = best.model, best.base, best.predicted, best.spread, best.count
+    rho, left_over = judged(null, values, predicted, count, spread)
+    rounds.append(Round(now, base, predicted, spread, count, rho, left_over, ()))
     return rounds
+
+
+def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:
+    """(confirmed, best first; the others).  A fit has been adjusted to its one twin and looks better than it is: they
+    are confirmed from the best on, until one stands below all that the others promise."""
+    waiting, sure = sorted(fits, key=lambda f: f.misfit), list[Fit]()
+    while waiting and (not sure or waiting[0].misfit < min(f.misfit for f in sure) + SEPARATED):
+        sure.append(confirm(waiting.pop(0)))
+    return sorted(sure, key=lambda f: f.misfit), waiting
 
 
 def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screened) -> Fit:
     return fit(case, model, null, values, s.name, s.start, s.expected)
 
 
-def standing_on(null: Null, predicted: Array) -> Null:
+def standing_on(null: Null, predicted: Array, spread: Array) -> Null:
     """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
     floor = np.hypot(null.floor, TOLERANCE * (predicted - null.mean))
-    return replace(null, mean=predicted, floor=floor)
+    return replace(null, mean=predicted, sd=spread, floor=floor)
 
 
 def line_of(case: Case) -> float | None:
@@ -291,21 +301,24 @@ def concluded(
     ]
     rho = last.rho if last else before
     predicted = last.predicted if last else null.mean
-    excess = misfit(before) - len(values)
-    left = (misfit(rho) - len(values)) / max(excess, 1.0)
+    by_chance = float(np.sum(null.weight * np.ones(len(values))))
+    left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
     explained = not alarmed(null, rho) or left < UNEXPLAINED
+    chance = not found and bool(p.min() > SURE)
     place, time_ = where(case), when(case)
+    share = lambda f: gap_of(case, null, values, given, f.predicted).removed  # noqa: E731
     effects = tuple(
-        replace(named(f, r, null, values), where=place, when=time_) for f, r in zip(found, rounds, strict=False)
+        replace(named(f, r, null, values), where=place, when=time_, instead={o.name: share(o) for o in r.fits[1:]})
+        for f, r in zip(found, rounds, strict=False)
     )
-    rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.misfit < r.fits[0].misfit + SEPARATED]
-    if not (rounds and not explained):
+    rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.count > 1 and f.misfit < r.fits[0].misfit + SEPARATED]
+    if explained or chance:
         effects = (*(named_missing(m) for m in lacking), *effects)
     parameters = {} if lacking else off_nominal(case, model)
     unknown, class_ = None, None
     if contradictions:
         verdict = "data"
-    elif rounds and not (found and explained):
+    elif rounds and not chance and not (found and explained):
         verdict, effects = "unknown", ()
         unknown = {**structure(case, null, before), "best_candidate": found[0].name if found else None}
     elif found and rivals and len(found) == 1 and not lacking:
@@ -368,7 +381,7 @@ def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
 
 def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
     """A row of the ranking."""
-    before = misfit(turn.rho)
+    before = turn.misfit
     parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
     worst = float(np.abs(found.rho).max())
     reason = f"leaves {worst:.1f} noises at worst" if found.misfit < before else "explains nothing"

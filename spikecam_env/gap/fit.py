@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case, rests_on, settled, twins
-from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, misfit, residual, scale_of, values_of
+from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, judged, scale_of, spread_of, values_of
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -28,6 +28,9 @@ NEEDED = 15.0
 TURNS = 5
 """Most twins, Gauss-Newton steps apart, that the fit of one candidate takes."""
 
+VISIBLE = 12.0
+"""Noises that a simulated effect has to show somewhere to be scaled by: the loudest of 600 noises alone is near 4."""
+
 UNITS = 24
 """Units drawn for the pattern statistics of one model."""
 
@@ -36,13 +39,14 @@ UNITS = 24
 class Fit:
     """A candidate at its best.  parameters, sd: by name.  predicted: (S,) mean over `count` twins; base: its unit.
 
-    rho: (S,) what it leaves, in noise.  misfit: their heavy-tailed sum.
+    spread: (S,) standard deviation of one campaign.  rho: (S,) what it leaves, in noise.  misfit: `compare.judged`.
     """
 
     name: str
     parameters: dict[str, float]
     sd: dict[str, float]
     predicted: Array
+    spread: Array
     count: int
     base: BaseFit
     rho: Array
@@ -60,10 +64,24 @@ def predict(
     only: Sequence[int] | None = None,
 ) -> tuple[Array, list[BaseFit]]:
     """(S,) mean statistics of twins under a model, and the twins' refits; what is not simulated is as in `null`."""
+    values, refits = simulated(case, model, base, null, count, first, only)
+    return values.mean(axis=0), refits
+
+
+def simulated(
+    case: Case,
+    model: SensorModel,
+    base: BaseFit,
+    null: Null,
+    count: int,
+    first: int = 0,
+    only: Sequence[int] | None = None,
+) -> tuple[Array, list[BaseFit]]:
+    """(count, S) statistics of each twin, see `predict`."""
     made = twins(case, model, base, count, first, only)
     values = np.array([values_of(t.bank, null.keys) for t in made])
     known = np.isfinite(values).all(axis=0)
-    return np.where(known, np.where(known, values, 0.0).mean(axis=0), null.mean), [t.base for t in made]
+    return np.where(known, values, null.mean), [t.base for t in made]
 
 
 def with_pattern(case: Case, model: SensorModel, null: Null, mean: Array) -> Array:
@@ -125,17 +143,24 @@ def _fit_twins(
     parameters: dict[str, float],
     expected: Array | None,
 ) -> Fit:
-    """Twins at the start, scaled until the strength is right to a third; then, with shapes, Gauss-Newton; the last
-    step is a scaling of what was simulated, without another twin."""
+    """Twins at the start, made stronger until they show, scaled until the strength is right to a third; then, with
+    shapes, Gauss-Newton; the last step is a scaling of what was simulated, without another twin."""
     what = candidate(name)
     strength = what.fitted[0]
     power = 2.0 if what.square else 1.0
     base = within(model, case.base)
     parameters = bounded(name, parameters)
-    only = None if expected is None else concerned(case, null, measured, expected)
+    only = None if expected is None else concerned(case, name, null, measured, expected)
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
         predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
+        seen = float(np.max(np.abs(predicted - null.mean) / null.noise))
+        if seen < VISIBLE and turn < TURNS - 1:
+            louder = (2 * VISIBLE / max(seen, 1.0)) ** (1 / power)
+            stronger = bounded(name, {**parameters, strength: parameters[strength] * louder})
+            if stronger != parameters:
+                parameters, only = stronger, None
+                continue
         base = settled(tried, within(tried, base), case.base, refits)
         scale, sd = _scale(null, measured, predicted)
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
@@ -150,40 +175,43 @@ def _fit_twins(
             predicted, _ = predict(case, with_effect(model, name, parameters), base, null, 1, 100, only)
             scale, sd = _scale(null, measured, predicted)
             factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
+        too_weak_to_show = abs(scale) * seen < VISIBLE
+        near |= too_weak_to_show
         if near or turn == TURNS - 1:
             break
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
-        only = concerned(case, null, measured, (predicted - null.mean) * factor**power)
+        only = concerned(case, name, null, measured, (predicted - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
     scaled = null.mean + moved * (predicted - null.mean)
-    rho = residual(null, measured, scaled, 1)
+    rho, left = judged(null, measured, scaled, 1)
     relative = sd / max(abs(scale), 1e-9) / power
     return Fit(
         name,
         final,
         {strength: abs(final[strength]) * relative},
         scaled,
+        null.sd,
         1,
         base,
         rho,
-        misfit(rho),
+        left,
         with_effect(model, name, final),
     )
 
 
-def concerned(case: Case, null: Null, measured: Array, effect: Array) -> list[int] | None:
-    """Recordings on which an effect shows, or something has to be explained, by index; with those that the refit rests
-    on where one of them is among these.
+def concerned(case: Case, name: str, null: Null, measured: Array, effect: Array) -> list[int] | None:
+    """Recordings on which an effect shows, or something has to be explained, by index; None for all.
 
-    None for all.
+    With those that the refit rests on, unless the effect leaves steady uniform light alone: the refit takes up its
+    mean, and the others are judged by that refit.
     """
     seen = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean))) > 5 * null.noise
     shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
     which = {i for i, c in enumerate(case.conditions) if c.name in shows}
     if not which:
         return None
-    if which & rests_on(case):
+    if which & rests_on(case) or not candidate(name).only_contrast:
         which |= rests_on(case)
     return sorted(which) if len(which) < len(case.conditions) else None
 
@@ -222,16 +250,17 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
     frames = [e for e in added if not is_pattern(e.name)]
     if not frames:
         predicted = with_pattern(case, found.model, null, null.mean)
-        rho = residual(null, measured, predicted, UNITS)
-        return replace(found, predicted=predicted, rho=rho, misfit=misfit(rho))
-    only = concerned(case, null, measured, found.predicted - null.mean)
+        rho, left = judged(null, measured, predicted, UNITS)
+        return replace(found, predicted=predicted, rho=rho, misfit=left)
+    only = concerned(case, found.name, null, measured, found.predicted - null.mean)
     _, refits = predict(case, found.model, within(found.model, found.base), null, 1, 200, only)
     base = settled(found.model, within(found.model, found.base), case.base, refits)
-    predicted, _ = predict(case, found.model, base, null, count, 300, only)
+    values, _ = simulated(case, found.model, base, null, count, 300, only)
+    predicted, spread = values.mean(axis=0), spread_of(null, values)
     if len(frames) < len(added):
         predicted = with_pattern(case, found.model, null, predicted)
-    rho = residual(null, measured, predicted, count)
-    return replace(found, predicted=predicted, count=count, base=base, rho=rho, misfit=misfit(rho))
+    rho, left = judged(null, measured, predicted, count, spread)
+    return replace(found, predicted=predicted, spread=spread, count=count, base=base, rho=rho, misfit=left)
 
 
 def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Sequence[str]) -> Fit:
@@ -298,8 +327,8 @@ def _fit_pattern(
                 tried = bounded(name, {**centre, key: centre[key] * factor})
                 there = with_effect(model, name, tried)
                 predicted = with_pattern(case, there, null, null.mean)
-                rho = residual(null, measured, predicted, UNITS)
-                now = Fit(name, tried, {}, predicted, UNITS, within(there, case.base), rho, misfit(rho), there)
+                rho, left = judged(null, measured, predicted, UNITS)
+                now = Fit(name, tried, {}, predicted, null.sd, UNITS, within(there, case.base), rho, left, there)
                 best = now if best is None or now.misfit < best.misfit else best
     assert best is not None
     return best

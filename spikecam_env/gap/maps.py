@@ -336,7 +336,11 @@ def concluded(
     significant = adjusted(normal(null, rho)).min() < GATE
     explained = not rounds or not significant or left < UNEXPLAINED
     parameters = off_usual(case, last.state) if last else {}
-    effects = tuple(_named(r, last) for r in rounds[1:]) if last else ()
+    effects = tuple(
+        replace(_named(r, last), instead={t.name: _gap(case, null, values, t.predicted).removed for t in r[1:]})
+        for r in rounds[1:]
+        if last
+    )
     unknown = None
     found = [e.name for e in effects]
     notes = (_left(null, rho, left),) if rounds and explained and significant else ()

@@ -111,7 +111,7 @@ def pixel_map(values: Array, title: str, limits: tuple[float, float]) -> Figure:
         return figure
 
 
-_LARGEST = 200
+_LARGEST = 128
 """Pixels along a side up to which a map is drawn as it is."""
 
 

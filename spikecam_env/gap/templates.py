@@ -118,7 +118,7 @@ def screen(
             **measured_line,
             strength: entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power),
         }
-        now = Screened(entry.name, bounded(entry.name, start), misfit(rho), scale * shift * null.noise)
+        now = Screened(entry.name, bounded(entry.name, start), misfit(rho, null.weight), scale * shift * null.noise)
         if entry.name not in best or now.misfit < best[entry.name].misfit:
             best[entry.name] = now
     return sorted(best.values(), key=lambda s: s.misfit)
@@ -243,7 +243,15 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
         null.floor,
         count,
+        np.where(of_pattern, 1.0 / told(null.keys, case.conditions), 1.0),
     )
+
+
+def told(keys: Sequence[Key], conditions: Sequence[Shown]) -> Array:
+    """(S,) how many recordings tell the same statistic of the pattern: those in the dark, or those in light."""
+    lit = {c.name: c.kind != "dark" for c in conditions}
+    kind = [(k.name, lit[k.recording]) for k in keys]
+    return np.array([kind.count(k) for k in kind], dtype=np.float64)
 
 
 def starts(name: str) -> list[dict[str, float]]:
@@ -272,7 +280,7 @@ def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters:
         if then == now:
             break
         now = then
-        only = concerned(case, null, null.mean, shift * null.noise * factor**power)
+        only = concerned(case, name, null, null.mean, shift * null.noise * factor**power)
         shift = _shift(case, model, null, name, now, 1, only)
     return Template(name, now, shift)
 

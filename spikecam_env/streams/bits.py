@@ -74,7 +74,7 @@ def by_pixel(words: NDArray[np.uint64], column: int, out: NDArray[np.uint64]) ->
 @njit(cache=True, nogil=True, boundscheck=False)
 def times_of(bits: NDArray[np.uint64], times: NDArray[np.int32]) -> int:
     """Frames (n,) of one pixel's spikes into `times`, given its bits (ceil(F / 64),); returns n."""
-    n = 0
+    n = np.int64(0)
     for block in range(bits.size):
         word = bits[block]
         count = np.int64(ones(word))
@@ -82,4 +82,4 @@ def times_of(bits: NDArray[np.uint64], times: NDArray[np.int32]) -> int:
             times[n + i] = 64 * block + np.int32(lowest(word))
             word &= word - _Q(1)
         n += count
-    return n
+    return int(n)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -23,7 +24,7 @@ def test_from_ideal_the_gap_falls_with_every_effect_down_to_chance(tmp_path: Pat
     added = [r.added.name for r in made.rungs[1:] if r.added]
     assert set(added) == {"conversion_gain_spread", "dark_current", "dark_current_spread", "shot_noise"}
     assert gaps[0] > 1000 * gaps[-1] and gaps[-1] < 2.0
-    assert all(later < 1.3 * earlier for earlier, later in zip(gaps, gaps[1:], strict=False))
+    assert all(later < 1.3 * earlier for earlier, later in itertools.pairwise(gaps))
     made.write(tmp_path / "out")
     assert json.loads((tmp_path / "out" / "ladder.json").read_text())["rungs"][1]["added"] == added[0]
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"ladder.json", "ladder.png", "model.toml"}
