@@ -3,7 +3,8 @@
 A twin is a fresh unit of the model, counted as the maps were; its median response and dark level are the measured ones.
 Spreads of response and of dark level are free within what units differ by (`units.WITHIN`) before, and without limit
 in the fits; one that then is further off than units are is a parameter that is wrong.  Parameters are fitted by
-Gauss-Newton on the statistics, with the same draws at every step.
+Gauss-Newton on the statistics, with the same draws at every step; how a spread is shared between a Gaussian and a tail
+is nearly free, and stated errors do not say so.
 """
 
 from __future__ import annotations
