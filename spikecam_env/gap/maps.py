@@ -340,7 +340,7 @@ def concluded(
     effects = tuple(
         replace(_named(r, last), instead={t.name: _gap(case, null, values, t.predicted).removed for t in r[1:]})
         for r in rounds[1:]
-        if last
+        if last and shows(last, r[0].name)
     )
     unknown = None
     found = [e.name for e in effects]
@@ -352,6 +352,8 @@ def concluded(
     else:
         verdict = "parameter" if parameters else "none"
     patched = _patched(last.state, case) if last else model
+    for e in (e for e in last.state.added if not shows(last, e)) if last else ():
+        patched = patched.without(e)
     p = adjusted(z)
     return Diagnosis(
         verdict=verdict, sentence="", effects=effects, unknown=unknown, class_=None, parameters=parameters, data=notes,
@@ -396,6 +398,11 @@ def _named(tried: list[Tried], last: Tried) -> NamedEffect:
     total = 1.0 + sum(w for _, w in weights)
     return NamedEffect(best.name, candidate(best.name).family, min(1.0 / total, 0.99), _estimates(last, best.name),
                        tuple((n, w / total) for n, w in weights))  # fmt: skip
+
+
+def shows(last: Tried, name: str) -> bool:
+    """Whether an effect's strength is more than two standard deviations in the end: a later one may take its place."""
+    return last.sd[f"{name}.{CATALOGUE[name].strength}"] < 0.5
 
 
 def _estimates(tried: Tried, name: str) -> dict[str, Estimate]:
