@@ -3,6 +3,18 @@
 from scenes.collage import Collage
 from scenes.disk import RotatingDisk
 from scenes.protocol import Gaze, Scene, Truth
+from scenes.sliding import SlidingTexture
 from scenes.textures import TEXTURES, random_texture
+from scenes.video import VideoScene
 
-__all__ = ["TEXTURES", "Collage", "Gaze", "RotatingDisk", "Scene", "Truth", "random_texture"]
+__all__ = [
+    "TEXTURES",
+    "Collage",
+    "Gaze",
+    "RotatingDisk",
+    "Scene",
+    "SlidingTexture",
+    "Truth",
+    "VideoScene",
+    "random_texture",
+]

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.keys import side_by_side
 from scenes.protocol import Gaze, Truth
 from scenes.textures import random_texture
 from spikecam_env.errors import InputError
@@ -74,7 +75,13 @@ class Collage:
         frame = np.arange(first, last + 1) * float(self.key_every)
         if gaze is not None:
             frame = np.union1d(frame[(frame > start) & (frame < stop)], [start, stop])
-        return Keyframes(frame.astype(np.float64), np.stack([self._picture(t, gaze)[0] for t in frame]))
+        light = np.empty((len(frame), *self.shape), np.float32)
+
+        def paint(key: int) -> None:
+            light[key] = self._picture(float(frame[key]), gaze)[0]
+
+        side_by_side(paint, len(frame))
+        return Keyframes(frame.astype(np.float64), light)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Radiance, flow [pixels/frame] and object number (0: background, then the shapes from the back)."""
@@ -90,6 +97,11 @@ class Collage:
             for number, layer in enumerate(self._shapes, 1)
         }
         return Truth(radiance, flow, owner, None, poses | {"camera": _offset(frame, gaze)})
+
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """Where the shapes' middles are seen, see `scenes.protocol.Placed`."""
+        offset = _offset(frame, gaze)
+        return {f"shape-{n}": layer.pose(frame, offset, self.shape)[:2] for n, layer in enumerate(self._shapes, 1)}
 
     def _picture(self, frame: float, gaze: Gaze | None) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         offset = _offset(frame, gaze)

@@ -99,3 +99,15 @@ class Scene(Protocol):
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at an instant; frame n is sampled at n + 0.5."""
         ...
+
+
+@runtime_checkable
+class Placed(Scene, Protocol):
+    """A scene of things that can be followed."""
+
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """Where the middle of everything that moves is seen, by name: (x, y) [pixels], also outside the picture.
+
+        Nothing is rendered for it.
+        """
+        ...

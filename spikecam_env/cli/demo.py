@@ -1,4 +1,4 @@
-"""`spikecam demo`: a 2000-rpm disk through the noisy camera and the online denoiser, as a film."""
+"""`spikecam demo`: a fast scene through the noisy camera and the online denoiser, as a film."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from spikecam_env.cli.camera import Camera
 
 @dataclass
 class Demo:
-    """Stream a fast disk through the noisy 40 kHz camera, denoise it online, and film both beside the true light.
+    """Stream a fast scene through the noisy 40 kHz camera, denoise it online, and film both beside the true light.
 
     example:  spikecam demo --rpm 3000 --out demo
     """
 
     out: Path = Path("demo")
     """Folder for demo.mp4, demo.png and demo.json."""
-    rpm: float = 2000.0
-    """Speed of the disk."""
+    scene: str = "disk"
+    """The rotating disk or another scene of `spikecam scenes`."""
+    rpm: float | None = None
+    """Speed of the disk; default 2000."""
     frames: int = 1200
     """Spike frames to stream; 1200 are one turn at 2000 rpm."""
     mode: Literal["best", "paper"] = "best"
@@ -28,16 +30,17 @@ class Demo:
     height: int = 250
     width: int = 400
     seed: int = 0
-    """Seed of the camera unit, its noise, and the disk's angle and place."""
+    """Seed of the camera unit, its noise, and the scene."""
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder, write_json
         from spikecam_env.cli.film import write_film, write_picture
-        from spikecam_env.cli.showcase import comparison, film_frames, stream_disk
+        from spikecam_env.cli.showcase import comparison, film_frames, stream
         from spikecam_env.cli.table import table
 
         folder = out_folder(self.out)
-        run = stream_disk(
+        run = stream(
+            scene=self.scene,
             rpm=self.rpm,
             frames=self.frames,
             mode=self.mode,

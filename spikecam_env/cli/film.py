@@ -47,12 +47,24 @@ def compose(panels: Sequence[Panel], white: float, corner: str = "") -> NDArray[
         picture = Image.fromarray(display(panel.picture, white)).resize((w, h), Image.Resampling.NEAREST)
         canvas.paste(picture.convert("RGB"), (x, MARGIN))
         draw.text((x, MARGIN + h + 6), panel.title, INK, _font(16))
-        draw.text((x, MARGIN + h + 28), panel.line, FAINT, _font(14))
+        draw.text((x, MARGIN + h + 28), _shortened(panel.line, w, _font(14)), FAINT, _font(14))
     if corner:
         right, low = canvas.size[0] - MARGIN, canvas.size[1] - 8
         draw.text((right, low), corner, INK, _font(14), anchor="rd")
     even = canvas.crop((0, 0, canvas.size[0] // 2 * 2, canvas.size[1] // 2 * 2))
     return np.asarray(even)
+
+
+def sheet(panels: Sequence[Panel], columns: int) -> NDArray[np.uint8]:
+    """Panels row by row, white being 1; (rows, columns, 3) uint8."""
+    rows = [compose(panels[i : i + columns], 1.0) for i in range(0, len(panels), columns)]
+    width = max(row.shape[1] for row in rows)
+    page = np.full((sum(len(row) for row in rows), width, 3), BACKGROUND, np.uint8)
+    top = 0
+    for row in rows:
+        page[top : top + len(row), : row.shape[1]] = row
+        top += len(row)
+    return page
 
 
 def write_film(
@@ -70,10 +82,32 @@ def write_film(
             writer.append_data(frame)  # type: ignore[attr-defined]
 
 
+def write_gif(
+    path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], fps: float = 25.0, total: int | None = None
+) -> None:
+    """Write (rows, columns, 3) uint8 frames as an animated GIF of 64 greys; the file appears when it is complete."""
+    first, *rest = (
+        Image.fromarray(frame).convert("L").quantize(64)
+        for frame in tqdm(frames, desc="film", unit="frame", total=total, leave=False)
+    )
+    with whole_file(Path(path)) as beside:
+        first.save(beside, save_all=True, append_images=rest, duration=round(1000 / fps), loop=0)
+
+
 def write_picture(path: str | os.PathLike[str], picture: NDArray[np.uint8]) -> None:
     """Write a grey or RGB uint8 picture as PNG; the file appears whole."""
     with whole_file(Path(path)) as beside:
         Image.fromarray(picture).save(beside)
+
+
+def _shortened(text: str, width: int, font: ImageFont.FreeTypeFont) -> str:
+    """As many words as have room [pixels]."""
+    if font.getlength(text) <= width:
+        return text
+    words = text.split()
+    while words and font.getlength(" ".join(words) + " ...") > width:
+        words.pop()
+    return " ".join(words) + " ..."
 
 
 @lru_cache(maxsize=8)

@@ -13,6 +13,7 @@ from spikecam_env.cli.bench import Bench
 from spikecam_env.cli.blind_trial import BlindTrial
 from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.campaign import Campaign
+from spikecam_env.cli.dataset import Dataset
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
 from spikecam_env.cli.diagnose import Diagnose
@@ -20,6 +21,7 @@ from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.record import Record
+from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
 from spikecam_env.errors import InputError
 
@@ -35,6 +37,8 @@ examples:
 COMMANDS: dict[str, Any] = {
     "demo": Demo,
     "record": Record,
+    "scenes": Scenes,
+    "dataset": Dataset,
     "denoise": Denoise,
     "train": Train,
     "evaluate": Evaluate,

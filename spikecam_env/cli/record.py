@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 from spikecam_env.cli.camera import Camera
 from spikecam_env.errors import InputError
@@ -19,13 +18,13 @@ class Record:
 
     out: Path
     """Where to; .h5 (bit-packed with attributes), .dat (raw Vidar bits) or .npz (key `spikes`)."""
-    scene: Literal["disk", "collage"] = "disk"
-    """What the camera looks at: the rotating disk, or textured shapes in random motion."""
+    scene: str = "disk"
+    """What the camera looks at: the rotating disk, or another scene of `spikecam scenes`."""
     frames: int = 4000
     """Spike frames to record; 40 000 are a second."""
     camera: Camera = field(default_factory=Camera)
-    rpm: float = 2000.0
-    """Speed of the disk."""
+    rpm: float | None = None
+    """Speed of the disk; default 2000."""
     height: int = 250
     width: int = 400
     seed: int = 0
@@ -35,7 +34,7 @@ class Record:
         import numpy as np
         from tqdm import trange
 
-        from scenes import Collage, RotatingDisk, Scene
+        from spikecam_env.cli.scene import scene_named
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
         from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
@@ -49,11 +48,7 @@ class Record:
             raise InputError(f"--frames {self.frames}; record at least 1")
         model = self.camera.load()
         sensor = SpikeSensor(model, (self.height, self.width), self.seed, engine="auto")
-        scene: Scene
-        if self.scene == "disk":
-            scene = RotatingDisk((self.height, self.width), rpm=self.rpm, frame_rate_hz=model.frame_rate_hz)
-        else:
-            scene = Collage((self.height, self.width), seed=self.seed)
+        scene = scene_named(self.scene, (self.height, self.width), self.seed, model.frame_rate_hz, self.rpm)
 
         def stream():
             for start in trange(0, self.frames, 64, desc=f"record {self.scene}", unit="block", leave=False):

@@ -1,4 +1,4 @@
-"""What `spikecam demo` shows: a disk through environment and online denoiser, beside its clean twin and its truth."""
+"""What `spikecam demo` shows: a scene through environment and online denoiser, beside its clean twin and its truth."""
 
 from __future__ import annotations
 
@@ -59,25 +59,28 @@ class Streamed:
         return range(FIRST_SHOWN, len(self.truths) - LAST_SHOWN)
 
 
-def stream_disk(
-    *, rpm: float, frames: int, mode: str, model: SensorModel | str, shape: tuple[int, int], seed: int
+def stream(
+    *,
+    scene: str,
+    rpm: float | None,
+    frames: int,
+    mode: str,
+    model: SensorModel | str,
+    shape: tuple[int, int],
+    seed: int,
 ) -> Streamed:
-    """Stream the disk through environment and denoiser; raises InputError for fewer than 500 frames."""
+    """Stream a scene through environment and denoiser.
+
+    scene: "disk" (at a speed of rpm, default 2000), or another name of the catalogue.
+    Errors: InputError for fewer than 500 frames, an unknown scene, and rpm with another scene than the disk.
+    """
     if frames < 500:
         raise InputError(f"{frames} frames are too few to show; ask for 500 or more (1200 are a turn at 2000 rpm)")
-    env = gymnasium.make(
-        "spikecam_env/RotatingDisk-v0",
-        shape=shape,
-        rpm=rpm,
-        model=model,
-        frames_per_step=BLOCK,
-        max_episode_steps=frames,
-    )
+    env, start = _camera(scene, rpm, shape, seed, model=model, frames_per_step=BLOCK, max_episode_steps=frames)
     camera: Any = env.unwrapped
     online = OnlineDnSS.pretrained(mode, output="both")
     _compile(env, online, shape)
     still = np.zeros(2, np.float32)
-    centred = {"centre": ((shape[1] - 1) / 2, (shape[0] - 1) / 2), "drift_px_s": (0.0, 0.0)}
     noisy: list[Spikes] = []
     clean: list[Spikes] = []
     denoised: list[Spikes] = []
@@ -88,7 +91,7 @@ def stream_disk(
     for step in tqdm(range(blocks + 1), desc="stream", unit="block", leave=False):
         began = time.perf_counter()
         if step == 0:
-            block, _ = env.reset(seed=seed, options=centred)
+            block, _ = env.reset(seed=seed, options=start)
             twin = camera.sensor.clean_twin()
         elif step < blocks:
             block, *_ = env.step(still)
@@ -117,6 +120,20 @@ def stream_disk(
         denoiser_s=denoiser_s,
         latency=online.latency,
     )
+
+
+def _camera(
+    scene: str, rpm: float | None, shape: tuple[int, int], seed: int, **options: Any
+) -> tuple[gymnasium.Env, dict[str, Any]]:
+    """The environment, and the options of reset with which the camera is where it belongs."""
+    if scene == "disk":
+        env = gymnasium.make("spikecam_env/RotatingDisk-v0", shape=shape, rpm=2000.0 if rpm is None else rpm, **options)
+        return env, {"centre": ((shape[1] - 1) / 2, (shape[0] - 1) / 2), "drift_px_s": (0.0, 0.0)}
+    if rpm is not None:
+        raise InputError(f"--rpm {rpm:g} is the disk's speed; the scene {scene!r} has its own")
+    env = gymnasium.make("spikecam_env/Scene-v0", scene=scene, shape=shape, scene_seed=seed, **options)
+    start: dict[str, Any] = {"start_frame": 0, "offset": (0.0, 0.0)}
+    return env, start | ({"seed": seed} if scene == "random" else {})
 
 
 def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:

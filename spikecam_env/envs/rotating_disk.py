@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scenes.disk import RotatingDisk
 from scenes.protocol import Gaze
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
+from spikecam_env.envs.task import in_the_middle
 from spikecam_env.errors import InputError, unknown_name
 
 
@@ -67,11 +68,7 @@ class RotatingDiskEnv(SpikeCameraEnv):
 
 def judge(disk: RotatingDisk, frame: float, gaze: Gaze) -> tuple[float, bool]:
     """(reward, terminated) at a frame; see `RotatingDiskEnv`."""
-    rows, columns = disk.shape
-    x, y = disk.centre_at(frame, gaze)
-    distance = np.hypot(x - (columns - 1) / 2, y - (rows - 1) / 2)
-    inside = -0.5 <= x <= columns - 0.5 and -0.5 <= y <= rows - 0.5
-    return 1.0 - float(distance) / float(np.hypot(rows, columns) / 2), not inside
+    return in_the_middle(disk.centre_at(frame, gaze), disk.shape)
 
 
 def _within(rng: np.random.Generator, most: float) -> tuple[float, float]:

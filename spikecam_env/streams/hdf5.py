@@ -1,9 +1,13 @@
 """Recordings in HDF5.
 
-/spikes           (T, ceil(H W / 8)) uint8, packed as in `packing`, chunked in time
+/spikes           (T, ceil(H W / 8)) uint8, packed as in `packing`
+/clean            the same of the noise-free twin on the same initial phase; optional
 /truth/<name>     (N, ...) ground truth, /truth/frame (N,) float64 the frames it belongs to; optional
 attributes        format = "spikecam-recording/1", height, width, package_version,
                   frame_rate_hz (absent where unknown), and what the writer added: model, seed, scene, ...
+
+Spikes are stored in chunks of CHUNK_FRAMES frames x CHUNK_ROWS rows, so that a window of a crop is read without the
+rest.  The same calls write the same bytes: the file holds no time of its making.
 """
 
 from __future__ import annotations
@@ -17,14 +21,19 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.streams.files import check_range, existing_file
 from spikecam_env.streams.packing import as_spikes, check_shape, pack_frames, packed_bytes, unpack_frames
 from spikecam_env.version import __version__
 from spikecam_env.whole import beside_path
 
 FORMAT = "spikecam-recording/1"
-CHUNK_BYTES = 1 << 20
+CHUNK_FRAMES = 32
+CHUNK_ROWS = 16
+CACHE_BYTES = 1 << 24
+LIBRARY_VERSIONS = ("earliest", "v110")
+"""Oldest and newest HDF5 format features in the files; fixed, so that bytes do not depend on the library's default."""
+COMPRESSED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 RESERVED = ("format", "height", "width", "frame_rate_hz", "package_version")
 
 
@@ -52,11 +61,9 @@ class SpikeWriter:
         self._file: h5py.File | None = None
 
     def __enter__(self) -> SpikeWriter:
-        self._file = h5py.File(self._beside, "w")
+        self._file = h5py.File(self._beside, "w", libver=LIBRARY_VERSIONS, rdcc_nbytes=CACHE_BYTES)
         self._file.attrs.update(self._attributes)
-        size = packed_bytes(self.shape)
-        chunk = (max(1, CHUNK_BYTES // size), size)
-        self._file.create_dataset("spikes", (0, size), np.uint8, maxshape=(None, size), chunks=chunk)
+        self._make_stream("spikes")
         return self
 
     def __exit__(
@@ -69,14 +76,21 @@ class SpikeWriter:
         else:
             self._beside.unlink(missing_ok=True)
 
-    def append(self, spikes: ArrayLike) -> None:
-        """Add frames: (T, H, W) spikes."""
-        frames = as_spikes(spikes)
-        if frames.shape[1:] != self.shape:
-            raise InputError(
-                f"frames of {frames.shape[1:]} pixels for a recording of {self.shape}; one recording has one shape"
-            )
-        _grow(self._open_file()["spikes"], pack_frames(frames))
+    def append(self, spikes: ArrayLike, clean: ArrayLike | None = None) -> None:
+        """Add frames: (T, H, W) spikes, and those of the noise-free twin, in every call or in none.
+
+        Fastest in multiples of CHUNK_FRAMES frames.
+        """
+        file = self._open_file()
+        streams = {"spikes": self._checked(spikes)}
+        if clean is not None:
+            streams["clean"] = self._checked(clean)
+            if len(file["spikes"]) == 0 and "clean" not in file:
+                self._make_stream("clean")
+        if set(streams) != {"spikes", "clean"} & set(file) or len({len(frames) for frames in streams.values()}) > 1:
+            raise InputError("spikes and clean must come together, as many frames of each, in every call or in none")
+        for name, frames in streams.items():
+            _grow(file[name], pack_frames(frames))
 
     def append_truth(self, frame: float, **arrays: ArrayLike) -> None:
         """Add ground truth at a frame, e.g. radiance, flow: the same names, shapes and dtypes at each call."""
@@ -85,11 +99,29 @@ class SpikeWriter:
             array = np.asarray(value)
             if name not in group:
                 group.create_dataset(
-                    name, (0, *array.shape), array.dtype, maxshape=(None, *array.shape), chunks=(1, *array.shape)
+                    name,
+                    (0, *array.shape),
+                    array.dtype,
+                    maxshape=(None, *array.shape),
+                    chunks=(1, *array.shape),
+                    **(COMPRESSED if array.ndim else {}),
                 )
             if group[name].shape[1:] != array.shape:
                 raise InputError(f"truth {name} is {array.shape}; it was {group[name].shape[1:]} before")
             _grow(group[name], array[None])
+
+    def _make_stream(self, name: str) -> None:
+        size = packed_bytes(self.shape)
+        chunk = (CHUNK_FRAMES, min(size, CHUNK_ROWS * self.shape[1] // 8))
+        self._open_file().create_dataset(name, (0, size), np.uint8, maxshape=(None, size), chunks=chunk)
+
+    def _checked(self, spikes: ArrayLike) -> NDArray[np.uint8]:
+        frames = as_spikes(spikes)
+        if frames.shape[1:] != self.shape:
+            raise InputError(
+                f"frames of {frames.shape[1:]} pixels for a recording of {self.shape}; one recording has one shape"
+            )
+        return frames
 
     def _open_file(self) -> h5py.File:
         if self._file is None:
@@ -98,26 +130,42 @@ class SpikeWriter:
 
 
 def read_hdf5(
-    path: str | Path, *, first: int = 0, count: int | None = None
+    path: str | Path, *, first: int = 0, count: int | None = None, stream: str = "spikes"
 ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     """A recording -> (T, H, W) uint8 spikes and its attributes; only the frames asked are read.
 
-    Errors: InputError if the file is absent, truncated, not HDF5, or of another format.
+    stream: "spikes", or "clean" for the noise-free twin's.
+    Errors: InputError if the file is absent, truncated, not HDF5, of another format, or has no such stream.
     """
-    with _opened(path) as file:
+    with open_recording(path) as file:
+        if stream not in ("spikes", "clean") or stream not in file:
+            raise unknown_name(f"stream of {path}", stream, {"spikes", "clean"} & set(file))
         attributes = {name: _plain(value) for name, value in file.attrs.items()}
         shape = (attributes["height"], attributes["width"])
-        first, stop = check_range(first, count, len(file["spikes"]), str(path))
-        return unpack_frames(file["spikes"][first:stop], shape), attributes
+        first, stop = check_range(first, count, len(file[stream]), str(path))
+        return unpack_frames(file[stream][first:stop], shape), attributes
+
+
+def read_crop(stream: h5py.Dataset, width: int, frames: slice, rows: slice, columns: slice) -> NDArray[np.uint8]:
+    """(frames, rows, columns) uint8 of 0 and 1 from a packed stream of an open recording of this width.
+
+    The slices have start and stop, within the stream.  Read are the chunks that hold these frames and rows.
+    """
+    first_byte, skipped = divmod(rows.start * width, 8)
+    bits = (rows.stop - rows.start) * width
+    packed = stream[frames, first_byte : first_byte + -(-(skipped + bits) // 8)]
+    pixels = np.unpackbits(packed, axis=1, count=skipped + bits, bitorder="little")[:, skipped:]
+    return np.ascontiguousarray(pixels.reshape(len(packed), -1, width)[:, :, columns])
 
 
 def read_truth(path: str | Path) -> dict[str, NDArray[Any]]:
     """Ground truth beside a recording: name -> (N, ...), with "frame" (N,); empty where there is none."""
-    with _opened(path) as file:
+    with open_recording(path) as file:
         return {name: dataset[:] for name, dataset in file["truth"].items()} if "truth" in file else {}
 
 
-def _opened(path: str | Path) -> h5py.File:
+def open_recording(path: str | Path) -> h5py.File:
+    """The file, open for reading; raises InputError as `read_hdf5` does."""
     source = existing_file(path)
     try:
         file = h5py.File(source, "r")

@@ -64,10 +64,13 @@ def run_trial(
         return
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         futures = [pool.submit(run_case, case, out, diagnose, keep) for case in waiting]
-        for future in as_completed(futures):
-            future.result()
-            done += 1
-            yield done, len(picked)
+        try:
+            for future in as_completed(futures):
+                future.result()
+                done += 1
+                yield done, len(picked)
+        finally:
+            pool.shutdown(cancel_futures=True)  # a trial that is stopped ends with the cases at work
 
 
 def is_done(out: Path, case_id: str) -> bool:

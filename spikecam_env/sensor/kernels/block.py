@@ -24,6 +24,7 @@ from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, having
 from spikecam_env.sensor.kernels import block_loop, fast
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
+from spikecam_env.sensor.kernels.threads import together
 from spikecam_env.sensor.light import GRAINS, Segment, ramp
 from spikecam_env.sensor.unit import Unit
 
@@ -158,7 +159,7 @@ def _block(
     rows = 1 if feedback.kick else now.shape[0]
     parts = fast._worth(threads, rows, spikes.size)
     cuts = [now.shape[0] * part // parts for part in range(parts + 1)]
-    fast._together([partial(block_loop.advance, top, bottom, *work) for top, bottom in pairwise(cuts)])
+    together([partial(block_loop.advance, top, bottom, *work) for top, bottom in pairwise(cuts)])
     if having("read_out", effects):
         fired = spikes.view(np.bool_).reshape(-1, *now.shape)
         spikes[:] = drive.read_out(now, effects, state.memory, fired).reshape(spikes.shape)

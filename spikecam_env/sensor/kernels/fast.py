@@ -4,36 +4,29 @@ Poisson arrivals of rate lambda(t) are a unit-rate process in Lambda(t) = integr
 electrons fires when Lambda has advanced by Gamma(N, 1), with the reset's draw mixed in (`quantile`).  Between spikes
 nothing is drawn: the crossing time follows from the light ramp (`loop`).  Without noise the bits are the reference's.
 
-Threads are the engine's own, not numba's: numba's OpenMP layer aborts in a process forked after its first use, which is
-how vector environments start.  Their number is NUMBA_NUM_THREADS, by default the processors, and changes no bit.
+The number of threads (`threads`) changes no bit.
 """
 
 from __future__ import annotations
 
-import ctypes
-import os
-import sys
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numba import config
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.kernels import loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS, fitted_polynomial
+from spikecam_env.sensor.kernels.threads import as_many, together
 from spikecam_env.sensor.light import GRAINS, Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 
 CARRIES: frozenset[str] = frozenset(name for name, effect in CATALOGUE.items() if effect.is_fixed())
 """Every effect that does nothing from frame to frame: fixed patterns, static optics, noise drawn at a reset."""
-
-_LIBC = ctypes.PyDLL(None) if sys.platform == "linux" else None
 
 _NO_BITS = np.empty((0, 0), dtype=np.uint8)
 _NO_WORDS = np.empty((0, 0), dtype=np.uint64)
@@ -158,7 +151,7 @@ def _advance(
         packed,
         spikes,
     )
-    _together([partial(loop.advance, i, *work) for i in range(threads)], shared=True)
+    together([partial(loop.advance, i, *work) for i in range(threads)], shared=True)
 
 
 def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
@@ -175,38 +168,7 @@ def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None
 
 def _worth(threads: int | None, most: int, pixel_steps: int) -> int:
     """How many threads to share work among: as many as asked for (default NUMBA_NUM_THREADS) and as pay."""
-    asked = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
-    return max(1, min(asked, most, pixel_steps // _WORTH_A_THREAD))
-
-
-def _together(parts: list[Callable[[], None]], *, shared: bool = False) -> None:
-    """Run parts at once, the first on this thread.
-
-    shared: each part takes what is left of the whole, so one that has not begun when the first is done need not.
-    """
-    others = []
-    if len(parts) > 1:
-        here = _processor()
-        others = [_pool(os.getpid()).submit(_elsewhere, here, part) for part in parts[1:]]
-    parts[0]()
-    for other in others:
-        if not (shared and other.cancel()):
-            other.result()
-
-
-def _elsewhere(taken: int, work: Callable[[], None]) -> None:
-    """Run work on another processor than the one taken: with few processors Linux wakes a thread on its waker's."""
-    if taken >= 0 and _processor() == taken:
-        allowed = os.sched_getaffinity(0)
-        if len(allowed) > 1:
-            os.sched_setaffinity(0, allowed - {taken})
-            os.sched_setaffinity(0, allowed)
-    work()
-
-
-def _processor() -> int:
-    """Which processor this thread is on; -1 where that cannot be told."""
-    return _LIBC.sched_getcpu() if _LIBC is not None else -1
+    return as_many(threads, min(most, pixel_steps // _WORTH_A_THREAD))
 
 
 def _shape_of_law(unit: Unit) -> tuple[np.float32, ...]:
@@ -228,9 +190,3 @@ def _compilable(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
     """A read-only or strided array would be compiled for anew: seconds, against microseconds for a copy."""
     plain = radiance.flags.c_contiguous and radiance.flags.writeable
     return radiance if plain else radiance.copy()
-
-
-@lru_cache(maxsize=1)
-def _pool(process: int) -> ThreadPoolExecutor:
-    """Threads do not survive a fork, hence one pool a process; it starts them as they are needed."""
-    return ThreadPoolExecutor(max_workers=64, thread_name_prefix="spikecam-fast")

@@ -1,0 +1,105 @@
+"""A torch `Dataset` over a folder of recordings: windows of noisy spikes, with the clean twin's normalised ISI plane.
+
+    data = SpikeWindows("spift", split="train", crop=(64, 64))
+    loader = torch.utils.data.DataLoader(data, batch_size=16, shuffle=True, num_workers=2)
+
+The target is the paper's, (22): 1 / ISI of the noise-free stream at the window's middle frame.  Windows start after
+noisy and clean twins have forgotten their common phase (DESIGN section 7).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypedDict
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.utils.data import Dataset
+
+from denoiser.pairs import WARM_UP
+from spikecam_env.datasets import read_window
+from spikecam_env.datasets.manifest import Manifest
+from spikecam_env.errors import InputError
+
+
+class Item(TypedDict):
+    """spikes (2 reach + 1, h, w) uint8, noisy; clean_isi (h, w) float32, 1 / ISI of the clean stream at `frame`.
+
+    scene: number of the file in `SpikeWindows.paths`.  frame, row, column: the middle frame and the crop's corner.
+    """
+
+    spikes: Tensor
+    clean_isi: Tensor
+    scene: int
+    frame: int
+    row: int
+    column: int
+
+
+class SpikeWindows(Dataset[Item]):
+    """Windows at every `stride`-th frame of every scene of a split, each with one random crop.
+
+    folder  of a finished dataset (`spikecam dataset`)
+    split   "train" or "test"
+    reach   frames before and after the middle one; 20 is the paper's window of 41
+    crop    (rows, columns); None: the whole picture
+    seed    of the crops; item i of an epoch is always the same.  `epoch` may be set to draw others
+    Errors: InputError for a folder that is no dataset or not finished, a split that it has not, and a window or a crop
+    that its scenes are too small for.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        split: str = "train",
+        *,
+        reach: int = 20,
+        crop: tuple[int, int] | None = (64, 64),
+        stride: int = 1,
+        seed: int = 0,
+    ) -> None:
+        manifest = Manifest.read(Path(folder))
+        files = [file for file in manifest.files if file["path"].startswith(f"{split}/")]
+        if not files:
+            splits = {file["path"].split("/")[0] for file in manifest.files}
+            raise InputError(f"{folder} has no scenes of split {split!r}; it has {', '.join(sorted(splits))}")
+        if any(file["sha256"] is None for file in files):
+            raise InputError(f"{folder} is not finished; run its `spikecam dataset` command again")
+        rows, columns = manifest.settings["shape"]
+        self.paths = [Path(folder) / file["path"] for file in files]
+        self.shape = (int(rows), int(columns))
+        self.crop = self.shape if crop is None else crop
+        if reach < 0 or stride < 1 or not all(1 <= n <= full for n, full in zip(self.crop, self.shape, strict=True)):
+            raise InputError(
+                f"reach {reach}, stride {stride}, crop {self.crop}; need reach >= 0, stride >= 1 "
+                f"and a crop of at most {self.shape}"
+            )
+        self.reach, self.seed, self.epoch = reach, seed, 0
+        self.frames = range(WARM_UP + reach, int(manifest.settings["frames"]) - reach, stride)
+        if not self.frames:
+            raise InputError(
+                f"scenes of {manifest.settings['frames']} frames hold no window of {2 * reach + 1} "
+                f"after the first {WARM_UP}; make longer ones"
+            )
+
+    def __len__(self) -> int:
+        return len(self.paths) * len(self.frames)
+
+    def __getitem__(self, index: int) -> Item:
+        if not 0 <= index < len(self):
+            raise IndexError(f"item {index} of {len(self)}")
+        scene, window = divmod(index, len(self.frames))
+        rng = np.random.default_rng([self.seed, self.epoch, index])
+        row, column = (int(rng.integers(full - n + 1)) for n, full in zip(self.crop, self.shape, strict=True))
+        frame = self.frames[window]
+        rows, columns = slice(row, row + self.crop[0]), slice(column, column + self.crop[1])
+        found = read_window(self.paths[scene], frame, reach=self.reach, rows=rows, columns=columns)
+        return {
+            "spikes": torch.from_numpy(found.spikes),
+            "clean_isi": torch.from_numpy(found.clean_isi),
+            "scene": scene,
+            "frame": frame,
+            "row": row,
+            "column": column,
+        }

@@ -1,0 +1,223 @@
+"""How fast scenes are, how far their light is from the truth, and whether their flow is right.
+
+spikecam bench scenes
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from scenes.catalogue import SCENES, make_scene
+from scenes.collage import Collage
+from scenes.disk import RotatingDisk, disk_texture
+from scenes.exact import supersampled
+from scenes.flow_check import check_flow
+from scenes.keys import side_by_side
+from scenes.protocol import Scene
+from scenes.renderers.compare import compare_backends
+from scenes.sliding import SlidingTexture
+from spikecam_env.sensor import Keyframes, SpikeSensor
+
+SHAPE = (250, 400)
+BLOCK = 64
+"""Frames asked for at a time."""
+
+SPACE = "tumble"
+"""The scene that is timed in space: six objects of 17 000 triangles, one a disk at 2000 rpm, one before the other."""
+
+REAL_TIME = 40_000
+"""Frames a second."""
+
+Rows = list[dict[str, Any]]
+Array = NDArray[np.floating]
+
+
+def bench_scenes(names: Iterable[str] = (), seconds: float = 2.0) -> dict[str, Rows]:
+    """Tables by title, at 250 x 400, on NUMBA_NUM_THREADS threads.
+
+    names: scenes whose flow is checked; default the whole catalogue.  seconds: time spent on each measurement.
+    """
+    steps = {
+        "planar scenes": lambda: bench_planar(seconds),
+        f"space: {SPACE}": lambda: bench_space(seconds),
+        "renderer back-ends": _backends,
+        "end to end: light to noisy spikes": lambda: bench_end_to_end(seconds),
+        "flow: frame 100 moved along it, against frame 140": lambda: flow_table(list(names) or list(SCENES)),
+    }
+    return {title: step() for title, step in tqdm(steps.items(), desc="bench", unit="table", leave=False)}
+
+
+def bench_planar(seconds: float = 2.0) -> Rows:
+    """Frames a second, and how far the disk is from 16 x 16 samples a pixel, inside its rim, share of full scale.
+
+    Columns: scene; pixels a key, most that anything moves from one to the next; keys a frame; frames/s; best block
+    of 64, what it is where the machine does nothing else; processor, time of all threads together; rms at keys; rms of
+    frames, the light that the sensor collects over a frame against 8 instants of it, which is what counts; rms midway,
+    the instant half-way between two keys, the worst.
+    """
+    texture, dark = disk_texture(np.random.default_rng(3)), 0.2
+    disks = {"disk, 2000 rpm": (2000.0, 0.6), "disk, 2000 rpm, a key every second frame": (2000.0, 1.2)}
+    disks |= {"disk, 500 rpm": (500.0, 0.6), "disk, 6000 rpm": (6000.0, 0.6)}
+    rows = []
+    for name, (rpm, motion) in disks.items():
+        disk = RotatingDisk(
+            SHAPE, rpm, light=(0.0, 1.0), texture=texture, background=dark, centre=(199.3, 124.8), motion_per_key=motion
+        )
+        rows.append(_speed(name, disk, disk.rim_speed, seconds) | _disk_errors(disk, texture, dark))
+    unknown: dict[str, Any] = {"rms at keys, %": None, "rms of frames, %": None, "rms midway, %": None}
+    slide = SlidingTexture(SHAPE)
+    rows.append(
+        _speed("sliding texture, 20 000 pixels/s", slide, float(np.hypot(*slide.velocity())), seconds) | unknown
+    )
+    rows.append(_speed("collage", Collage(SHAPE), None, seconds) | unknown)
+    return rows
+
+
+def bench_space(seconds: float = 2.0, name: str = SPACE, instants: int = 6) -> Rows:
+    """Frames a second, and how far light at instants in the middle of frames is from pictures rendered at those very
+    instants, where anything moves, share of full scale (the brightest light).
+
+    Columns: as `bench_planar`, with the share of the picture that moves.
+    """
+    scene = make_scene(name, SHAPE)
+    row = _speed(name, scene, None, seconds)
+    squares, full, moving = [], 0.0, []
+    for frame in tqdm(np.linspace(1000, 3000, instants).astype(int), desc="truth", unit="frame", leave=False):
+        at = float(frame) + 0.5
+        truth = scene.truth(at)
+        given = scene.radiance(int(frame), int(frame) + 1).at(at)
+        mask = np.hypot(truth.flow[..., 0], truth.flow[..., 1]) > 0.01
+        squares.append(np.square(given - truth.radiance, dtype=np.float64)[mask])
+        full = max(full, float(truth.radiance.max()))
+        moving.append(mask.mean())
+    error = float(np.sqrt(np.mean(np.concatenate(squares)))) / full
+    return [row | {"rms in motion, %": 100 * error, "moving, %": 100 * float(np.mean(moving))}]
+
+
+def bench_end_to_end(seconds: float = 2.0) -> Rows:
+    """From scene to noisy spikes (model scsim, engine fast), in blocks of 64 frames, and where the time goes.
+
+    Columns: scene, frames/s, x real time (40 000 frames a second), light, % and camera, % of the time, keys a frame.
+    """
+    rows = []
+    for name, scene in {"disk": RotatingDisk(SHAPE), SPACE: make_scene(SPACE, SHAPE)}.items():
+        sensor = SpikeSensor("scsim", SHAPE, seed=0, engine="fast")
+        light_s = camera_s = 0.0
+        frames = keys = 0
+        start = -2 * BLOCK
+        while light_s + camera_s < seconds:
+            begin = time.perf_counter()
+            light = scene.radiance(start + 2 * BLOCK, start + 3 * BLOCK)
+            lit = time.perf_counter()
+            sensor.step(Keyframes(light.frame - start - 2 * BLOCK + sensor.frame, light.radiance), BLOCK)
+            end = time.perf_counter()
+            start += BLOCK
+            if start >= 0:  # the first two blocks compile
+                light_s, camera_s = light_s + lit - begin, camera_s + end - lit
+                frames, keys = frames + BLOCK, keys + len(light.frame) - 1
+        total = light_s + camera_s
+        rows.append(
+            {
+                "scene": name,
+                "frames/s": frames / total,
+                "x real time": frames / total / REAL_TIME,
+                "light, %": 100 * light_s / total,
+                "camera, %": 100 * camera_s / total,
+                "keys a frame": keys / frames,
+            }
+        )
+    return rows
+
+
+def flow_table(names: Iterable[str]) -> Rows:
+    """`scenes.flow_check.check_flow` of scenes of the catalogue, in per cent."""
+    rows = []
+    for name in tqdm(list(names), desc="flow", unit="scene", leave=False):
+        check = check_flow(make_scene(name, SHAPE))
+        rows.append(
+            {
+                "scene": name,
+                "rms, %": 100 * check.error,
+                "shade aside, %": 100 * check.shade_aside,
+                "sharp, %": 100 * check.sharp,
+                "not moved, %": 100 * check.unmoved,
+                "compared, %": 100 * check.compared,
+            }
+        )
+    return rows
+
+
+def _backends() -> Rows:
+    """`scenes.renderers.compare` as a table; rms in per cent."""
+    return [
+        {
+            "back-end": row.backend,
+            "key, ms": row.key_ms,
+            "rms, %": 100 * row.error,
+            "to embree, %": 100 * row.to_embree,
+            "name": row.name,
+        }
+        for row in compare_backends(SHAPE)
+    ]
+
+
+def _speed(name: str, scene: Scene, pixels_a_frame: float | None, seconds: float) -> dict[str, Any]:
+    """Blocks of light one after the other, each of frames that were never asked for before."""
+    times: list[float] = []
+    keys = start = 0
+    scene.radiance(start, start + BLOCK)
+    processor = time.process_time()
+    until = time.perf_counter() + seconds
+    while time.perf_counter() < until or len(times) < 4:
+        start += BLOCK
+        begin = time.perf_counter()
+        light = scene.radiance(start, start + BLOCK)
+        times.append(time.perf_counter() - begin)
+        keys += len(light.frame) - 1
+    frames = len(times) * BLOCK
+    a_key = keys / frames
+    return {
+        "scene": name,
+        "pixels a key": None if pixels_a_frame is None else pixels_a_frame / a_key,
+        "keys a frame": a_key,
+        "frames/s": frames / sum(times),
+        "best block": BLOCK / min(times),
+        "processor, ms a frame": 1e3 * (time.process_time() - processor) / frames,
+    }
+
+
+def _disk_errors(disk: RotatingDisk, texture: NDArray[np.float32], dark: float) -> dict[str, float]:
+    """See `bench_planar`."""
+    inside = disk.truth(0.0).object_id > 0
+    keys = disk.radiance(1000, 1000 + BLOCK)
+    between = 0.5 * (keys.frame[1:] + keys.frame[:-1])
+    frames = 1000 + np.arange(0, BLOCK, BLOCK // 4)
+    parts = (np.arange(8) + 0.5) / 8
+
+    def off(instants: Array) -> NDArray[np.float64]:
+        """The mean over these instants, given and true."""
+        given = np.mean([keys.at(t) for t in instants], axis=0)
+        true = np.empty((len(instants), *disk.shape), np.float32)
+
+        def draw(i: int) -> None:
+            true[i] = supersampled(disk, texture, dark, instants[i])
+
+        side_by_side(draw, len(instants))
+        return (given - true.mean(axis=0))[inside]
+
+    return {
+        "rms at keys, %": _rms([off(keys.frame[i : i + 1]) for i in (0, 1, len(keys.frame) // 2)]),
+        "rms of frames, %": _rms([off(frame + parts) for frame in frames]),
+        "rms midway, %": _rms([off(between[i : i + 1]) for i in (0, len(between) // 2, len(between) - 1)]),
+    }
+
+
+def _rms(errors: list[NDArray[np.float64]]) -> float:
+    """[%]"""
+    return 100 * float(np.sqrt(np.mean(np.square(np.concatenate(errors)))))

@@ -1,0 +1,52 @@
+"""Where a world is seen from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scenes.trajectories import AT_REST, Pose, Trajectory, Vector
+from spikecam_env.errors import InputError
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole at `position` that looks at `target`.
+
+    field_of_view_deg   over the picture's height
+    shake               motion in the camera's own coordinates, e.g. `Shake()`
+    """
+
+    position: Vector = (0.0, 0.0, 3.0)
+    target: Vector = (0.0, 0.0, 0.0)
+    field_of_view_deg: float = 40.0
+    shake: Trajectory = AT_REST
+    up: Vector = (0.0, 1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.field_of_view_deg < 170:
+            raise InputError(f"field_of_view_deg is {self.field_of_view_deg}; it must lie between 0 and 170")
+        ahead = np.subtract(self.target, self.position)
+        if not np.linalg.norm(np.cross(ahead, self.up)) > 0:
+            raise InputError(f"the camera looks along {tuple(ahead)}, up is {self.up}; they must not be parallel or 0")
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        """Camera to world (..., 4, 4); it looks along its -z, y up."""
+        return self.rest() @ self.shake.pose(time_s)
+
+    def focal(self, rows: int) -> float:
+        """[pixels] for a picture of so many rows."""
+        return float(rows / 2 / np.tan(np.radians(self.field_of_view_deg) / 2))
+
+    def rest(self) -> NDArray[np.float64]:
+        """Camera to world (4, 4), without shake."""
+        back = np.subtract(self.position, self.target)
+        back = back / np.linalg.norm(back)
+        right = np.cross(self.up, back)
+        right = right / np.linalg.norm(right)
+        rest = np.eye(4)
+        rest[:3, :3] = np.stack([right, np.cross(back, right), back], -1)
+        rest[:3, 3] = self.position
+        return rest

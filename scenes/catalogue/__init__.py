@@ -1,0 +1,93 @@
+"""The scenes by name: `make_scene("fan")`, and random ones: `random_world(seed)`.
+
+A scene is a small file in this folder with one function
+
+    scene(shape, seed, frame_rate_hz, renderer) -> Scene
+
+and its name in `SCENES`.  Everything in a scene follows from these arguments, so a worker process rebuilds it
+from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from scenes.catalogue import (
+    ball,
+    car,
+    collage,
+    cook,
+    dice,
+    disk,
+    doll,
+    fan,
+    fly,
+    hand,
+    jump,
+    poker,
+    random_bodies,
+    text,
+    top,
+    train,
+    tumble,
+)
+from scenes.exposure import expose
+from scenes.protocol import Scene
+from scenes.renderers.protocol import Renderer
+from spikecam_env.errors import unknown_name
+
+SCENES: dict[str, Callable[..., Scene]] = {
+    "ball": ball.scene,
+    "car": car.scene,
+    "collage": collage.scene,
+    "cook": cook.scene,
+    "dice": dice.scene,
+    "disk": disk.scene,
+    "doll": doll.scene,
+    "fan": fan.scene,
+    "fly": fly.scene,
+    "hand": hand.scene,
+    "jump": jump.scene,
+    "poker": poker.scene,
+    "text": text.scene,
+    "top": top.scene,
+    "train": train.scene,
+    "tumble": tumble.scene,
+    "random": random_bodies.scene,
+}
+
+METERED_ROWS = 60
+"""Exposure is measured on a small picture of the scene."""
+
+
+def make_scene(
+    name: str,
+    shape: tuple[int, int] = (250, 400),
+    seed: int = 0,
+    mean_interval: float = 10.0,
+    frame_rate_hz: float = 40_000.0,
+    renderer: Renderer | None = None,
+) -> Scene:
+    """A scene of the catalogue, exposed to a mean interval [frames].
+
+    seed       of what the scene leaves to chance: textures, starting poses
+    renderer   default: chosen on first use, in each process (`scenes.renderers`)
+    Errors: InputError for an unknown name, with those that there are.
+    """
+    if name not in SCENES:
+        raise unknown_name("scene", name, SCENES)
+    build = SCENES[name]
+    small = (METERED_ROWS, max(1, round(METERED_ROWS * shape[1] / shape[0])))
+    metered = build(small, seed, frame_rate_hz, renderer) if shape[0] > METERED_ROWS else None
+    return expose(build(shape, seed, frame_rate_hz, renderer), mean_interval, metered)
+
+
+def random_world(
+    seed: int,
+    shape: tuple[int, int] = (250, 400),
+    mean_interval: float = 10.0,
+    frame_rate_hz: float = 40_000.0,
+    renderer: Renderer | None = None,
+) -> Scene:
+    """Textured objects in random rigid motion before a background, as in SPIFT; the whole follows from the seed."""
+    return make_scene("random", shape, seed, mean_interval, frame_rate_hz, renderer)

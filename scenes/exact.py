@@ -1,0 +1,53 @@
+"""What a picture of a disk should be: many samples a pixel, straight from the texture.  Slow; for tests and `bench`."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.disk import RotatingDisk
+from scenes.protocol import Gaze
+from scenes.textures import Texture
+
+
+def supersampled(
+    disk: RotatingDisk,
+    texture: Texture,
+    background: float,
+    frame: float,
+    gaze: Gaze | None = None,
+    samples: int = 16,
+) -> NDArray[np.float32]:
+    """The radiance (H, W) at an instant by samples x samples a pixel.
+
+    texture, background: those that the disk was made with, a light of (0, 1).
+    """
+    picture = np.empty(disk.shape, np.float32)
+    x, y = disk.centre_at(frame, gaze)
+    _supersample(texture, background, x, y, disk.radius, disk.angle_at(frame), samples, picture)
+    return picture
+
+
+@numba.njit(cache=True, nogil=True)
+def _supersample(texture, background, x0, y0, radius, angle, samples, picture):  # pragma: no cover - compiled
+    n = texture.shape[0]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    for r in range(picture.shape[0]):
+        for c in range(picture.shape[1]):
+            total = 0.0
+            for j in range(samples):
+                for i in range(samples):
+                    dx = (c + (i + 0.5) / samples - 0.5 - x0) / radius
+                    dy = (r + (j + 0.5) / samples - 0.5 - y0) / radius
+                    if dx * dx + dy * dy > 1.0:
+                        total += background
+                        continue
+                    u = min(max((cosine * dx - sine * dy + 1) / 2 * n - 0.5, 0.0), n - 1.001)
+                    v = min(max((sine * dx + cosine * dy + 1) / 2 * n - 0.5, 0.0), n - 1.001)
+                    a, b = int(u), int(v)
+                    p, q = u - a, v - b
+                    upper = texture[b, a] * (1 - p) + texture[b, a + 1] * p
+                    lower = texture[b + 1, a] * (1 - p) + texture[b + 1, a + 1] * p
+                    total += upper * (1 - q) + lower * q
+            picture[r, c] = total / (samples * samples)

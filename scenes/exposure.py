@@ -1,0 +1,72 @@
+"""Automatic exposure: light in the sensor's unit, so that the mean interval between spikes is as wanted.
+
+    mean interval = frames x pixels / spikes = 1 / mean radiance        [frames]
+
+The mean is over the picture at a few frames; each pixel's own interval is 1 / its radiance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.flow import displacement
+from scenes.protocol import Gaze, Placed, Scene, Truth
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import Keyframes
+
+METERED_FRAMES = (0.5, 333.5, 666.5, 999.5)
+"""Where the light is measured: over the first thousand frames, a common length of a clip."""
+
+
+def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = None) -> Exposed:
+    """The scene with its light scaled to a mean interval [frames].
+
+    metered   measure this one instead, e.g. the same scene at a smaller shape
+    Errors: InputError for an interval below 1 (a pixel fires at most once a frame) or a scene without light.
+    """
+    if not (np.isfinite(mean_interval) and mean_interval >= 1):
+        raise InputError(f"mean_interval is {mean_interval}; it must be 1 frame or more, e.g. 10")
+    mean = float(np.mean([(metered or scene).truth(frame).radiance.mean() for frame in METERED_FRAMES]))
+    if not mean > 0:
+        raise InputError("the scene has no light to expose; give it a lamp, an emission or a background")
+    return Exposed(scene, 1.0 / (mean_interval * mean))
+
+
+@dataclass(frozen=True)
+class Exposed:
+    """Scene: another one with its light multiplied by `gain`."""
+
+    scene: Scene
+    gain: float
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return self.scene.shape
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames a second."""
+        return self.scene.frame_rate_hz
+
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
+        """The scene's keys, scaled."""
+        keys = self.scene.radiance(start, stop, gaze)
+        return Keyframes(keys.frame, keys.radiance * np.float32(self.gain))
+
+    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
+        """The scene's truth, its radiance scaled."""
+        truth = self.scene.truth(frame, gaze)
+        return dataclasses.replace(truth, radiance=truth.radiance * np.float32(self.gain))
+
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """The scene's places; none where it has nothing to follow."""
+        return self.scene.places(frame, gaze) if isinstance(self.scene, Placed) else {}
+
+    def displacement(self, frame: float, frames: float, gaze: Gaze | None = None) -> NDArray[np.float32]:
+        """As `scenes.flow.displacement` has it."""
+        return displacement(self.scene, frame, frames, gaze)

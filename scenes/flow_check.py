@@ -1,0 +1,112 @@
+"""Is the flow right?  A picture moved along it must become the picture that comes later.
+
+Only the truth of the scene is asked, step by step, as any user of its flow would; `scenes.flow` asks a world itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.protocol import Gaze, Scene, Truth
+
+STEP = 5
+"""Frames that a point is carried on at a time, by the flow at the middle of them."""
+
+NEAR = 5
+"""Pixels: the square about a point within which only one object may be seen, or the point is left out."""
+
+BLUR = 0.7
+"""Pixels, standard deviation: what alternates from pixel to pixel cannot be read between them, right as flow may be."""
+
+SHADE = 8.0
+"""Pixels, standard deviation: wide beside what a texture shows, narrow beside how shade falls on a body."""
+
+Places = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class FlowCheck:
+    """error: rms of what came along the flow against what is there, share of full scale (the brightest light), both
+    pictures first blurred by `BLUR`.  shade_aside: the same once what turned in the light is given its new shade, taken
+    as smooth over `SHADE` within an object.  sharp: without blur.  unmoved: blurred, had nothing been moved.
+    compared: share of the picture that was: the rest left the picture, was covered, or lies beside an object's edge.
+    """
+
+    error: float
+    shade_aside: float
+    sharp: float
+    unmoved: float
+    compared: float
+
+
+def check_flow(scene: Scene, frame: int = 100, frames: int = 40, gaze: Gaze | None = None) -> FlowCheck:
+    """Carry every point of the picture at `frame` along the flow for so many frames, and compare its light with that at
+    the place where it comes to, read between pixels by Lanczos interpolation."""
+    y, x = np.indices(scene.shape).astype(np.float32)
+    first = scene.truth(frame, gaze)
+    alone, at = _alone(first), first
+    for since in range(0, frames, STEP):
+        step = min(STEP, frames - since)
+        here = _read(at.flow, x, y, cv2.INTER_LINEAR)
+        middle = scene.truth(frame + since + step / 2, gaze)
+        flow = _read(middle.flow, x + here[..., 0] * step / 2, y + here[..., 1] * step / 2, cv2.INTER_LINEAR)
+        x, y = x + flow[..., 0] * step, y + flow[..., 1] * step
+        at = scene.truth(frame + since + step, gaze)
+        alone &= _inside(x, y, scene.shape) & (_alone_at(at, x, y) == first.object_id)
+    full = float(first.radiance.max())
+    before, after = _blurred(first.radiance), _blurred(at.radiance)
+    there = _read(after, x, y, cv2.INTER_LANCZOS4)
+    pairs = {
+        "error": (before, there),
+        "shade_aside": (before * _shade(before, there, first.object_id, alone), there),
+        "sharp": (first.radiance, _read(at.radiance, x, y, cv2.INTER_LANCZOS4)),
+        "unmoved": (before, after),
+    }
+    errors = {name: _rms((there - here)[alone]) / full for name, (here, there) in pairs.items()}
+    return FlowCheck(**errors, compared=float(alone.mean()))
+
+
+def _blurred(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.asarray(cv2.GaussianBlur(picture, (0, 0), BLUR), np.float32)
+
+
+def _shade(
+    before: NDArray[np.float32], after: NDArray[np.float32], owner: NDArray[np.int32], compared: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Smooth ratio of both within each object: light about a pixel afterwards, over light about it before."""
+    ratio = np.ones_like(before)
+    for number in np.unique(owner[compared]):
+        mine = (compared & (owner == number)).astype(np.float32)
+        then, now = (cv2.GaussianBlur(mine * light, (0, 0), SHADE) for light in (after, before))
+        ratio = np.where((mine > 0) & (now > 0), then / np.maximum(now, 1e-9), ratio)
+    return ratio
+
+
+def _alone(truth: Truth) -> NDArray[np.bool_]:
+    """Pixels with one object only about them."""
+    square, owner = np.ones((NEAR, NEAR), np.uint8), truth.object_id.astype(np.int16)
+    return cv2.erode(owner, square) == cv2.dilate(owner, square)
+
+
+def _alone_at(truth: Truth, x: Places, y: Places) -> NDArray[np.int32]:
+    """The object at places, -1 where it is not alone."""
+    owner = np.where(_alone(truth), truth.object_id, -1).astype(np.float32)
+    return _read(owner, x, y, cv2.INTER_NEAREST).astype(np.int32)
+
+
+def _inside(x: Places, y: Places, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Far enough from the border to read about a place."""
+    return (x >= 2) & (x <= shape[1] - 3) & (y >= 2) & (y <= shape[0] - 3)
+
+
+def _read(picture: NDArray[np.float32], x: Places, y: Places, how: int) -> NDArray[np.float32]:
+    places = x.astype(np.float32), y.astype(np.float32)
+    return np.asarray(cv2.remap(picture, *places, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
+
+
+def _rms(difference: NDArray[np.floating]) -> float:
+    return float(np.sqrt(np.mean(np.square(difference, dtype=np.float64)))) if difference.size else float("nan")

@@ -1,0 +1,67 @@
+"""Keys: when they lie, and how they are painted.  They are pictures of their own, so several threads paint at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count, takewhile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.protocol import Gaze
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import Keyframes
+from spikecam_env.sensor.kernels.threads import as_many, together
+
+LONGEST_INTERVAL = 64
+"""Frames between two keys, at most."""
+
+_WORTH_A_THREAD = 4
+"""Keys below which another thread costs more than it saves."""
+
+
+def interval_for(speed: float, motion_per_key: float) -> int:
+    """Whole frames from key to key so that nothing moves further than asked [pixels], as far as whole frames allow.
+
+    speed: of the fastest point [pixels/frame].
+    """
+    return int(np.clip(motion_per_key / max(speed, 1e-9) + 1e-9, 1, LONGEST_INTERVAL))
+
+
+def painted(
+    shape: tuple[int, int],
+    start: int,
+    stop: int,
+    interval: int,
+    gaze: Gaze | None,
+    paint: Callable[[float, NDArray[np.float32]], None],
+) -> Keyframes:
+    """Keys that cover frames [start, stop], painted side by side by paint(frame, picture (H, W)).
+
+    Without gaze they are multiples of the interval; with gaze there are keys at `start` and `stop` too, where the
+    camera's path may bend.  Errors: InputError unless start < stop.
+    """
+    if not start < stop:
+        raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+    if gaze is None:
+        frame = np.arange(start // interval, -(-stop // interval) + 1) * interval
+    else:
+        inner = np.arange(start // interval + 1, -(-stop // interval)) * interval
+        frame = np.concatenate([[start], inner, [stop]])
+    light = np.empty((len(frame), *shape), np.float32)
+    side_by_side(lambda key: paint(float(frame[key]), light[key]), len(frame))
+    return Keyframes(frame.astype(np.float64), light)
+
+
+def side_by_side(paint: Callable[[int], None], keys: int, threads: int | None = None) -> None:
+    """Call paint(0) ... paint(keys - 1), in any order; each thread takes the next one when it is ready.
+
+    threads: default NUMBA_NUM_THREADS, fewer where there are few keys.
+    """
+    waiting = count()
+
+    def work() -> None:
+        for key in takewhile(lambda key: key < keys, waiting):
+            paint(key)
+
+    together([work] * as_many(threads, keys // _WORTH_A_THREAD), shared=True)

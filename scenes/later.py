@@ -1,0 +1,55 @@
+"""The same scene from another moment on, and from a camera that has turned already."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scenes.protocol import Gaze, Placed, Truth
+from spikecam_env.sensor import Keyframes
+
+
+@dataclass(frozen=True)
+class Later:
+    """Scene: another one's light, frame 0 being its frame `frames`, a camera at rest being one at `offset`.
+
+    frames   whole frames
+    offset   (pan, tilt) [pixels]
+    """
+
+    scene: Placed
+    frames: int = 0
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return self.scene.shape
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames a second."""
+        return self.scene.frame_rate_hz
+
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
+        """The scene's keys, at their frames here."""
+        keys = self.scene.radiance(start + self.frames, stop + self.frames, self._there(gaze))
+        return Keyframes(keys.frame - self.frames, keys.radiance)
+
+    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
+        """The scene's truth; its camera pose has the offset in it."""
+        return self.scene.truth(frame + self.frames, self._there(gaze))
+
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """The scene's places."""
+        return self.scene.places(frame + self.frames, self._there(gaze))
+
+    def _there(self, gaze: Gaze | None) -> Gaze | None:
+        if gaze is None and self.offset == (0.0, 0.0):
+            return None
+        gaze = gaze or Gaze.fixed(0.0, 0.0)
+        (pan, tilt), (first, last) = self.offset, gaze.frames
+        return Gaze(
+            (gaze.start[0] + pan, gaze.start[1] + tilt),
+            (gaze.stop[0] + pan, gaze.stop[1] + tilt),
+            (first + self.frames, last + self.frames),
+        )

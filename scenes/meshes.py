@@ -1,0 +1,409 @@
+"""Meshes: parts with normals and texture coordinates, put together to surfaces; and your own mesh or picture.
+
+    assemble(lathe(profile, picture), box((1, 1, 1), 0.2).moved(Still((0, 2, 0))))      one rigid surface
+    from_file("teapot.obj", texture="wood.jpg", size=1.0)                               your own
+
+Every part is a grid of points, so that normals are smooth along it and break where two parts meet.
+Faces look outward; light is Lambert's, so a sheet has a front and a back, a little apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+from scenes.renderers.protocol import Surface
+from scenes.textures import Texture
+from scenes.trajectories import Trajectory
+from spikecam_env.errors import InputError
+
+Albedo = float | Texture
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """vertices, normals (V, 3); uv (V, 2), v = 1 at the top of the texture; faces (F, 3); albedo 0..1, linear."""
+
+    vertices: Points
+    normals: Points
+    uv: Points
+    faces: NDArray[np.int64]
+    albedo: Albedo = 0.8
+
+    def moved(self, by: Trajectory) -> Part:
+        """Turned and shifted as a trajectory is at time 0."""
+        pose = by.pose(0.0)
+        return replace(
+            self, vertices=self.vertices @ pose[:3, :3].T + pose[:3, 3], normals=self.normals @ pose[:3, :3].T
+        )
+
+    def scaled(self, factor: ArrayLike) -> Part:
+        """By a positive factor, or one for each axis."""
+        factors = np.broadcast_to(np.asarray(factor, np.float64), 3)
+        normals = self.normals / factors
+        return replace(self, vertices=self.vertices * factors, normals=_unit(normals))
+
+
+def assemble(*parts: Part) -> Surface:
+    """One rigid surface; textures and greys of several parts go into one atlas."""
+    if not parts:
+        raise InputError("a surface needs at least one part")
+    if len(parts) == 1:
+        return _surface(parts[0])
+    atlas, places = _atlas([part.albedo for part in parts])
+    start = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    return _surface(
+        Part(
+            np.concatenate([part.vertices for part in parts]),
+            np.concatenate([part.normals for part in parts]),
+            np.concatenate([place[:2] + part.uv * place[2:] for part, place in zip(parts, places, strict=True)]),
+            np.concatenate([part.faces + first for part, first in zip(parts, start, strict=False)]),
+            atlas,
+        )
+    )
+
+
+# -- your own --------------------------------------------------------------------------------------------------
+
+
+def from_file(
+    path: str | PathLike[str], texture: str | PathLike[str] | Texture | None = None, size: float | None = None
+) -> Surface:
+    """A mesh file that trimesh reads (obj, stl, ply, glb, ...), with its own texture or the one given.
+
+    size   of its longest side, the middle at the origin; default: as it is in the file
+    Errors: InputError where there is no such file or no triangle in it.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"no mesh file {path}; give the path of an obj, stl, ply or glb file")
+    try:
+        mesh: Any = trimesh.load(str(path), force="mesh")
+    except Exception as error:
+        raise InputError(f"{path} cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
+    return from_mesh(mesh, texture, size)
+
+
+def from_mesh(
+    mesh: trimesh.Trimesh, texture: str | PathLike[str] | Texture | None = None, size: float | None = None
+) -> Surface:
+    """A trimesh mesh; without texture coordinates of its own a texture is wrapped around its vertical axis."""
+    if not len(getattr(mesh, "faces", ())):
+        raise InputError("the mesh has no triangles; a cloud of points has no surface to render")
+    mesh = mesh.copy()
+    if size is not None:
+        mesh.apply_translation(-mesh.bounds.mean(0))
+        mesh.apply_scale(size / np.ptp(mesh.bounds, axis=0).max())
+    albedo = _own_albedo(mesh) if texture is None else _texture(texture)
+    uv = getattr(mesh.visual, "uv", None)
+    if np.ndim(albedo) == 2 and (uv is None or len(uv) != len(mesh.vertices)):
+        mesh.visual = trimesh.visual.TextureVisuals(uv=_around(np.asarray(mesh.vertices)))
+    return Surface(mesh, albedo)
+
+
+def picture(path: str | PathLike[str]) -> Texture:
+    """A picture file as linear grey in [0, 1], (h, w) float32; 8 and 16 bit are taken as sRGB."""
+    image: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if Path(path).is_file() else None
+    if image is None:
+        raise InputError(f"no picture can be read from {path}; give the path of a png, jpg or tif file")
+    if np.issubdtype(image.dtype, np.integer):
+        image = linear(image / np.float32(np.iinfo(image.dtype).max))
+    return np.asarray(_grey(image[..., 2::-1] if image.ndim == 3 else image), np.float32)
+
+
+def linear(encoded: ArrayLike) -> NDArray[np.float32]:
+    """sRGB code values in [0, 1] to linear light (IEC 61966-2-1)."""
+    code = np.asarray(encoded, np.float32)
+    return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+# -- parts -----------------------------------------------------------------------------------------------------
+
+
+def sheet(points: Callable[[Points, Points], Sequence[Points]], shape: tuple[int, int], albedo: Albedo = 0.8) -> Part:
+    """A smooth grid: points(u, v) -> x, y, z, for u, v in [0, 1], u to the right and v up as seen from outside.
+
+    shape   cells along v and u
+    """
+    rows, columns = shape
+
+    def at(u: Points, v: Points) -> Points:
+        return np.stack(np.broadcast_arrays(*points(u, v)), -1).astype(np.float64)
+
+    u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
+    small = 1e-4
+    inner_u, inner_v = np.clip(u, small, 1 - small), np.clip(v, small, 1 - small)
+    normals = np.cross(
+        at(inner_u + small, inner_v) - at(inner_u - small, inner_v),
+        at(inner_u, inner_v + small) - at(inner_u, inner_v - small),
+    )
+    corner = np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)
+    a, b, c, d = (corner + step for step in (0, 1, columns + 2, columns + 1))
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    vertices = at(u, v).reshape(-1, 3)
+    corners = vertices[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
+    faces = faces[area > 1e-9 * area.max()]
+    uv = np.stack([u, v], -1).reshape(-1, 2)
+    return Part(vertices, _unit(normals.reshape(-1, 3)), uv, faces, albedo)
+
+
+def lathe(
+    profile: Sequence[tuple[float, float]], albedo: Albedo = 0.8, sections: int = 64, smooth: bool = True
+) -> Part:
+    """A profile of (radius, height), from the bottom up along the outside, turned about y.
+
+    The texture goes round once, from the bottom to the top of the profile.  smooth: a curve through the points
+    (Catmull-Rom), else straight pieces with edges between.
+    """
+    knots = np.asarray(profile, np.float64)
+    if not smooth:
+        pieces = [_turned(knots[i : i + 2], albedo, sections, 1) for i in range(len(knots) - 1)]
+        length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=-1))])
+        length /= length[-1]
+        return joined(
+            *(
+                replace(piece, uv=np.stack([piece.uv[:, 0], low + piece.uv[:, 1] * (high - low)], -1))
+                for piece, low, high in zip(pieces, length, length[1:], strict=False)
+            )
+        )
+    return _turned(knots, albedo, sections, 6 * (len(knots) - 1))
+
+
+def joined(*parts: Part) -> Part:
+    """Parts of one texture as one part, with the first one's albedo."""
+    start = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    return Part(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.normals for part in parts]),
+        np.concatenate([part.uv for part in parts]),
+        np.concatenate([part.faces + first for part, first in zip(parts, start, strict=False)]),
+        parts[0].albedo,
+    )
+
+
+def sphere(radius: float = 1.0, albedo: Albedo = 0.8, sections: int = 64) -> Part:
+    """u is the longitude, v the latitude."""
+
+    def points(u: Points, v: Points) -> Sequence[Points]:
+        longitude, latitude = 2 * np.pi * u, np.pi * (v - 0.5)
+        ring = radius * np.cos(latitude)
+        return ring * np.sin(longitude), radius * np.sin(latitude), ring * np.cos(longitude)
+
+    return sheet(points, (sections // 2, sections), albedo)
+
+
+def torus(radius: float, thickness: float, albedo: Albedo = 0.8, sections: int = 64) -> Part:
+    """A ring about y; `thickness` is the radius of the tube."""
+
+    def points(u: Points, v: Points) -> Sequence[Points]:
+        around, across = 2 * np.pi * u, 2 * np.pi * v
+        ring = radius + thickness * np.cos(across)
+        return ring * np.sin(around), thickness * np.sin(across), ring * np.cos(around)
+
+    return sheet(points, (max(8, sections // 2), sections), albedo)
+
+
+def capsule(length: float, radius: float, albedo: Albedo = 0.8, sections: int = 32, taper: float = 1.0) -> Part:
+    """A rounded stick along y from 0 to `length` between the middles of its ends; taper: radius of the upper end."""
+    bend = np.linspace(-np.pi / 2, 0, 6)
+    lower = [(radius * np.cos(a), radius * np.sin(a)) for a in bend]
+    upper = [(taper * radius * np.cos(a), length - taper * radius * np.sin(a)) for a in bend[::-1]]
+    knots = np.asarray([*lower, *upper])
+    return _turned(knots, albedo, sections, 3 * (len(knots) - 1), straight=True)
+
+
+def disc(radius: float, albedo: Albedo = 0.8, sections: int = 96) -> Part:
+    """In the plane z = 0, facing +z; the texture is the square around it."""
+    turn = 2 * np.pi * np.arange(sections) / sections
+    rim = np.stack([np.cos(turn), np.sin(turn)], -1)
+    flat = np.concatenate([np.zeros((1, 2)), rim])
+    following = 1 + (np.arange(sections) + 1) % sections
+    faces = np.stack([np.zeros(sections, np.int64), 1 + np.arange(sections), following], -1)
+    vertices = np.concatenate([radius * flat, np.zeros((len(flat), 1))], -1)
+    return Part(vertices, np.tile([0.0, 0, 1], (len(flat), 1)), (flat + 1) / 2, faces, albedo)
+
+
+def rectangle(width: float, height: float, albedo: Albedo = 0.8, cells: int = 1) -> Part:
+    """In the plane z = 0, facing +z, the middle at the origin."""
+    return sheet(lambda u, v: ((u - 0.5) * width, (v - 0.5) * height, 0 * u), (cells, cells), albedo)
+
+
+def box(extents: tuple[float, float, float], albedo: Albedo | Sequence[Albedo] = 0.8, cells: int = 1) -> list[Part]:
+    """Six rectangles: front (+z), right (+x), back, left, top (+y), bottom; an albedo for all or for each."""
+    sides: list[Any] = list(albedo) if isinstance(albedo, (list, tuple)) else [albedo] * 6
+    if len(sides) != 6:
+        raise InputError(f"a box got {len(sides)} albedos; it takes one, or six")
+    width, height, depth = extents
+    turns = [(0, 0), (0, 90), (0, 180), (0, 270), (-90, 0), (90, 0)]
+    sizes = [(width, height, depth), (depth, height, width)] * 2 + [(width, depth, height)] * 2
+    parts = []
+    for (about_x, about_y), (across, up, out), side in zip(turns, sizes, sides, strict=True):
+        face = rectangle(across, up, side, cells)
+        parts.append(_placed(replace(face, vertices=face.vertices + np.array([0, 0, out / 2])), about_x, about_y))
+    return parts
+
+
+def prism(outline: Sequence[tuple[float, float]], depth: float, side: Albedo = 0.8, face: Albedo = 0.8) -> list[Part]:
+    """A polygon in x, y (counter-clockwise) drawn out along z by `depth`, its middle at z = 0.
+
+    The faces' texture spans the outline's bounding box; the sides are one grey.
+    """
+    corners = np.asarray(outline, np.float64)
+    triangles = _triangulated(corners)
+    low, size = corners.min(0), np.ptp(corners, axis=0)
+    uv = (corners - low) / size
+    front = np.concatenate([corners, np.full((len(corners), 1), depth / 2)], -1)
+    ahead = np.tile([0.0, 0, 1], (len(corners), 1))
+    parts = [
+        Part(front, ahead, uv, triangles, face),
+        Part(front * [1, 1, -1], -ahead, uv, triangles[:, ::-1], face),
+    ]
+    for a, b in zip(corners, np.roll(corners, -1, 0), strict=True):
+        parts.append(sheet(partial(_between, a, b, depth), (1, 1), side))
+    return parts
+
+
+# -- helpers ---------------------------------------------------------------------------------------------------
+
+
+def _between(a: Points, b: Points, depth: float, u: Points, v: Points) -> Sequence[Points]:
+    """The wall of a prism from corner a to corner b."""
+    return a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), depth * (v - 0.5)
+
+
+def _turned(knots: Points, albedo: Albedo, sections: int, pieces: int, straight: bool = False) -> Part:
+    """A curve through knots (radius, height), turned about y."""
+    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=-1))])
+    length /= length[-1]
+    slope = np.gradient(knots, length, axis=0) if len(knots) > 2 else None
+
+    def curve(v: Points) -> Points:
+        if straight or slope is None:
+            return np.stack([np.interp(v, length, knots[:, k]) for k in (0, 1)], -1)
+        i = np.clip(np.searchsorted(length, v, "right") - 1, 0, len(knots) - 2)
+        h = (length[i + 1] - length[i])[..., None]
+        t = ((v - length[i])[..., None] / h).clip(0, 1)
+        return (
+            (1 + 2 * t) * (1 - t) ** 2 * knots[i]
+            + t * (1 - t) ** 2 * h * slope[i]
+            + t**2 * (3 - 2 * t) * knots[i + 1]
+            + t**2 * (t - 1) * h * slope[i + 1]
+        )
+
+    def points(u: Points, v: Points) -> Sequence[Points]:
+        radius, height = np.moveaxis(curve(v), -1, 0)
+        radius = np.maximum(radius, 1e-6)
+        return radius * np.sin(2 * np.pi * u), height, radius * np.cos(2 * np.pi * u)
+
+    return sheet(points, (max(pieces, 1), sections), albedo)
+
+
+def _surface(part: Part) -> Surface:
+    mesh = trimesh.Trimesh(part.vertices, part.faces, vertex_normals=part.normals, process=False)
+    mesh.visual = trimesh.visual.TextureVisuals(uv=part.uv)
+    return Surface(mesh, part.albedo)
+
+
+def _atlas(albedos: Sequence[Albedo]) -> tuple[Texture, list[NDArray[np.float64]]]:
+    """All in one texture, shelf by shelf, each with a margin of its edge; and the places (u, v, width, height)."""
+    tiles = {id(a): np.full((4, 4), a, np.float32) if np.ndim(a) == 0 else np.asarray(a, np.float32) for a in albedos}
+    order = sorted(tiles, key=lambda name: -tiles[name].shape[0])
+    width = max(256, *(tile.shape[1] + 2 * _MARGIN for tile in tiles.values()))
+    x = y = shelf = 0
+    corner = {}
+    for name in order:
+        rows, columns = (side + 2 * _MARGIN for side in tiles[name].shape)
+        if x + columns > width:
+            x, y, shelf = 0, y + shelf, 0
+        corner[name] = (x, y)
+        x, shelf = x + columns, max(shelf, rows)
+    height = y + shelf
+    atlas = np.zeros((height, width), np.float32)
+    for name, (x, y) in corner.items():
+        padded = np.pad(tiles[name], _MARGIN, mode="edge")
+        atlas[y : y + padded.shape[0], x : x + padded.shape[1]] = padded
+    places = []
+    for albedo in albedos:
+        (x, y), (rows, columns) = corner[id(albedo)], tiles[id(albedo)].shape
+        left, top = x + _MARGIN, y + _MARGIN
+        places.append(np.array([left / width, 1 - (top + rows) / height, columns / width, rows / height]))
+    return atlas, places
+
+
+_MARGIN = 8
+"""Texels around a tile of an atlas, so that coarse readings do not see the next one."""
+
+
+def _triangulated(corners: Points) -> NDArray[np.int64]:
+    """Triangles of a simple polygon, by cutting ears."""
+    left, triangles = list(range(len(corners))), []
+
+    def turn(a: int, b: int, c: int) -> float:
+        (ax, ay), (bx, by), (cx, cy) = corners[[a, b, c]]
+        return float((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
+
+    while len(left) > 3:
+        for k, b in enumerate(left):
+            a, c = left[k - 1], left[(k + 1) % len(left)]
+            others = [p for p in left if p not in (a, b, c)]
+            if turn(a, b, c) > 0 and not any(
+                turn(a, b, p) >= 0 and turn(b, c, p) >= 0 and turn(c, a, p) >= 0 for p in others
+            ):
+                triangles.append((a, b, c))
+                left.pop(k)
+                break
+        else:
+            raise InputError("the outline of a prism must be a simple polygon, counter-clockwise")
+    return np.array([*triangles, tuple(left)], np.int64)
+
+
+def _placed(part: Part, about_x: float, about_y: float) -> Part:
+    sx, cx = np.sin(np.radians(about_x)), np.cos(np.radians(about_x))
+    sy, cy = np.sin(np.radians(about_y)), np.cos(np.radians(about_y))
+    turn = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    return replace(part, vertices=part.vertices @ turn.T, normals=part.normals @ turn.T)
+
+
+def _unit(vectors: Points) -> Points:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
+def _around(vertices: Points) -> Points:
+    """Cylinder coordinates about y, mirrored half-way round so that there is no seam."""
+    centred = vertices - vertices.mean(0)
+    u = np.abs(np.arctan2(centred[:, 0], centred[:, 2])) / np.pi
+    height = np.ptp(vertices[:, 1])
+    return np.stack([u, (vertices[:, 1] - vertices[:, 1].min()) / (height or 1)], -1)
+
+
+def _texture(texture: str | PathLike[str] | Texture) -> Texture:
+    if isinstance(texture, (str, PathLike)):
+        return picture(texture)
+    values = np.asarray(texture, np.float32)
+    if values.ndim != 2:
+        raise InputError(f"texture has shape {values.shape}; give (h, w) linear grey in [0, 1], or a picture's path")
+    return values
+
+
+def _own_albedo(mesh: trimesh.Trimesh) -> Albedo:
+    """From the mesh's own material, grey; 0.7 where it has none."""
+    material = getattr(mesh.visual, "material", None)
+    image = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
+    if image is not None:
+        return np.asarray(_grey(linear(np.asarray(image.convert("RGB"), np.float32) / 255)), np.float32)
+    return 0.7
+
+
+def _grey(rgb: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Luminance of linear light (Rec. 709)."""
+    return rgb @ np.array([0.2126, 0.7152, 0.0722], np.float32) if rgb.ndim == 3 else rgb

@@ -1,0 +1,138 @@
+"""What every back-end needs before it draws: a surface as checked arrays, and the part of the window it can reach.
+
+Nothing here knows of OpenGL or of rays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
+from scenes.renderers.pyramid import Pyramid, pyramid
+from spikecam_env.errors import InputError
+
+NEAREST = 1e-3
+"""Share of the farthest vertex's distance at which OpenGL begins to see a surface; it cuts nearer parts away."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A surface as arrays.
+
+    vertices, normals  (V, 3) float64
+    uv                 (V, 2) float64; zeros where the albedo is one value
+    faces              (F, 3) int32
+    albedo             the texture and its reductions; one texel where the albedo is one value
+    closed             whether the mesh bounds a volume, faces outwards: from outside only front faces are seen
+    """
+
+    vertices: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    uv: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    albedo: Pyramid
+    closed: bool
+
+
+def geometry(surface: Surface) -> Geometry:
+    """Errors: InputError for a mesh without triangles, a texture without uv, or a texture that is not (h, w) finite."""
+    mesh = surface.mesh
+    if len(mesh.faces) == 0:
+        raise InputError("the mesh of a surface has no triangles; give one with faces")
+    albedo = np.asarray(surface.albedo, np.float32)
+    if albedo.ndim not in (0, 2) or albedo.size == 0 or not np.isfinite(albedo).all():
+        raise InputError(
+            f"albedo has shape {albedo.shape}; give one value or a finite texture (h, w), a colour picture as grey"
+        )
+    uv = getattr(mesh.visual, "uv", None)
+    if albedo.ndim == 2 and (uv is None or len(uv) != len(mesh.vertices)):
+        raise InputError(
+            "a surface has a texture but its mesh no texture coordinates; set mesh.visual = "
+            "trimesh.visual.TextureVisuals(uv=(V, 2) array), or give albedo as one value"
+        )
+    return Geometry(
+        vertices=np.array(mesh.vertices, np.float64),
+        normals=np.array(mesh.vertex_normals, np.float64),
+        uv=np.array(uv, np.float64)[:, :2] if albedo.ndim == 2 else np.zeros((len(mesh.vertices), 2)),
+        faces=np.array(mesh.faces, np.int32),
+        albedo=pyramid(np.atleast_2d(albedo)),
+        closed=_closed(mesh),
+    )
+
+
+def to_camera(pose: NDArray[np.float64], camera: Pinhole) -> NDArray[np.float64]:
+    """(4, 4): a surface's coordinates to the camera's.  Errors: InputError where a pose cannot be inverted."""
+    for name, matrix in (("pose", pose), ("camera.pose", camera.pose)):
+        if np.shape(matrix) != (4, 4) or not np.isfinite(matrix).all() or np.linalg.det(matrix) == 0:
+            raise InputError(f"{name} is\n{np.asarray(matrix)}\nit must be a (4, 4) matrix that can be inverted")
+    return np.linalg.inv(camera.pose) @ pose
+
+
+def moved(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (N, 3) through a (4, 4) matrix."""
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def reached(vertices: NDArray[np.float64], camera: Pinhole, window: Window) -> Window | None:
+    """The part of the window that these vertices (N, 3) in camera coordinates can cover; None where none."""
+    distance = -vertices[:, 2]
+    if distance.max() <= 0:
+        return None
+    if distance.min() <= NEAREST * distance.max():
+        return window
+    x = camera.centre[0] + camera.focal * vertices[:, 0] / distance
+    y = camera.centre[1] - camera.focal * vertices[:, 1] / distance
+    left, right = _overlap(x, window.left, window.columns)
+    top, bottom = _overlap(y, window.top, window.rows)
+    return Window(top, left, bottom - top, right - left) if top < bottom and left < right else None
+
+
+def towards(lighting: Lighting) -> NDArray[np.float64]:
+    """(3,) unit vector to the lamp.  Errors: InputError for a zero direction."""
+    direction = np.asarray(lighting.towards, np.float64)
+    length = np.linalg.norm(direction)
+    if direction.shape != (3,) or not 0 < length < np.inf:
+        raise InputError(f"lighting.towards is {lighting.towards}; it must be three numbers, not all of them zero")
+    return direction / length
+
+
+def blank(window: Window) -> Sprite:
+    """A sprite that covers nothing."""
+    size = (window.rows, window.columns)
+    return Sprite(window, np.zeros(size, np.float32), np.zeros(size, np.float32), np.full(size, np.inf, np.float32))
+
+
+def pasted(part: Sprite, window: Window) -> Sprite:
+    """A sprite of a window, of which only a part was drawn."""
+    if part.window == window:
+        return part
+    whole = blank(window)
+    top, left = part.window.top - window.top, part.window.left - window.left
+    inside = np.s_[top : top + part.window.rows, left : left + part.window.columns]
+    whole.radiance[inside], whole.coverage[inside], whole.depth[inside] = part.radiance, part.coverage, part.depth
+    return whole
+
+
+def checked(window: Window, supersample: int) -> None:
+    """Errors: InputError for an empty window or no rays."""
+    if window.rows < 1 or window.columns < 1:
+        raise InputError(f"the window has {window.rows} rows and {window.columns} columns; it needs some of each")
+    if supersample < 1:
+        raise InputError(f"supersample is {supersample}; it must be at least 1 ray a pixel and axis")
+
+
+def _closed(mesh: trimesh.Trimesh) -> bool:
+    """Whether it bounds a volume once the seams of texture and shading are sewn up."""
+    sewn = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    return bool(sewn.is_volume)
+
+
+def _overlap(positions: NDArray[np.float64], first: int, count: int) -> tuple[int, int]:
+    """Pixels [start, stop) of a row of `count` that an interval of positions touches."""
+    low = np.clip(np.floor(positions.min() + 0.5), first, first + count)
+    high = np.clip(np.floor(positions.max() + 0.5) + 1, first, first + count)
+    return int(low), int(high)

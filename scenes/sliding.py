@@ -1,0 +1,160 @@
+"""A texture that slides past: the simplest motion, the same everywhere, with a closed-form truth.
+
+    light(x, y, t) = texture(x - vx t + pan, y - vy t + tilt),  flow = v - gaze rate      [pixels/frame]
+
+The texture repeats without end.  It is averaged over the area of a pixel once, at `SAMPLES_PER_PIXEL` places along
+either side of a pixel, and read between them.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scenes.keys import interval_for, painted
+from scenes.protocol import Gaze, Truth
+from scenes.textures import dead_leaves
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import Keyframes
+
+SAMPLES_PER_PIXEL = 4
+
+
+class SlidingTexture:
+    """Scene: one texture over the whole picture at constant velocity.
+
+    shape           (rows, columns) of the sensor
+    velocity_px_s   (x, y) [pixels/s]
+    texture         (n, m) in [0, 1], repeated; its values are little squares of light.  Default: fallen leaves
+    texel_px        size of such a square [pixels]; with 0.5 the default texture repeats every 256 pixels
+    light           radiance of texture value 0 and 1: (dark, bright)
+    seed            of the default texture
+    frame_rate_hz   frames a second
+    motion_per_key  most the texture may move between two keys [pixels], as far as whole frames allow
+
+    Truth: all is object 0; poses["texture"] is where its upper left corner has gone, (x, y) [pixels].
+    Errors: InputError for a value out of range, by name.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int] = (250, 400),
+        velocity_px_s: tuple[float, float] = (20_000.0, 0.0),
+        texture: ArrayLike | None = None,
+        texel_px: float = 0.5,
+        light: tuple[float, float] = (0.05, 0.6),
+        seed: int = 0,
+        frame_rate_hz: float = 40_000.0,
+        motion_per_key: float = 0.6,
+    ) -> None:
+        values = dead_leaves(np.random.default_rng(seed), 512) if texture is None else np.asarray(texture, np.float32)
+        _check(shape, velocity_px_s, values, texel_px, light, frame_rate_hz, motion_per_key)
+        self.shape = (int(shape[0]), int(shape[1]))
+        self.velocity_px_s, self.frame_rate_hz = velocity_px_s, float(frame_rate_hz)
+        self.motion_per_key = float(motion_per_key)
+        samples = _area_average(_area_average(values.T, texel_px).T, texel_px)
+        self._samples = np.ascontiguousarray(light[0] + (light[1] - light[0]) * samples, np.float32)
+
+    def __repr__(self) -> str:
+        return f"SlidingTexture(shape={self.shape}, velocity_px_s={self.velocity_px_s})"
+
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
+        """Keys that cover frames [start, stop], see `scenes.keys.painted`."""
+        speed = float(np.hypot(*self.velocity(gaze)))
+        interval = interval_for(speed, self.motion_per_key)
+        return painted(self.shape, start, stop, interval, gaze, lambda t, picture: self._paint(t, gaze, picture))
+
+    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
+        """Ground truth at a frame; see `scenes.protocol.Truth`."""
+        radiance = np.empty(self.shape, np.float32)
+        self._paint(frame, gaze, radiance)
+        flow = np.broadcast_to(np.asarray(self.velocity(gaze), np.float32), (*self.shape, 2)).copy()
+        camera = gaze.at(frame) if gaze else (0.0, 0.0)
+        return Truth(
+            radiance,
+            flow,
+            np.zeros(self.shape, np.int32),
+            poses={"texture": self.corner_at(frame, gaze), "camera": camera},
+        )
+
+    def velocity(self, gaze: Gaze | None = None) -> tuple[float, float]:
+        """(x, y) in the picture [pixels/frame]."""
+        pan, tilt = gaze.rate if gaze else (0.0, 0.0)
+        return self.velocity_px_s[0] / self.frame_rate_hz - pan, self.velocity_px_s[1] / self.frame_rate_hz - tilt
+
+    def corner_at(self, frame: float, gaze: Gaze | None = None) -> tuple[float, float]:
+        """(x, y) in the picture of the texture's upper left corner [pixels]; it started at (-0.5, -0.5)."""
+        seconds = frame / self.frame_rate_hz
+        pan, tilt = gaze.at(frame) if gaze else (0.0, 0.0)
+        return self.velocity_px_s[0] * seconds - pan - 0.5, self.velocity_px_s[1] * seconds - tilt - 0.5
+
+    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+        rows, columns = self._samples.shape
+        x, y = (-SAMPLES_PER_PIXEL * (corner + 0.5) for corner in self.corner_at(frame, gaze))
+        _paint(self._samples, x % columns, y % rows, picture)
+
+
+def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.float64]:
+    """Averages over a pixel along the first axis, SAMPLES_PER_PIXEL a pixel; the first is that of a pixel whose
+    upper edge is the texture's.
+
+    Exact for squares of light: differences of the integral, which is straight between their edges.  To read between
+    two samples blurs by 1 / 6 m^2 pixels^2 more (m: samples a pixel), so the box is that much narrower than a pixel.
+    The period is rounded to whole samples.
+    """
+    texels = len(values)
+    samples = max(1, round(texels * texel_px * SAMPLES_PER_PIXEL))
+    pixel = SAMPLES_PER_PIXEL * texels / samples
+    half = pixel / 2 * np.sqrt(1 - 2 / SAMPLES_PER_PIXEL**2)
+    middle = np.arange(samples) * (texels / samples) + pixel / 2
+    integral = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0, dtype=np.float64)])
+
+    def up_to(place: NDArray[np.float64]) -> NDArray[np.float64]:
+        turns, rest = np.divmod(place, texels)
+        whole = np.minimum(rest.astype(int), texels - 1)
+        part = (rest - whole)[:, None]
+        return integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
+
+    return (up_to(middle + half) - up_to(middle - half)) / (2 * half)
+
+
+@numba.njit(cache=True, nogil=True)
+def _paint(samples, x, y, picture):  # pragma: no cover - compiled
+    """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
+    height, width = samples.shape
+    left, top = int(x), int(y)
+    right_share, lower_share = np.float32(x - left), np.float32(y - top)
+    columns = picture.shape[1]
+    near = (left + SAMPLES_PER_PIXEL * np.arange(columns)) % width
+    far = (near + 1) % width
+    for r in range(picture.shape[0]):
+        row = (top + SAMPLES_PER_PIXEL * r) % height
+        upper, lower = samples[row], samples[(row + 1) % height]
+        for c in range(columns):
+            above = upper[near[c]] + right_share * (upper[far[c]] - upper[near[c]])
+            below = lower[near[c]] + right_share * (lower[far[c]] - lower[near[c]])
+            picture[r, c] = above + lower_share * (below - above)
+
+
+def _check(
+    shape: tuple[int, int],
+    velocity_px_s: tuple[float, float],
+    texture: NDArray[np.float32],
+    texel_px: float,
+    light: tuple[float, float],
+    frame_rate_hz: float,
+    motion_per_key: float,
+) -> None:
+    if len(shape) != 2 or min(shape) < 1:
+        raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
+    if texture.ndim != 2 or not texture.size or not (texture.min() >= 0 and texture.max() <= 1):
+        raise InputError(f"texture has shape {texture.shape}; it must be (n, m) with values in [0, 1]")
+    if not np.isfinite(velocity_px_s).all():
+        raise InputError(f"velocity_px_s is {velocity_px_s}; it must be finite")
+    if not 0 <= light[0] < light[1] < np.inf:
+        raise InputError(f"light is {light}; it must be (dark, bright) with 0 <= dark < bright")
+    positive = {"texel_px": texel_px, "frame_rate_hz": frame_rate_hz, "motion_per_key": motion_per_key}
+    for name, value in positive.items():
+        if not 0 < value < np.inf:
+            raise InputError(f"{name} is {value}; it must be positive and finite")

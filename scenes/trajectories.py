@@ -1,0 +1,232 @@
+"""Trajectories: where a body is over time, as small frozen values.
+
+    Ballistic((0, 1, 0), (3, 2, 0)) @ Spinning((0, 1, 0), rpm=2000)
+
+A trajectory's pose is a 4 x 4 rigid map from the body's coordinates to the world's; `a @ b` is a's pose after
+b's: turn as b says, then move as a says.  Time is in seconds, so that the same motion may be watched at any
+frame rate; lengths are in the world's unit (metres in the catalogue); y is up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from spikecam_env.errors import InputError
+
+Vector = tuple[float, float, float]
+Pose = NDArray[np.float64]
+
+GRAVITY = 9.81
+"""[m/s^2]"""
+
+
+@runtime_checkable
+class Trajectory(Protocol):
+    """Anything with a pose over time; no state, so any time may be asked for in any order."""
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        """Times of any shape (...) [s] -> rigid maps (..., 4, 4) float64."""
+        ...
+
+
+class Motion:
+    """What makes trajectories chain: `outer @ inner`."""
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        raise NotImplementedError
+
+    def __matmul__(self, inner: Trajectory) -> Chain:
+        return Chain(self, inner)
+
+
+@dataclass(frozen=True)
+class Chain(Motion):
+    """outer after inner."""
+
+    outer: Trajectory
+    inner: Trajectory
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        return self.outer.pose(time_s) @ self.inner.pose(time_s)
+
+
+@dataclass(frozen=True)
+class Still(Motion):
+    """At rest: turned by `turn` about an axis of that direction [degrees along the vector], then put at `position`.
+
+    Still((0, 1, 0), turn=(90, 0, 0)) lies a quarter turn about x at height 1.
+    """
+
+    position: Vector = (0.0, 0.0, 0.0)
+    turn: Vector = (0.0, 0.0, 0.0)
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        rotation = Rotation.from_rotvec(np.radians(self.turn)).as_matrix()
+        return _pose(np.shape(time_s), rotation, self.position)
+
+
+@dataclass(frozen=True)
+class Ballistic(Motion):
+    """position + velocity t + gravity t^2 / 2: thrown at t = 0; without gravity, straight and even."""
+
+    position: Vector = (0.0, 0.0, 0.0)
+    velocity: Vector = (0.0, 0.0, 0.0)
+    gravity: Vector = (0.0, 0.0, 0.0)
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        t = np.asarray(time_s, np.float64)[..., None]
+        where = np.asarray(self.position) + t * np.asarray(self.velocity) + t * t / 2 * np.asarray(self.gravity)
+        return _pose(t.shape[:-1], np.eye(3), where)
+
+
+@dataclass(frozen=True)
+class Spinning(Motion):
+    """Turning evenly about an axis through the origin: angle = angle_deg + 6 rpm t [degrees]."""
+
+    axis: Vector
+    rpm: float
+    angle_deg: float = 0.0
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        t = np.asarray(time_s, np.float64)
+        return _turned(self.axis, np.radians(self.angle_deg + 6 * self.rpm * t))
+
+
+@dataclass(frozen=True)
+class Swinging(Motion):
+    """Turning to and fro about an axis through the origin: angle = amplitude sin(2 pi (frequency t + phase))."""
+
+    axis: Vector
+    amplitude_deg: float
+    frequency_hz: float
+    phase: float = 0.0
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        swing = np.sin(2 * np.pi * (self.frequency_hz * np.asarray(time_s, np.float64) + self.phase))
+        return _turned(self.axis, np.radians(self.amplitude_deg) * swing)
+
+
+@dataclass(frozen=True)
+class Vibrating(Motion):
+    """Moving to and fro: amplitude (a vector) times sin(2 pi (frequency t + phase))."""
+
+    amplitude: Vector
+    frequency_hz: float
+    phase: float = 0.0
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        t = np.asarray(time_s, np.float64)[..., None]
+        swing = np.sin(2 * np.pi * (self.frequency_hz * t + self.phase))
+        return _pose(t.shape[:-1], np.eye(3), swing * np.asarray(self.amplitude))
+
+
+@dataclass(frozen=True)
+class Bouncing(Motion):
+    """Up and down between y = 0 and `height`, as under gravity on a perfect floor; at the top when t = 0.
+
+    y = height - g tau^2 / 2,  tau: time to the nearest top;  period 2 sqrt(2 height / g)
+    """
+
+    height: float
+    gravity: float = GRAVITY
+    phase: float = 0.0
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        period = 2 * np.sqrt(2 * self.height / self.gravity)
+        turns = np.asarray(time_s, np.float64) / period + self.phase
+        tau = (turns - np.round(turns)) * period
+        where = np.zeros((*tau.shape, 3))
+        where[..., 1] = self.height - self.gravity * tau**2 / 2
+        return _pose(tau.shape, np.eye(3), where)
+
+
+@dataclass(frozen=True)
+class Path(Motion):
+    """A smooth curve through positions at times (cubic spline); closed, it starts over after the last time.
+
+    A closed path must end where it starts.  Before the first and after the last time an open path stands still.
+    """
+
+    time_s: tuple[float, ...]
+    positions: tuple[Vector, ...]
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.time_s) != len(self.positions) or len(self.time_s) < 2 or not np.all(np.diff(self.time_s) > 0):
+            raise InputError(
+                f"a path needs as many positions as rising times, two at least; "
+                f"got {len(self.time_s)} times and {len(self.positions)} positions"
+            )
+        if self.closed and not np.allclose(self.positions[0], self.positions[-1]):
+            raise InputError(
+                f"a closed path must end where it starts; got {self.positions[0]} and {self.positions[-1]}"
+            )
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        t = np.asarray(time_s, np.float64)
+        first, last = self.time_s[0], self.time_s[-1]
+        inside = first + (t - first) % (last - first) if self.closed else np.clip(t, first, last)
+        curve = CubicSpline(self.time_s, self.positions, bc_type="periodic" if self.closed else "natural")
+        return _pose(t.shape, np.eye(3), curve(inside))
+
+
+@dataclass(frozen=True)
+class Shake(Motion):
+    """A hand-held camera: small turns and shifts, each a sum of sines at random frequencies up to a highest one.
+
+    angle_deg, shift   standard deviation about and along each axis [degrees, world units]
+    """
+
+    angle_deg: float = 0.05
+    shift: float = 0.0
+    highest_hz: float = 60.0
+    seed: int = 0
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        t = np.asarray(time_s, np.float64)[..., None, None]
+        rng = np.random.default_rng(self.seed)
+        frequency = self.highest_hz * rng.uniform(0.1, 1.0, (6, _SINES))
+        wave = np.sin(2 * np.pi * (frequency * t + rng.random((6, _SINES)))).sum(-1) * np.sqrt(2 / _SINES)
+        turn = Rotation.from_rotvec(np.radians(self.angle_deg) * wave[..., :3].reshape(-1, 3)).as_matrix()
+        return _pose(t.shape[:-2], turn.reshape(*t.shape[:-2], 3, 3), self.shift * wave[..., 3:])
+
+
+@dataclass(frozen=True)
+class Repeating(Motion):
+    """Another trajectory, started over after every period; the jump back is best made out of sight."""
+
+    motion: Trajectory
+    period_s: float
+    start_s: float = 0.0
+
+    def pose(self, time_s: ArrayLike) -> Pose:
+        return self.motion.pose((np.asarray(time_s, np.float64) - self.start_s) % self.period_s + self.start_s)
+
+
+AT_REST = Still()
+"""At the origin."""
+
+_SINES = 5
+
+
+def _turned(axis: Vector, angle: NDArray[np.float64]) -> Pose:
+    """Rotation by angles (...) [radians] about an axis (Rodrigues' formula)."""
+    length = float(np.linalg.norm(axis))
+    if not length > 0:
+        raise InputError(f"the axis of a turn is {axis}; it must have a length")
+    x, y, z = np.asarray(axis, np.float64) / length
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    sine, versine = np.sin(angle)[..., None, None], (1 - np.cos(angle))[..., None, None]
+    return _pose(np.shape(angle), np.eye(3) + sine * cross + versine * (cross @ cross), np.zeros(3))
+
+
+def _pose(shape: tuple[int, ...], rotation: NDArray[np.float64], position: ArrayLike) -> Pose:
+    pose = np.zeros((*shape, 4, 4))
+    pose[..., :3, :3], pose[..., :3, 3], pose[..., 3, 3] = rotation, position, 1.0
+    return pose

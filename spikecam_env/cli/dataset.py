@@ -1,0 +1,134 @@
+"""`spikecam dataset`: SPIFT_N and PHM_N, made and verified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from spikecam_env.cli.camera import Camera
+
+if TYPE_CHECKING:
+    from spikecam_env.datasets import Plan
+
+
+@dataclass
+class Making:
+    """What every dataset has."""
+
+    out: Path
+    """Folder for the dataset; a run that was stopped goes on in it."""
+    frames: int = 1000
+    """Spike frames of each scene; 40 000 are a second."""
+    size: tuple[int, int] = (250, 400)
+    """Rows and columns; 500 800 is the other size in use."""
+    seed: int = 0
+    """Of the scenes and the cameras; the same seed gives the same bytes."""
+    truth_every: int = 100
+    """Frames between ground truths (radiance, flow, object number, depth, poses); 0: none."""
+    mean_interval: float = 10.0
+    """Exposure: frames between spikes, on average over the picture."""
+    renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
+    """Back-end that draws; auto: the best there is, and the same again when a run goes on."""
+    camera: Camera = field(default_factory=Camera)
+    jobs: int = 1
+    """Worker processes on this machine, or workers of a local Ray cluster."""
+    ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    """Work on a Ray cluster: its address, e.g. auto or ray-head:6379; `local` starts one of --jobs workers here."""
+
+    def settings(self) -> dict[str, Any]:
+        """As fields of a `Plan`."""
+        return {
+            "frames": self.frames,
+            "shape": self.size,
+            "seed": self.seed,
+            "truth_every": self.truth_every,
+            "mean_interval": self.mean_interval,
+            "model": self.camera.load(),
+            "renderer": self.renderer,
+        }
+
+    def make(self, plan: Plan) -> None:
+        """Make it and say what was done."""
+        from spikecam_env.datasets import build
+
+        built = build(plan, self.out, jobs=self.jobs, ray=self.ray, progress=True)
+        size = f"{built.bytes / 1e9:.3g} GB"
+        print(f"{self.out}: {built.made} scenes made, {built.kept} were there, {size} (renderer: {built.renderer})")
+        if built.seconds:
+            spent = ", ".join(f"{what} {s:.3g}" for what, s in sorted(built.seconds.items(), key=lambda i: -i[1]))
+            print(f"seconds over all workers: {spent}")
+
+
+@dataclass
+class SpiftN(Making):
+    """Random scenes: 100 to train on and 10 to test, as in the paper, each with a camera of its own.
+
+    example:  spikecam dataset spift-n --out spift --jobs 2
+    """
+
+    train: int = 100
+    """Scenes to train on."""
+    test: int = 10
+    """Scenes to test."""
+
+    def run(self) -> None:
+        from spikecam_env.datasets import spift_n
+
+        self.make(spift_n(train=self.train, test=self.test, **self.settings()))
+
+
+@dataclass
+class PhmN(Making):
+    """The ten well-designed scenes: ball, cook, dice, doll, fan, fly, hand, jump, poker, top.
+
+    example:  spikecam dataset phm-n --out phm --jobs 2
+    """
+
+    scenes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...", help_behavior_hint="(default: the ten)")] = ()
+    """Other scenes of the catalogue; `spikecam scenes` lists them."""
+
+    def run(self) -> None:
+        from spikecam_env.datasets import PHM, phm_n
+
+        self.make(phm_n(scenes=self.scenes or PHM, **self.settings()))
+
+
+@dataclass
+class Verify:
+    """Find files that are truncated, edited, missing, or do not belong; exit code 1 where there are any.
+
+    example:  spikecam dataset verify spift --jobs 2
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of the dataset."""
+    jobs: int = 1
+    """Files read at a time."""
+
+    def run(self) -> None:
+        from spikecam_env.datasets import verify
+
+        faults = verify(self.folder, jobs=self.jobs, progress=True)
+        print("\n".join(faults) if faults else f"{self.folder}: every file is there and as it was written")
+        if faults:
+            raise SystemExit(1)
+
+
+@dataclass
+class Dataset:
+    """Datasets of noisy and clean spikes with ground truth (docs/datasets.md).
+
+    example:  spikecam dataset spift-n --out spift --jobs 2
+    """
+
+    action: (
+        Annotated[SpiftN, tyro.conf.subcommand("spift-n", prefix_name=False)]
+        | Annotated[PhmN, tyro.conf.subcommand("phm-n", prefix_name=False)]
+        | Annotated[Verify, tyro.conf.subcommand("verify", prefix_name=False)]
+    )
+
+    def run(self) -> None:
+        self.action.run()

@@ -1,0 +1,27 @@
+"""What the camera looks at, as options say it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from spikecam_env.errors import InputError, unknown_name
+
+if TYPE_CHECKING:
+    from scenes import Scene
+
+
+def scene_named(name: str, shape: tuple[int, int], seed: int, frame_rate_hz: float, rpm: float | None = None) -> Scene:
+    """The disk at a speed, or another scene of the catalogue by name.
+
+    rpm: of the disk; default 2000.  Errors: InputError for an unknown name, and for rpm with another scene.
+    """
+    from scenes import RotatingDisk
+    from scenes.catalogue import SCENES, make_scene
+
+    if name not in SCENES:
+        raise unknown_name("scene", name, SCENES)
+    if name == "disk":
+        return RotatingDisk(shape, rpm=2000.0 if rpm is None else rpm, frame_rate_hz=frame_rate_hz)
+    if rpm is not None:
+        raise InputError(f"--rpm {rpm:g} is the disk's speed; the scene {name!r} has its own")
+    return make_scene(name, shape, seed, frame_rate_hz=frame_rate_hz)

@@ -1,0 +1,119 @@
+"""`spikecam scenes`: what there is to look at; pictures of it and films."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from spikecam_env.errors import InputError, unknown_name
+
+SHOWN_AT = 500
+"""Frame of which the sheet has pictures."""
+COLUMNS = 4
+FILM_FPS = 25
+
+
+@dataclass
+class Scenes:
+    """List the scenes, put pictures of them on a sheet, or film one in slow motion.
+
+    example:  spikecam scenes disk --film disk.mp4
+              spikecam scenes --out sheet.png
+    """
+
+    name: tyro.conf.Positional[str | None] = None
+    """A scene; default all."""
+    out: Path | None = None
+    """Write a picture (PNG) of the scene, or of all on one sheet."""
+    film: Path | None = None
+    """Write a film (.mp4 or .gif) of the scene's light."""
+    size: tuple[int, int] = (250, 400)
+    """Rows and columns."""
+    seed: int = 0
+    """Seed of what the scene leaves to chance; the scene `random` is another world with each."""
+    frames: int = 4000
+    """Length of the film in frames of the camera; 40 000 are a second."""
+    every: int = 32
+    """Camera frames from picture to picture: 32 is 50 times slower than life at 25 pictures a second."""
+
+    def run(self) -> None:
+        from scenes.catalogue import SCENES
+
+        if self.name not in (None, *SCENES):
+            raise unknown_name("scene", self.name, SCENES)
+        if min(self.size) < 8:
+            raise InputError(f"--size {self.size[0]} {self.size[1]}; at least 8 rows and 8 columns")
+        if self.film is not None:
+            self._write_film(self.film)
+        if self.out is not None:
+            self._write_sheet(self.out)
+        if self.film is None and self.out is None:
+            for name in (self.name,) if self.name else SCENES:
+                print(f"{name:10} {about(name)}")
+
+    def _write_film(self, path: Path) -> None:
+        from spikecam_env.cli.film import write_film, write_gif
+
+        if path.suffix.lower() not in (".mp4", ".gif"):
+            raise InputError(f"--film {path}: unknown file type {path.suffix!r}; use .mp4 or .gif")
+        if self.name is None:
+            raise InputError(f"which scene? spikecam scenes NAME --film {path}; `spikecam scenes` lists the names")
+        if self.frames < 1 or self.every < 1:
+            raise InputError(f"--frames {self.frames} --every {self.every}; both must be 1 or more")
+        at = range(0, self.frames, self.every)
+        write = write_gif if path.suffix.lower() == ".gif" else write_film
+        write(path, self._pictures(at), FILM_FPS, len(at))
+        slower = 40_000 / (FILM_FPS * self.every)
+        print(f"wrote {path}: {1e3 * self.frames / 40_000:g} ms of {self.name}, {slower:g} times slower than life")
+
+    def _pictures(self, at: range) -> Any:
+        """The light that the sensor gets at these frames, white the brightest hundredth of the first picture's."""
+        import numpy as np
+
+        from spikecam_env.cli.film import display
+
+        scene, white = self._scene(self.name), None
+        for frame in at:
+            light = scene.radiance(frame, frame + 1).at(frame)
+            white = white or _white(light)
+            rows, columns = (n // 2 * 2 for n in light.shape)
+            yield np.repeat(display(light[:rows, :columns], white)[..., None], 3, axis=2)
+
+    def _write_sheet(self, path: Path) -> None:
+        from tqdm import tqdm
+
+        from scenes.catalogue import SCENES
+        from spikecam_env.cli.film import Panel, sheet, write_picture
+
+        if path.suffix.lower() != ".png":
+            raise InputError(f"--out {path}: unknown file type {path.suffix!r}; use .png")
+        names = (self.name,) if self.name else SCENES
+        panels = []
+        for name in tqdm(names, desc="scenes", unit="scene", leave=False):
+            light = self._scene(name).truth(SHOWN_AT).radiance
+            panels.append(Panel(light / _white(light), name, about(name).partition(": ")[2]))
+        write_picture(path, sheet(panels, COLUMNS))
+        print(f"wrote {path}: {len(names)} scene{'s' if len(names) > 1 else ''}")
+
+    def _scene(self, name: str | None) -> Any:
+        from scenes.catalogue import make_scene
+
+        return make_scene(str(name), self.size, self.seed)
+
+
+def about(name: str) -> str:
+    """A scene's line: the first sentence of the file that it is in."""
+    from scenes.catalogue import SCENES
+
+    described = sys.modules[SCENES[name].__module__].__doc__ or ""
+    return described.splitlines()[0].partition(".  ")[0].rstrip(".")
+
+
+def _white(light: Any) -> float:
+    import numpy as np
+
+    return float(np.percentile(light, 99.5)) or 1.0

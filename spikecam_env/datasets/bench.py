@@ -1,0 +1,59 @@
+"""How fast a dataset is made, and where the time goes.
+
+spikecam bench dataset
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from dataclasses import replace
+from typing import Any
+
+from spikecam_env.datasets.build import Built, build
+from spikecam_env.datasets.plan import Plan, phm_n
+from spikecam_env.datasets.verify import verify
+
+ALONE = 2
+"""Scenes of the run in one process."""
+
+PARTS = ("scene", "noisy", "clean", "file", "truth", "digest", "start")
+
+
+def bench_dataset(plan: Plan | None = None, jobs: int | None = None) -> list[dict[str, Any]]:
+    """Make a dataset and verify it; default: the PHM-like scenes, 1000 frames each at 250 x 400, one process a core.
+
+    Columns: run, scenes, frames/s (wall clock, start of the processes included), processor time a frame [ms] (which
+    other work on the machine changes little; starting the processes not included), and the share of the workers' time
+    on each part: scene (light), noisy and clean (camera and twin), file (packing and writing), truth, digest (SHA-256),
+    start (making the scene, exposure, compiling or loading what is compiled).
+    Rows: one process (first scenes only), all processes, verify.
+    """
+    plan = phm_n() if plan is None else plan
+    jobs = (os.cpu_count() or 1) if jobs is None else jobs
+    few = replace(plan, entries=plan.entries[:ALONE])
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, part, workers in (("1 process", few, 1), (f"{jobs} processes", plan, jobs)):
+            out = f"{folder}/{workers}-{len(part.entries)}"
+            begin = time.perf_counter()
+            built = build(part, out, jobs=workers, progress=True)
+            rows.append(_row(name, part, time.perf_counter() - begin, built))
+        begin = time.perf_counter()
+        faults = verify(out, jobs=jobs)
+        rows.append(_row(f"verify: {len(faults)} faults", plan, time.perf_counter() - begin, None))
+    return rows
+
+
+def _row(name: str, plan: Plan, wall_s: float, built: Built | None) -> dict[str, Any]:
+    seconds = built.seconds if built else {}
+    total = sum(seconds.values())
+    frames = len(plan.entries) * plan.frames
+    return {
+        "run": name,
+        "scenes": len(plan.entries),
+        "frames/s": frames / wall_s,
+        "processor ms/frame": 1e3 * built.processor_s / frames if built else None,
+        **{part: f"{seconds[part] / total:.0%}" if part in seconds else None for part in PARTS},
+    }

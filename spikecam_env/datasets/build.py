@@ -1,0 +1,148 @@
+"""Making a dataset: what is not done yet, in this process, in several, or on a Ray cluster; the same bytes each way.
+
+A run may be killed at any time; the same call goes on where it was.  Files appear whole, and one that was not finished
+is made again from its first frame: a scene is seconds.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+
+from tqdm import tqdm
+
+from spikecam_env.datasets.manifest import NAME, Manifest
+from spikecam_env.datasets.plan import Entry, Plan
+from spikecam_env.datasets.processes import on_processes
+from spikecam_env.datasets.ray_cluster import on_ray
+from spikecam_env.datasets.renderer import AUTO, first_that_works
+from spikecam_env.datasets.write import Written, write_scene
+from spikecam_env.errors import InputError
+
+UNFINISHED = ".*.partial.*"
+"""Files that a killed run leaves behind (`spikecam_env.whole`)."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """What a run did: with which renderer, files made and files that were there, bytes of both; over all
+    workers, where the time went [s] and processor time [s]."""
+
+    renderer: str
+    made: int
+    kept: int
+    bytes: int
+    seconds: dict[str, float]
+    processor_s: float
+
+
+def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = None, progress: bool = False) -> Built:
+    """Make a dataset in `folder`, or go on with it.
+
+    jobs: worker processes; 1 works in this one.  ray: "local" for a cluster of `jobs` workers on this machine, or the
+    address of a running one, whose machines share `folder`.  progress: a bar over frames.
+    Errors: InputError if the folder holds anything else, or another run is at work in it.
+    """
+    if jobs < 1:
+        raise InputError(f"jobs is {jobs}; it must be 1 or more")
+    target = Path(folder).resolve()
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot use {target} as a folder for a dataset: {error.strerror}") from error
+    with _alone_in(target):
+        plan = _with_renderer(plan, target)
+        manifest = _begun(plan, target)
+        _clear_unfinished(target)
+        manifest.write(target)
+        try:
+            return _make_missing(plan, target, manifest, jobs, ray, progress)
+        finally:
+            _clear_unfinished(target)
+
+
+def _with_renderer(plan: Plan, folder: Path) -> Plan:
+    """The back-end that the dataset was begun with, else the best there is, where the choice is ours."""
+    if plan.renderer != AUTO:
+        return plan
+    begun = (folder / NAME).exists()
+    return replace(plan, renderer=Manifest.read(folder).settings["renderer"] if begun else first_that_works())
+
+
+def _begun(plan: Plan, folder: Path) -> Manifest:
+    asked = Manifest.of(plan)
+    if not (folder / NAME).exists():
+        if any(not path.match(UNFINISHED) for path in folder.iterdir()):
+            raise InputError(f"{folder} is not empty and holds no dataset; choose a new folder")
+        return asked
+    found = Manifest.read(folder)
+    if different := found.differences(asked):
+        raise InputError(
+            f"{folder} holds a dataset with other settings: {', '.join(different)}; "
+            "ask for the same to go on with it, or choose another folder"
+        )
+    return found.without_lost(folder)
+
+
+def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: str | None, progress: bool) -> Built:
+    done = {file["path"] for file in manifest.files if file["sha256"] is not None}
+    missing = tuple(entry for entry in plan.entries if entry.path not in done)
+    seconds: Counter[str] = Counter()
+    processor_s = 0.0
+    frames = plan.frames * len(plan.entries)
+    bar = tqdm(
+        total=frames, initial=plan.frames * len(done), desc=plan.kind, unit="frame", leave=False, disable=not progress
+    )
+    with bar:
+        for news in _at_work(plan, folder, missing, jobs, ray):
+            if isinstance(news, Written):
+                manifest = manifest.with_file(news)
+                manifest.write(folder)
+                seconds.update(news.seconds)
+                processor_s += news.processor_s
+            else:
+                bar.update(news)
+    return Built(
+        plan.renderer,
+        len(missing),
+        len(done),
+        sum(file["bytes"] for file in manifest.files),
+        dict(seconds),
+        processor_s,
+    )
+
+
+def _at_work(
+    plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, ray: str | None
+) -> Iterator[Written | int]:
+    """Files as they are done, in any order, and between them how many more frames are."""
+    if ray is not None:
+        return on_ray(plan, folder, entries, jobs, ray)
+    if jobs > 1:
+        return on_processes(plan, folder, entries, jobs)
+    return chain.from_iterable(write_scene(plan, entry, folder) for entry in entries)
+
+
+def _clear_unfinished(folder: Path) -> None:
+    for path in folder.rglob(UNFINISHED):
+        path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """A lock on the folder; the system lifts it when the process ends, however it ends."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InputError(f"another run is at work in {folder}; wait for it, or choose another folder") from error
+        yield
+    finally:
+        os.close(handle)

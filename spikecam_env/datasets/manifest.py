@@ -1,0 +1,87 @@
+"""`dataset.json`: a dataset's settings and scenes, with size and SHA-256 of every file that is done.
+
+A file counts only when it is listed here; so a run that was killed goes on with what is not listed.  Nothing in it
+says when, where or by how many processes the dataset was made.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from spikecam_env.datasets.plan import Entry, Plan
+from spikecam_env.datasets.write import Written
+from spikecam_env.errors import InputError
+from spikecam_env.version import __version__
+from spikecam_env.whole import write_text_whole
+
+NAME = "dataset.json"
+FORMAT = "spikecam-dataset/1"
+_STATE = {"bytes", "sha256"}
+_FILE_KEYS = {field.name for field in fields(Entry)} | _STATE
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """settings: what the scenes share.  files: one a scene; `bytes` and `sha256` are None until it is done."""
+
+    settings: dict[str, Any]
+    files: tuple[dict[str, Any], ...]
+
+    @classmethod
+    def of(cls, plan: Plan) -> Manifest:
+        """Of a dataset that is not begun."""
+        settings = {"package_version": __version__, **plan.settings()}
+        return cls(settings, tuple({**asdict(entry), "bytes": None, "sha256": None} for entry in plan.entries))
+
+    @classmethod
+    def read(cls, folder: Path) -> Manifest:
+        """Raises InputError where there is none, or it is none."""
+        path = folder / NAME
+        if not path.is_file():
+            raise InputError(f"{folder} is no dataset: there is no {NAME} in it")
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            found, manifest = data["format"], cls(data["settings"], tuple(data["files"]))
+            whole = all(set(file) == _FILE_KEYS for file in manifest.files)
+        except (ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{path} is damaged ({error!r}); make the dataset again in an empty folder") from error
+        if found != FORMAT or not whole:
+            raise InputError(f"{path} is no manifest of a dataset: format {found!r}, need {FORMAT!r}")
+        return manifest
+
+    def write(self, folder: Path) -> None:
+        """The file appears whole."""
+        data = {"format": FORMAT, "settings": self.settings, "files": self.files}
+        write_text_whole(folder / NAME, json.dumps(data, indent=1) + "\n")
+
+    def with_file(self, written: Written) -> Manifest:
+        """With a file that is done."""
+        done = {"bytes": written.size, "sha256": written.sha256}
+        files = (file | done if file["path"] == written.entry.path else file for file in self.files)
+        return Manifest(self.settings, tuple(files))
+
+    def without_lost(self, folder: Path) -> Manifest:
+        """Files that have gone, or have another size than when they were done, are not done."""
+        lost = {"bytes": None, "sha256": None}
+        return Manifest(self.settings, tuple(f if _is_there(folder, f) else f | lost for f in self.files))
+
+    def differences(self, other: Manifest) -> list[str]:
+        """Where settings and scenes differ, as "frames 1000 (asked: 500)"."""
+        ours, theirs = self._asked(), other._asked()
+        return [
+            name if name in ("model", "scenes") else f"{name} {ours.get(name)} (asked: {theirs[name]})"
+            for name in theirs
+            if ours.get(name) != theirs[name]
+        ]
+
+    def _asked(self) -> dict[str, Any]:
+        scenes = [{k: v for k, v in file.items() if k not in _STATE} for file in self.files]
+        return {**self.settings, "scenes": scenes}
+
+
+def _is_there(folder: Path, file: dict[str, Any]) -> bool:
+    path = folder / file["path"]
+    return file["sha256"] is not None and path.is_file() and path.stat().st_size == file["bytes"]

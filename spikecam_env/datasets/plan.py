@@ -1,0 +1,134 @@
+"""What a dataset is to hold.  Every byte of it follows from its plan.
+
+SPIFT_N: random scenes to train on, and others to test.  PHM_N: the ten well-designed scenes, to test.
+Source: the paper, section "Datasets": 100 random scenes, 10 well-designed ones; ours are of our own making.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from scenes.catalogue import SCENES, make_scene
+from scenes.protocol import Scene
+from scenes.renderers.choose import BACKENDS
+from spikecam_env.datasets.renderer import AUTO, renderer_of_process
+from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor.sensor import checked_frames, checked_seed, checked_shape
+
+RANDOM = "random"
+"""The scene of the catalogue that its seed draws."""
+
+PHM = ("ball", "cook", "dice", "doll", "fan", "fly", "hand", "jump", "poker", "top")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One scene, and the camera it is recorded with.
+
+    path        of its file in the dataset's folder; its first part is the split, "train" or "test"
+    scene       its name in `scenes.catalogue.SCENES`
+    scene_seed  of what the scene leaves to chance
+    unit_seed   of the camera: its fixed pattern, starting phases and temporal noise
+    """
+
+    path: str
+    scene: str
+    scene_seed: int
+    unit_seed: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A dataset: the scenes, and what they share.
+
+    shape          (rows, columns)
+    frames         of each recording
+    truth_every    frames between ground truths, at frames 0, truth_every, ...; 0: none
+    mean_interval  between spikes, over the picture [frames]: the exposure
+    renderer       back-end that draws: one of `scenes.renderers.choose.BACKENDS`, or "auto" for the best there is
+    Errors: InputError for no entries, an unknown scene, and numbers that are not positive.
+    """
+
+    kind: str
+    entries: tuple[Entry, ...]
+    shape: tuple[int, int] = (250, 400)
+    frames: int = 1000
+    seed: int = 0
+    truth_every: int = 100
+    mean_interval: float = 10.0
+    model: SensorModel = field(default_factory=SensorModel.preset)
+    renderer: str = AUTO
+
+    def __post_init__(self) -> None:
+        if not self.entries:
+            raise InputError(f"a {self.kind} dataset of no scenes; ask for 1 or more")
+        for entry in self.entries:
+            if entry.scene not in SCENES:
+                raise unknown_name("scene", entry.scene, SCENES)
+        if not (np.isfinite(self.mean_interval) and self.mean_interval >= 1):
+            raise InputError(f"mean_interval is {self.mean_interval}; it must be 1 frame or more, e.g. 10")
+        if self.renderer not in (AUTO, *BACKENDS):
+            raise unknown_name("renderer", self.renderer, (AUTO, *BACKENDS))
+        checked_seed(self.truth_every, "truth_every")
+        checked_seed(self.seed)
+        checked_frames(self.frames)
+        checked_shape(self.shape)
+
+    def scene(self, entry: Entry) -> Scene:
+        """The scene of an entry."""
+        return make_scene(
+            entry.scene,
+            shape=self.shape,
+            seed=entry.scene_seed,
+            mean_interval=self.mean_interval,
+            frame_rate_hz=self.model.frame_rate_hz,
+            renderer=renderer_of_process(self.renderer),
+        )
+
+    def settings(self) -> dict[str, Any]:
+        """What the scenes share, as plain values."""
+        return {
+            "kind": self.kind,
+            "shape": list(self.shape),
+            "frames": self.frames,
+            "seed": self.seed,
+            "truth_every": self.truth_every,
+            "mean_interval": self.mean_interval,
+            "model": self.model.toml(),
+            "renderer": self.renderer,
+        }
+
+
+def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any) -> Plan:
+    """Random scenes: `train` of them to train on, `test` others.  settings: fields of `Plan`.
+
+    A scene depends on the seed, its split and its number, not on how many there are.
+    """
+    counts = {"train": checked_seed(train, "train"), "test": checked_seed(test, "test")}
+    checked_seed(seed)
+    entries = tuple(
+        Entry(f"{split}/{number:03}.h5", RANDOM, *_seeds(seed, split, number))
+        for split, count in counts.items()
+        for number in range(count)
+    )
+    return Plan("spift-n", entries, seed=seed, **settings)
+
+
+def phm_n(*, scenes: tuple[str, ...] = PHM, seed: int = 0, **settings: Any) -> Plan:
+    """Well-designed scenes, each with a camera of its own.  settings: fields of `Plan`."""
+    checked_seed(seed)
+    for name in scenes:
+        if scenes.count(name) > 1:
+            raise InputError(f"scene {name!r} is listed {scenes.count(name)} times; list it once")
+    entries = tuple(Entry(f"test/{name}.h5", name, seed, _seeds(seed, name, 0)[1]) for name in scenes)
+    return Plan("phm-n", entries, seed=seed, **settings)
+
+
+def _seeds(seed: int, purpose: str, number: int) -> tuple[int, int]:
+    """Of a scene and of its camera."""
+    rng = np.random.default_rng([seed, *purpose.encode(), number])
+    return int(rng.integers(2**31)), int(rng.integers(2**31))

@@ -1,0 +1,71 @@
+"""A window of a scene's file, cut to a crop: noisy spikes about a frame, and the noise-free twin's interval there.
+
+What is read: of the noisy stream the frames of the window; of the clean one as many frames on both sides, in steps that
+double, as it takes until every pixel of the crop has a spike before and after, or the stream ends.  Both by chunks of
+32 frames x 16 rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.errors import InputError
+from spikecam_env.streams import isi_plane
+from spikecam_env.streams.hdf5 import CHUNK_FRAMES, open_recording, read_crop
+
+FIRST_REACH = 32
+"""Frames of the clean stream read on either side at first."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """spikes (2 reach + 1, h, w) uint8, noisy; clean_isi (h, w) float32, normalised: 1 / ISI in (0, 1]."""
+
+    spikes: NDArray[np.uint8]
+    clean_isi: NDArray[np.float32]
+
+
+def read_window(
+    path: str | Path, frame: int, *, reach: int = 20, rows: slice | None = None, columns: slice | None = None
+) -> Window:
+    """Frames frame - reach .. frame + reach of the noisy stream, and the clean ISI plane at `frame`, of a crop.
+
+    rows, columns: slices with start and stop; None for all.  The plane is
+    `isi_plane(clean, frame, normalised=True)` of the whole clean stream, to the bit.
+    Errors: InputError if the window or the crop leaves the recording, or it has no clean twin.
+    """
+    with open_recording(path) as file:
+        if "clean" not in file:
+            raise InputError(f"{path} holds no clean twin; make it with `spikecam dataset`")
+        height, width = int(file.attrs["height"]), int(file.attrs["width"])
+        across, along = _inside(rows, height, "rows", path), _inside(columns, width, "columns", path)
+        window = _inside(slice(frame - reach, frame + reach + 1), len(file["spikes"]), "frames", path)
+        spikes = read_crop(file["spikes"], width, window, across, along)
+        return Window(spikes, _clean_plane(file["clean"], width, frame, across, along))
+
+
+def _clean_plane(stream: h5py.Dataset, width: int, frame: int, rows: slice, columns: slice) -> NDArray[np.float32]:
+    reach = FIRST_REACH
+    while True:
+        first = max(0, (frame - reach) // CHUNK_FRAMES * CHUNK_FRAMES)
+        stop = min(len(stream), -(-(frame + reach) // CHUNK_FRAMES) * CHUNK_FRAMES)
+        spikes = read_crop(stream, width, slice(first, stop), rows, columns)
+        at = frame - first
+        starts = first == 0 or spikes[: at + 1].any(axis=0).all()
+        ends = stop == len(stream) or spikes[at + 1 :].any(axis=0).all()
+        if starts and ends:
+            return isi_plane(spikes, at, normalised=True)
+        reach *= 2
+
+
+def _inside(part: slice | None, size: int, name: str, path: str | Path) -> slice:
+    if part is None:
+        return slice(0, size)
+    if not 0 <= part.start < part.stop <= size:
+        raise InputError(f"{name} {part.start} to {part.stop} asked of {path}, which has {size}")
+    return slice(part.start, part.stop)

@@ -1,0 +1,60 @@
+"""Threads for compiled code that lets others run: our own, not numba's.
+
+numba's OpenMP layer aborts in a process forked after its first use, which is how vector environments start.  How many
+there are is NUMBA_NUM_THREADS, by default the processors.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+
+from numba import config
+
+_LIBC = ctypes.PyDLL(None) if sys.platform == "linux" else None
+
+
+def as_many(threads: int | None, most: int) -> int:
+    """How many threads to share work among: as many as asked for (default NUMBA_NUM_THREADS), at most `most`."""
+    asked = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
+    return max(1, min(asked, most))
+
+
+def together(parts: list[Callable[[], None]], *, shared: bool = False) -> None:
+    """Run parts at once, the first on this thread.
+
+    shared: each part takes what is left of the whole, so one that has not begun when the first is done need not.
+    """
+    others = []
+    if len(parts) > 1:
+        here = _processor()
+        others = [_pool(os.getpid()).submit(_elsewhere, here, part) for part in parts[1:]]
+    parts[0]()
+    for other in others:
+        if not (shared and other.cancel()):
+            other.result()
+
+
+def _elsewhere(taken: int, work: Callable[[], None]) -> None:
+    """Run work on another processor than the one taken: with few processors Linux wakes a thread on its waker's."""
+    if taken >= 0 and _processor() == taken:
+        allowed = os.sched_getaffinity(0)
+        if len(allowed) > 1:
+            os.sched_setaffinity(0, allowed - {taken})
+            os.sched_setaffinity(0, allowed)
+    work()
+
+
+def _processor() -> int:
+    """Which processor this thread is on; -1 where that cannot be told."""
+    return _LIBC.sched_getcpu() if _LIBC is not None else -1
+
+
+@lru_cache(maxsize=1)
+def _pool(process: int) -> ThreadPoolExecutor:
+    """Threads do not survive a fork, hence one pool a process; it starts them as they are needed."""
+    return ThreadPoolExecutor(max_workers=64, thread_name_prefix="spikecam")

@@ -1,0 +1,85 @@
+"""The torch dataset: items that follow from seed, epoch and index, equal to a naive reading."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from torch.utils.data import DataLoader
+
+from denoiser.dataset import SpikeWindows
+from denoiser.pairs import WARM_UP
+from spikecam_env.datasets import Entry, Plan, build
+from spikecam_env.errors import InputError
+from spikecam_env.streams import isi_plane, read_recording
+
+FRAMES = 200
+PLAN = Plan(
+    "small",
+    (Entry("train/a.h5", "collage", 1, 2), Entry("train/b.h5", "disk", 3, 4), Entry("test/a.h5", "collage", 5, 6)),
+    shape=(32, 48),
+    frames=FRAMES,
+    truth_every=0,
+    renderer="embree",
+)
+
+
+@pytest.fixture(scope="module")
+def folder():
+    with tempfile.TemporaryDirectory() as made:
+        build(PLAN, made)
+        yield Path(made)
+
+
+def test_items_equal_naive_reading(folder: Path) -> None:
+    data = SpikeWindows(folder, crop=(16, 24), stride=7)
+    streams = {
+        scene: [read_recording(path, stream=s).spikes for s in ("spikes", "clean")]
+        for scene, path in enumerate(data.paths)
+    }
+    assert len(data) == 2 * len(range(WARM_UP + 20, FRAMES - 20, 7))
+    for index in range(0, len(data), 3):
+        item = data[index]
+        noisy, clean = streams[item["scene"]]
+        crop = np.s_[item["row"] : item["row"] + 16, item["column"] : item["column"] + 24]
+        frames = slice(item["frame"] - 20, item["frame"] + 21)
+        np.testing.assert_array_equal(item["spikes"], noisy[(frames, *crop)])
+        np.testing.assert_array_equal(item["clean_isi"], isi_plane(clean, item["frame"], normalised=True)[crop])
+
+
+def test_items_follow_from_seed_epoch_and_index(folder: Path) -> None:
+    def corners(data: SpikeWindows) -> list[tuple[int, int]]:
+        return [(data[i]["row"], data[i]["column"]) for i in range(0, len(data), 20)]
+
+    data, same = SpikeWindows(folder, crop=(8, 8)), SpikeWindows(folder, crop=(8, 8))
+    assert corners(data) == corners(same) != corners(SpikeWindows(folder, crop=(8, 8), seed=1))
+    same.epoch = 1
+    assert corners(data) != corners(same)
+
+
+def test_loader_processes_give_the_same_items(folder: Path) -> None:
+    data = SpikeWindows(folder, "test", crop=(16, 16), stride=16)
+    here = [data[i] for i in range(len(data))]
+    there = list(DataLoader(data, batch_size=None, num_workers=2))
+    assert len(there) == len(here) > 3
+    for a, b in zip(here, there, strict=True):
+        assert all(np.array_equal(a[name], b[name]) for name in ("spikes", "clean_isi", "frame", "row", "column"))
+
+
+def test_the_whole_picture_without_a_crop(folder: Path) -> None:
+    item = SpikeWindows(folder, "test", crop=None, reach=3)[0]
+    assert item["spikes"].shape == (7, 32, 48) and item["clean_isi"].shape == (32, 48)
+    assert (item["row"], item["column"], item["frame"]) == (0, 0, WARM_UP + 3)
+
+
+def test_datasets_that_will_not_do_are_refused(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no scenes of split 'valid'; it has test, train"):
+        SpikeWindows(folder, "valid")
+    with pytest.raises(InputError, match=r"crop \(64, 64\)"):
+        SpikeWindows(folder)
+    with pytest.raises(InputError, match="no window of 161 after the first 64"):
+        SpikeWindows(folder, crop=None, reach=80)
+    with pytest.raises(InputError, match="no dataset"):
+        SpikeWindows(tmp_path)

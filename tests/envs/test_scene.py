@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env, data_equivalence
+
+from scenes.catalogue import SCENES
+from spikecam_env.envs.registration import ENVIRONMENTS, register
+from spikecam_env.envs.scene import SceneEnv
+from spikecam_env.errors import InputError
+
+register()
+SMALL: dict[str, Any] = {"shape": (24, 32), "frames_per_step": 8}
+NAMED = sorted(name for name, (_, options) in ENVIRONMENTS.items() if options)
+
+
+def make(name: str = "spikecam_env/Scene-v0", **options: Any) -> SceneEnv:
+    env = gymnasium.make(name, **{**SMALL, **options}).unwrapped
+    assert isinstance(env, SceneEnv)
+    return env
+
+
+def test_every_scene_of_the_catalogue_has_an_id() -> None:
+    assert {ENVIRONMENTS[name][1]["scene"] for name in NAMED} | {"random"} == set(SCENES)
+
+
+@pytest.mark.parametrize("scene", ["collage", "dice"])
+def test_check_env_is_clean(scene: str) -> None:
+    """Without its render check, which `test_rotating_disk` has: it makes the environment anew again and again."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(make(scene=scene, ground_truth=True), skip_render_check=True)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_every_id_starts_with_its_target_in_view_and_steps(name: str) -> None:
+    env = make(name)
+    observation, info = env.reset(seed=3)
+    assert observation in env.observation_space and 0.01 < observation.mean() < 0.6
+    assert -1 <= info["target"][0] <= 33 and -1 <= info["target"][1] <= 25
+    observation, reward, *_ = env.step(np.array([0.3, -0.2], np.float32))
+    assert observation in env.observation_space and -1 < reward <= 1
+
+
+@pytest.mark.parametrize("name", ["spikecam_env/Collage-v0", "spikecam_env/Fan-v0"])
+def test_same_seed_and_actions_give_the_same_bits(name: str) -> None:
+    def rollout(env: SceneEnv, seed: int) -> list[Any]:
+        actions = np.random.default_rng(0).uniform(-1, 1, (3, 2))
+        return [env.reset(seed=seed), *(env.step(action) for action in actions)]
+
+    env = make(name, ground_truth=True)
+    first, other, again = rollout(env, 3), rollout(env, 4), rollout(env, 3)
+    assert data_equivalence(first, again, exact=True)
+    assert data_equivalence(first, rollout(make(name, ground_truth=True), 3), exact=True)
+    assert not data_equivalence(first, other, exact=True)
+
+
+def test_target_is_where_the_truth_sees_it() -> None:
+    """The middle of the pixels of a shape that stands alone is where the shape's middle is said to be."""
+    env = make("spikecam_env/Disk-v0", shape=(100, 100), frames_per_step=2, ground_truth=True)
+    for frame in (0, 12_345):
+        _, info = env.reset(seed=0, options={"start_frame": frame, "offset": (2.0, -1.0)})
+        rows, columns = np.nonzero(info["object_id"])
+        seen = np.array([columns.mean(), rows.mean()])
+        print(f"target {info['target']}, seen {seen}")
+        assert np.abs(seen - info["target"]).max() < 0.1
+
+
+def test_bodies_in_space_are_seen_where_they_are_said_to_be() -> None:
+    """Dice are convex: the middle of a die's pixels is within a quarter of its size of its projected middle."""
+    env = make("spikecam_env/Dice-v0", shape=(60, 96), frames_per_step=1, ground_truth=True)
+    _, info = env.reset(seed=1, options={"offset": (0.0, 0.0)})
+    scene: Any = env.scene
+    inside = 0
+    for name, (x, y) in scene.places(0.5).items():
+        if 8 < x < 87 and 8 < y < 51:
+            around = info["object_id"][int(y) - 1 : int(y) + 3, int(x) - 1 : int(x) + 3]
+            assert (around > 0).all(), name
+            inside += 1
+    assert inside >= 1
+
+
+def test_following_beats_standing_still() -> None:
+    def mean_reward(follow: bool) -> float:
+        env = make("spikecam_env/Disk-v0", frames_per_step=40)
+        _, info = env.reset(seed=5)
+        rewards = []
+        for _ in range(40):
+            error = info["target"] - [15.5, 11.5]
+            _, reward, _, _, info = env.step(np.clip(error, -1, 1) if follow else np.zeros(2))
+            rewards.append(reward)
+        return float(np.mean(rewards))
+
+    following, still = mean_reward(True), mean_reward(False)
+    print(f"mean reward: following {following:.3f}, still {still:.3f}")
+    assert following > 0.9 > still
+
+
+def test_episode_ends_when_the_target_leaves() -> None:
+    env = make("spikecam_env/Disk-v0", max_gaze_rate_px_s=40_000.0)
+    env.reset(seed=0)
+    ends = [env.step(np.array([1.0, 0.0]))[2] for _ in range(5)]
+    assert ends[0] is False and ends[-1] is True
+
+
+def test_make_vec_gives_each_camera_its_own_world() -> None:
+    vector = gymnasium.make_vec("spikecam_env/Scene-v0", num_envs=2, vectorization_mode="sync", **SMALL)
+    observation, _ = vector.reset(seed=5)
+    assert observation.shape == (2, 8, 24, 32)
+    np.testing.assert_array_equal(observation[1], make().reset(seed=6)[0])
+    vector.step(vector.action_space.sample())
+    vector.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"scene": "dise"}, "unknown scene 'dise'"),
+        ({"scene": "disk", "target": "fly"}, "unknown target .*'fly'"),
+        ({"start_offset_px": -1.0}, "start_offset_px is -1"),
+        ({"scene": "disk", "mean_interval": 0.5}, "mean_interval is 0.5"),
+    ],
+)
+def test_bad_options_are_named(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        SceneEnv(**{**SMALL, **options})
+
+
+def test_unknown_option_of_reset_is_named() -> None:
+    with pytest.raises(InputError, match="unknown option of reset 'center'"):
+        make("spikecam_env/Disk-v0").reset(options={"center": (1, 2)})
+    with pytest.raises(InputError, match="unknown option of reset 'seed'"):
+        make("spikecam_env/Disk-v0").reset(options={"seed": 2})

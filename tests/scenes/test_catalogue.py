@@ -1,0 +1,56 @@
+"""The catalogue: every scene is lit, moves, and its flow carries it; random worlds follow from their seed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenes.catalogue import SCENES, make_scene, random_world
+from scenes.flow import flow_error
+from scenes.protocol import Scene
+from scenes.renderers.embree import Embree
+from spikecam_env.errors import InputError
+
+SHAPE = (60, 96)
+FINEST = 1.0
+"""Pixels of smoothing at this small shape, where letters are six pixels high; docs/scenes.md: 250 x 400 with less."""
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Embree:
+    return Embree()
+
+
+def test_the_ten_scenes_of_phm_are_there() -> None:
+    assert {"ball", "cook", "dice", "doll", "fan", "fly", "hand", "jump", "poker", "top"} <= set(SCENES)
+    assert {"disk", "train", "car", "text", "random"} <= set(SCENES)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_is_lit_and_moves_and_its_flow_carries_it(name: str, renderer: Embree) -> None:
+    scene = make_scene(name, SHAPE, mean_interval=8.0, renderer=renderer)
+    assert isinstance(scene, Scene) and scene.shape == SHAPE
+    keys = scene.radiance(100, 104)
+    assert keys.radiance.shape[1:] == SHAPE
+    truth = scene.truth(100.5)
+    interval, contrast = 1 / keys.radiance.mean(), truth.radiance.std() / truth.radiance.mean()
+    fastest = float(np.linalg.norm(truth.flow, axis=-1).max())
+    error, share = flow_error(scene, 100.5, smoothing=FINEST)
+    print(
+        f"{name}: mean interval {interval:.1f} frames, contrast {contrast:.2f}, fastest {fastest:.3f} pixels/frame; "
+        f"flow {100 * error:.2f} % of {100 * share:.0f} %"
+    )
+    assert 5 < interval < 13  # metered at other frames, so not exactly 8
+    assert contrast > 0.1 and fastest > 0.005
+    assert error < 0.02 and share > (0.2 if name == "collage" else 0.5)  # the collage's layers are small and fast
+
+
+def test_a_random_world_follows_from_its_seed(renderer: Embree) -> None:
+    first, again, other = (random_world(seed, (30, 48), renderer=renderer).truth(3.5).radiance for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_an_unknown_scene_is_named_with_those_there_are() -> None:
+    with pytest.raises(InputError, match="unknown scene 'fun'; choose one of ball, car"):
+        make_scene("fun")

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from scenes import Gaze, Scene, VideoScene
+from spikecam_env.errors import InputError
+
+
+def steps(pictures: int = 4, shape: tuple[int, int] = (6, 8)) -> np.ndarray:
+    """Pictures of one grey each: 0, 51, 102, 153."""
+    return np.broadcast_to(51 * np.arange(pictures, dtype=np.uint8)[:, None, None], (pictures, *shape)).copy()
+
+
+def test_light_is_linear_radiance_between_dark_and_bright() -> None:
+    scene = VideoScene(steps(), 1000.0, light=(0.1, 0.9))
+    keys = scene.radiance(0, 120)
+    np.testing.assert_array_equal(keys.frame, [0, 40, 80, 120])
+    expected = 0.1 + 0.8 * (np.arange(4) / 5) ** 2.2
+    np.testing.assert_allclose(keys.radiance.mean(axis=(1, 2)), expected, rtol=1e-3)
+    assert isinstance(scene, Scene)
+
+
+def test_colour_is_luminance_of_linear_light() -> None:
+    red = np.zeros((2, 4, 4, 3), np.uint8)
+    red[..., 0] = 255
+    np.testing.assert_allclose(VideoScene(red, 1000.0, light=(0, 1)).truth(0).radiance, 0.2126, rtol=1e-3)
+
+
+def test_floats_are_light_and_gamma_1_leaves_it() -> None:
+    film = np.stack([np.full((4, 4), 0.25), np.full((4, 4), 0.75)])
+    scene = VideoScene(film, 500.0, gamma=1.0, light=(0.0, 1.0))
+    np.testing.assert_allclose(scene.truth(40.0).radiance, 0.5, rtol=1e-3)
+
+
+def test_it_plays_forth_and_back_without_end() -> None:
+    scene = VideoScene(steps(), 1000.0)
+    for frame in (0, 40, 90, 119.5):
+        here = scene.truth(frame).radiance
+        np.testing.assert_allclose(scene.truth(240 - frame).radiance, here, rtol=1e-3)
+        np.testing.assert_allclose(scene.truth(240_000 + frame).radiance, here, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("rate", "interval"), [(40_000.0, 1), (1000.0, 40), (900.0, 44), (30.0, 64), (90_000.0, 1)])
+def test_keys_are_whole_frames_apart_whatever_the_rate(rate: float, interval: int) -> None:
+    frame = VideoScene(steps(), rate).radiance(0, 300).frame
+    assert (np.diff(frame) == interval).all() and frame[0] == 0 and frame[-1] >= 300
+
+
+def test_the_middle_of_the_film_fills_the_picture_by_area() -> None:
+    film = np.zeros((2, 40, 100), np.uint8)
+    film[:, :, 30:50] = 255
+    seen = VideoScene(film, 1000.0, shape=(4, 4), light=(0.0, 1.0)).truth(0).radiance
+    np.testing.assert_allclose(seen, np.tile([1.0, 1.0, 0.0, 0.0], (4, 1)), atol=1e-3)
+
+
+def test_gaze_shifts_the_picture_and_mirrors_it_beyond_the_edge() -> None:
+    film = np.tile(np.arange(8, dtype=np.uint8) * 30, (2, 6, 1))
+    scene = VideoScene(film, 1000.0)
+    still, turned = scene.truth(0).radiance, scene.truth(0, Gaze.fixed(2.0, 0.0)).radiance
+    np.testing.assert_allclose(turned[:, :-2], still[:, 2:], rtol=1e-5)
+    np.testing.assert_allclose(turned[:, -2:], still[:, :-3:-1], rtol=1e-5)
+
+
+def test_truth_says_that_flow_is_unknown() -> None:
+    truth = VideoScene(steps(), 1000.0).truth(5)
+    assert np.isnan(truth.flow).all() and truth.flow.shape == (6, 8, 2)
+    assert not truth.object_id.any() and truth.depth is None
+
+
+def test_a_file_reads_as_its_pictures(tmp_path: Path) -> None:
+    path = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 500.0, (32, 24))
+    for grey in (60, 120, 180):
+        writer.write(np.full((24, 32, 3), grey, np.uint8))
+    writer.release()
+    scene = VideoScene(path, light=(0.0, 1.0))
+    assert scene.shape == (24, 32) and scene.frames_per_picture == 80
+    for i, grey in enumerate((60, 120, 180)):
+        np.testing.assert_allclose(scene.truth(80 * i).radiance, (grey / 255) ** 2.2, rtol=0.05)
+    assert VideoScene(path, most_pictures=2, shape=(12, 12)).shape == (12, 12)
+
+
+@pytest.mark.parametrize(
+    ("film", "options", "message"),
+    [
+        (steps(), {}, "film_rate_hz is None"),
+        (steps(1), {"film_rate_hz": 9.0}, "T of 2 or more"),
+        (np.zeros((3, 4, 4, 2), np.uint8), {"film_rate_hz": 9.0}, "it must be"),
+        (np.zeros((3, 4, 4), np.int32), {"film_rate_hz": 9.0}, "int32"),
+        (np.full((3, 4, 4), 2.0), {"film_rate_hz": 9.0}, "floats must lie"),
+        (steps(), {"film_rate_hz": 9.0, "gamma": 0.0}, "gamma is 0"),
+        (steps(), {"film_rate_hz": 9.0, "light": (1.0, 0.0)}, "light is"),
+        (steps(), {"film_rate_hz": 9.0, "most_pictures": 1}, "most_pictures is 1"),
+        ("no such film.mp4", {}, "there is no film"),
+        (__file__, {}, "holds 0 pictures"),
+    ],
+)
+def test_bad_films_are_named(film, options: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        VideoScene(film, **options)
