@@ -19,6 +19,7 @@ from spikecam_env.cli.denoise import Denoise
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.evaluate import Evaluate
+from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
@@ -44,6 +45,7 @@ COMMANDS: dict[str, Any] = {
     "calibrate": Calibrate,
     "campaign": Campaign,
     "diagnose": Diagnose,
+    "ladder": Ladder,
     "blind-trial": BlindTrial,
     "effects": Effects,
     "bench": Bench,

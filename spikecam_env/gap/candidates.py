@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from spikecam_env.errors import unknown_name
-from spikecam_env.gap.world import Shown
+from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 
 Needs = Callable[[Sequence[Shown]], "str | None"]
@@ -61,6 +61,10 @@ def _steady(shown: Sequence[Shown]) -> str | None:
     )
 
 
+def _even(shown: Sequence[Shown]) -> str | None:
+    return None if any(s.kind in KNOWN for s in shown) else "flats: a pattern cannot be told from an unknown scene"
+
+
 _FIELD = "flats at several levels beside a picture with bright and dark rows"
 _SECOND = "flats at a second V_d"
 
@@ -97,13 +101,13 @@ CANDIDATES: dict[str, Candidate] = {
     "dark_current_spread": Candidate("dark", ("sigma_pA",), needs=_dark),
     "dark_current_tail": Candidate("dark", ("sigma",), needs=_dark),
     "hot_pixels": Candidate("dark", ("fraction", "mean_pA"), {"mean_pA": (3.0,)}, needs=_dark),
-    "dead_pixels": Candidate("defects", ("fraction",), needs=_steady),
-    "conversion_gain_spread": Candidate("pattern", ("sigma",), needs=_steady),
-    "capacitor_spread": Candidate("pattern", ("sigma_fF",), needs=_steady, experiment=_SECOND),
-    "bias_voltage_spread": Candidate("pattern", ("sigma_V",), needs=_steady, experiment=_SECOND),
-    "row_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_steady),
-    "column_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_steady),
-    "vignetting": Candidate("optics", ("falloff",), needs=_steady),
+    "dead_pixels": Candidate("defects", ("fraction",), needs=_even),
+    "conversion_gain_spread": Candidate("pattern", ("sigma",), needs=_even),
+    "capacitor_spread": Candidate("pattern", ("sigma_fF",), needs=_even, experiment=_SECOND),
+    "bias_voltage_spread": Candidate("pattern", ("sigma_V",), needs=_even, experiment=_SECOND),
+    "row_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_even),
+    "column_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_even),
+    "vignetting": Candidate("optics", ("falloff",), needs=_even),
     "optical_blur": Candidate("optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
     "crosstalk": Candidate("coupling", ("kick",), needs=_steady),
     "blooming": Candidate("coupling", ("share",), needs=_bright),

@@ -10,11 +10,11 @@ import numpy as np
 
 from spikecam_env.gap.observe import Observation
 from spikecam_env.gap.refit import BaseFit, measured_base, within
+from spikecam_env.gap.scene import simulate_seen
 from spikecam_env.gap.statistics import Key, bank, pattern_bank
 from spikecam_env.gap.statistics.moving import Film, films
 from spikecam_env.gap.statistics.reading import Reading
-from spikecam_env.gap.twin import simulate
-from spikecam_env.gap.world import Shown
+from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import SensorModel
 
 
@@ -31,6 +31,11 @@ class Case:
     seed: int
     jobs: int = 1
     frame_rate_hz: float = 40_000.0
+
+    @property
+    def scenes_only(self) -> bool:
+        """Whether no light is known: response and dark level cannot be told from the scene."""
+        return not any(c.kind in KNOWN for c in self.conditions)
 
 
 @dataclass(frozen=True)
@@ -77,15 +82,16 @@ def twins(
 def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None) -> Twin:
     which = range(len(case.conditions)) if only is None else only
     conditions = [case.conditions[i] for i in which]
-    observations = simulate(model, base, conditions, case.shape, seed, which)
+    seen = [case.observations[i] for i in which]
+    observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which)
     own = measured_base(observations, conditions) if rests_on(case) <= set(which) else base
     return Twin(bank(Reading(observations, conditions, own, case.films)), own)
 
 
 def rests_on(case: Case) -> set[int]:
-    """Recordings that the base refit rests on."""
-    still = ("dark", "flat", "picture")
-    return {i for i, c in enumerate(case.conditions) if c.kind in still}
+    """Recordings that the base refit rests on: of known light, or where there is none, of unknown scenes."""
+    known = {i for i, c in enumerate(case.conditions) if c.kind in KNOWN}
+    return known or {i for i, c in enumerate(case.conditions) if c.kind == "unknown"}
 
 
 def settled(model: SensorModel, used: BaseFit, measured: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:

@@ -29,7 +29,9 @@ from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, judged
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.fit import Fit, confirmed, fit, gain, rejoined
 from spikecam_env.gap.floor import floor_of_halves
+from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import Missing, missing
+from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
 from spikecam_env.gap.refit import BaseFit, within
@@ -38,7 +40,7 @@ from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_
 from spikecam_env.gap.structure import structure
 from spikecam_env.gap.templates import Screened, Templates, bounds, load, model_null, screen
 from spikecam_env.gap.words import sentence
-from spikecam_env.gap.world import observed, shown
+from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -105,7 +107,19 @@ def diagnose(
     timed = _stages(stages, progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     assumed = model if isinstance(model, SensorModel) else SensorModel.load(model)
+    assumed = replace(assumed, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(assumed, candidates, exclude)
+    asked = {
+        "model_name": assumed.name if isinstance(model, SensorModel) else str(model),
+        "candidates": None if candidates is None else tuple(candidates),
+        "exclude": tuple(exclude),
+        "stages": stages,
+    }
+    if not any(r.spikes for r in measured.recordings):
+        with timed("maps"):
+            found = diagnose_maps(measured, assumed, candidates=candidates, exclude=exclude, seed=seed, jobs=jobs)
+        found = replace(found, **asked)  # type: ignore[arg-type]
+        return replace(found, sentence=sentence(found))
     with timed("read"):
         case = read_case(measured, seed, jobs)
     with timed("audit"):
@@ -123,6 +137,8 @@ def diagnose(
     rounds: list[Round] = []
     if adjusted(deviates(null, values)).min() < ALARM:
         with timed("candidates"):
+            if case.scenes_only:
+                templates = templates or own_templates(case, start, null, names)
             rounds = search(case, start, null, values, names, templates or load())
     with timed("verdict"):
         found = concluded(
@@ -140,11 +156,8 @@ def diagnose(
         found,
         gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
-        model_name=assumed.name if isinstance(model, SensorModel) else str(model),
-        candidates=None if candidates is None else tuple(candidates),
-        exclude=tuple(exclude),
         evidence=evidence,
-        stages=stages,
+        **asked,  # type: ignore[arg-type]
     )
     return replace(found, sentence=sentence(found))
 
@@ -158,20 +171,30 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
     kept = [i for i in kept if conditions[i].v_d == common]
     part = replace(campaign, recordings=tuple(campaign.recordings[i] for i in kept))
     conditions = [conditions[i] for i in kept]
-    if sum(c.kind in ("dark", "flat", "picture") and c.use == "fit" for c in conditions) < 2:
-        raise InputError(f"{campaign.folder} has fewer than two static recordings of known light to refit the unit by")
-    seen = observed(part, conditions)
-    return case_of(campaign.shape, conditions, [o for o in seen if o is not None], seed, jobs, campaign.frame_rate_hz)
+    if not refittable(conditions):
+        raise InputError(
+            f"{campaign.folder} has fewer than two static recordings of known light to refit the unit by (two of use "
+            "fit are needed, or unknown static scenes and nothing else)"
+        )
+    seen = [o for o in observed(part, conditions) if o is not None]
+    conditions = [
+        replace(c, level=float(o.rate.mean())) if c.kind == "unknown" else c
+        for c, o in zip(conditions, seen, strict=True)
+    ]
+    return case_of(campaign.shape, conditions, seen, seed, jobs, campaign.frame_rate_hz)
+
+
+def refittable(conditions: Sequence[Shown]) -> bool:
+    """Whether there are two recordings to refit the unit by, or nothing but scenes."""
+    scenes = bool(conditions) and all(c.kind == "unknown" for c in conditions)
+    return scenes or sum(c.kind in KNOWN and c.use == "fit" for c in conditions) >= 2
 
 
 def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     """The case without recordings that contradict the others, where enough is left to refit the unit by."""
     bad = {r for c in contradictions for r in c.recordings}
     keep = [i for i, c in enumerate(case.conditions) if c.name not in bad]
-    enough = sum(
-        case.conditions[i].kind in ("dark", "flat", "picture") and case.conditions[i].use == "fit" for i in keep
-    )
-    if not bad or enough < 2:
+    if not bad or not refittable([case.conditions[i] for i in keep]):
         return case
     return case_of(
         case.shape,
@@ -283,8 +306,10 @@ def concluded(
     explained = not alarmed(null, rho) or left < UNEXPLAINED
     chance = not found and bool(p.min() > SURE)
     place, time_ = where(case), when(case)
+    share = lambda f: gap_of(case, null, values, given, f.predicted).removed  # noqa: E731
     effects = tuple(
-        replace(named(f, r, null, values), where=place, when=time_) for f, r in zip(found, rounds, strict=False)
+        replace(named(f, r, null, values), where=place, when=time_, instead={o.name: share(o) for o in r.fits[1:]})
+        for f, r in zip(found, rounds, strict=False)
     )
     rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.count > 1 and f.misfit < r.fits[0].misfit + SEPARATED]
     if explained or chance:

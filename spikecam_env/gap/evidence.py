@@ -22,7 +22,7 @@ from spikecam_env.gap.case import Case
 from spikecam_env.gap.observe import Observation
 from spikecam_env.gap.refit import BaseFit, measured_base
 from spikecam_env.gap.result import Evidence
-from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.scene import simulate_seen
 from spikecam_env.gap.units import drawn
 from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import SensorModel
@@ -88,7 +88,8 @@ def evidence_of(
     """
 
     def twin(model: SensorModel, unit: BaseFit, number: int) -> tuple[Observation, ...]:
-        return tuple(simulate(model, unit, case.conditions, case.shape, case.seed * 1000 + 900 + number))
+        seed, takes = case.seed * 1000 + 900 + number, range(len(case.conditions))
+        return tuple(simulate_seen(model, unit, case.conditions, case.observations, case.shape, seed, takes))
 
     unit = after_base or base
     first, again = twin(before, base, 0), twin(before, base, 1)
@@ -102,8 +103,8 @@ def evidence_of(
         before_base=measured_base(list(first), list(case.conditions)),
         after_base=measured_base(list(last), list(case.conditions)) if last else None,
         again=again,
-        drawn_before=drawn(before, case.base, case.shape, case.seed),
-        drawn_after=drawn(after, case.base, case.shape, case.seed) if after else None,
+        drawn_before=None if case.scenes_only else drawn(before, case.base, case.shape, case.seed),
+        drawn_after=drawn(after, case.base, case.shape, case.seed) if after and not case.scenes_only else None,
     )
 
 

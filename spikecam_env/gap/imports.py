@@ -5,7 +5,8 @@ in any other unit proportional to light go through `radiance_per_unit`, the radi
 
 Rates are an npz with `rate` (H, W) [spikes/frame] and `frames` it was counted over.
 
-Flat maps (`calibration.flat_maps`) become two recordings of rates, lit and dark.  How many spikes a frame 335 lux
+Flat maps (`calibration.flat_maps`) become recordings of rates, lit and dark, and where its counts can be told the one
+at 153 lux, which is held out.  How many spikes a frame 335 lux
 should give is not known, so the lit one is labelled by the camera itself, `relative`: radiance is the median over
 pixels of its rate less the dark's.  By this label the median pixel has gain 1; only how pixels
 differ, and the dark, can disagree with a model.
@@ -165,10 +166,15 @@ def _flat_maps(path: Path, label: Label, name: str, part: _Part) -> list[_Piece]
     lit, dark = part.of(maps.lit, label.file), part.of(maps.dark, label.file)
     radiance = float(np.median(lit - dark))
     note = f"{label.note} radiance is relative: 335 lux is the median over pixels of this unit's rate less the dark's"
-    return [
+    pieces = [
         _Piece(label, f"{name}-light", label.use, even_light(radiance), flat_maps.FRAMES, lit, note=note.strip()),
         _Piece(label, f"{name}-dark", label.use, even_light(0.0), flat_maps.FRAMES, dark, note=label.note),
     ]
+    if maps.counted.all():
+        dim = part.of(maps.dim, label.file)
+        light, note = even_light(float(np.median(dim - dark))), note.replace("335", "153")
+        pieces.append(_Piece(label, f"{name}-dim", "holdout", light, flat_maps.FRAMES, dim, note=note.strip()))
+    return pieces
 
 
 def _light(folder: Path, label: Label, part: _Part, unit: float) -> Keyframes | None:

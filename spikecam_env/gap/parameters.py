@@ -22,6 +22,8 @@ def off_nominal(case: Case, model: SensorModel) -> dict[str, dict[str, float]]:
     white = float(np.mean((1 / unit.electrons if unit.shot else 0.0) + unit.kappa**2))
     if names & set(NOISE):
         pairs["reset_noise" if "reset_noise" in names else "shot_noise"] = (case.base.white, white)
+    if case.scenes_only:
+        names = set()
     if "dark_current" in names:
         pairs["dark_current"] = (float(np.median(case.base.dark[live])), float(np.median(unit.dark)))
     if "dark_current_spread" in names:

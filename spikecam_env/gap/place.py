@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 SIGMAS = 8.0
 """Noises by which a field or a half has to stand out."""
 
+LEAST_FRAMES = 1000
+"""Shortest recording whose halves are compared by their lines: pixels of one rate make a line of their own at first."""
+
 FIELDS = 3
 """Fields along each side of the array."""
 
@@ -88,9 +91,11 @@ def when(case: Case) -> str:
             votes.append(second > first)
         halves = [strongest_line(spectrum(part)) for part in (o.frame[:half], o.frame[half:])]
         (_a, first_line), (_b, second_line) = halves
-        if max(first_line, second_line) > 60 and max(first_line, second_line) > 6 * min(first_line, second_line):
+        louder, quieter = max(first_line, second_line), min(first_line, second_line)
+        if o.frames >= LEAST_FRAMES and louder > 60 and louder > 6 * quieter:
             votes.append(second_line > first_line)
-        votes += _jump(o.blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))
+        blocks = o.blocks[:-1] if o.frames % BLOCKS else o.blocks
+        votes += _jump(blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))
     if len(votes) < 2:
         return ""
     return "from about half of each recording on" if np.mean(votes) > 0.5 else "until about half of each recording"

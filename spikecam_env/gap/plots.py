@@ -99,7 +99,8 @@ def _by_name(axis: Axes, p: Panel) -> None:
 
 
 def pixel_map(values: Array, title: str, limits: tuple[float, float]) -> Figure:
-    """Every pixel (H, W) in colour, between limits."""
+    """Every pixel (H, W) in colour, between limits; of large arrays means of 2 x 2 pixels, or more."""
+    values = _shrunk(values)
     with mpl.rc_context(_FONTS):
         figure = Figure((3.4, 2.9))
         axis = figure.add_axes((0.02, 0.02, 0.74, 0.87))
@@ -108,6 +109,16 @@ def pixel_map(values: Array, title: str, limits: tuple[float, float]) -> Figure:
         axis.set_title(title)
         axis.set(xticks=[], yticks=[])
         return figure
+
+
+_LARGEST = 128
+"""Pixels along a side up to which a map is drawn as it is."""
+
+
+def _shrunk(values: Array) -> Array:
+    n = -(-max(values.shape) // _LARGEST)
+    rows, columns = (size // n * n for size in values.shape)
+    return values[:rows, :columns].reshape(rows // n, n, columns // n, n).mean(axis=(1, 3))
 
 
 def map_limits(values: Array) -> tuple[float, float]:
@@ -165,6 +176,34 @@ def gap_bars(gap: Gap, recordings: Sequence[str]) -> Figure:
         axis.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
         axis.set_yticks(y, names)
         axis.set(xlabel="mean square distance, in noise")
+        return figure
+
+
+def rungs(names: Sequence[str], gaps: Sequence[float], groups: Sequence[dict[str, float]]) -> Figure:
+    """Models one above the other: the gap of each as a bar, and of its groups of statistics as dots."""
+    height, left = 0.95 + 0.55 * len(names), 0.25 + 0.087 * max(map(len, names))
+    whole, low = left + 4.6, 0.1
+    most = max((v for g in groups for v in g.values()), default=1.0)
+    y = -np.arange(len(names), dtype=np.float64)
+    with mpl.rc_context(_FONTS):
+        figure = Figure((whole, height))
+        axis = figure.add_axes((left / whole, 0.55 / height, 3.2 / whole, 1 - 0.65 / height))
+        axis.barh(y, np.maximum(np.array(gaps) - low, 0.0), left=low, height=0.45, color="#BFD7EA", zorder=0)
+        worst = sorted({k for g in groups for k in g}, key=lambda k: -max(g.get(k, 0.0) for g in groups))
+        for number, name in enumerate(worst):
+            at = [max(g.get(name, np.nan), low) for g in groups]
+            colour = mpl.color_sequences["tab10"][number % 10]
+            axis.plot(at, y, ls="", marker="o^svDP"[number % 6], ms=5, color=colour, label=name, clip_on=False)
+        for place, gap in zip(y, gaps, strict=True):
+            axis.annotate(f"{gap:.2g}", (max(gap, low), place), (3, 9), textcoords="offset points", va="bottom",
+                          fontsize=9, fontweight="bold")  # fmt: skip
+        axis.axvline(1.0, color=FLOOR, lw=1, ls=":")
+        axis.set_xscale("log")
+        axis.set_xlim(low, 4 * max(most, *gaps))
+        axis.set_ylim(float(y[-1]) - 0.5, 0.75)
+        axis.set_yticks(y, names)
+        axis.set(xlabel="mean square distance, in noise (1: chance)")
+        axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8, frameon=False)
         return figure
 
 

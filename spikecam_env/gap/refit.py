@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from spikecam_env.calibration.jitter import fit_jitter
 from spikecam_env.calibration.response import fit_lines, rates_from_times, together
 from spikecam_env.gap.observe import STEPS, Observation
-from spikecam_env.gap.world import Shown
+from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.unit import PixelArray, Unit, firing_law
 
@@ -50,8 +50,13 @@ class BaseFit:
 
 
 def measured_base(observations: list[Observation], conditions: list[Shown]) -> BaseFit:
-    """Free refit: every pixel its own line, from static recordings of known light marked "fit"."""
-    static = [(o, c) for o, c in zip(observations, conditions, strict=True) if c.kind in ("dark", "flat", "picture")]
+    """Free refit: every pixel its own line, from static recordings of known light marked "fit".
+
+    Where no light is known, jitter alone: each pixel's line is rate = L.
+    """
+    static = [(o, c) for o, c in zip(observations, conditions, strict=True) if c.kind in KNOWN]
+    if not static:
+        return _of_scenes([o for o, c in zip(observations, conditions, strict=True) if c.use == "fit"] or observations)
     rates = together([rates_from_times([o.times]) for o, _ in static])
     light = np.stack([np.broadcast_to(c.picture, o.times.count.shape) for o, c in static])
     use = np.array([c.use == "fit" for _, c in static])
@@ -63,6 +68,13 @@ def measured_base(observations: list[Observation], conditions: list[Shown]) -> B
     residual = np.where(known, rates.rate / np.where(known, expected, 1.0) - 1.0, np.nan)
     live = gain > 0.1 * np.median(gain) if np.median(gain) > 0 else np.ones(gain.shape, bool)
     return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, live)
+
+
+def _of_scenes(observations: list[Observation]) -> BaseFit:
+    one = np.ones(observations[0].times.count.size)
+    live = np.all([o.times.count > 1 for o in observations], axis=0)
+    nothing = np.zeros((0, one.size))
+    return BaseFit(one, 0.0 * one, 0.0 * one, 0.0 * one, jitter_of(observations), nothing, live)
 
 
 def jitter_of(observations: list[Observation]) -> float:

@@ -223,6 +223,7 @@ _STRUCTURE = {
     "time_scale_frames": "Time scale [frames]",
     "history": "Depends on earlier spikes",
     "neighbours": "Depends on neighbours",
+    "clock": "Differs where intervals are whole numbers of frames",
     "where": "Where",
     "when": "When",
     "best_candidate": "Nearest candidate",
@@ -264,7 +265,8 @@ def _gap(d: Diagnosis) -> Iterator[str]:
     yield element("p", gap_line(d.gap))
     caption = (
         "Mean square distance of statistics from the model, in units of their noise. Orange: model as given; "
-        "blue: patched; grey: floor, by how much two halves of the measurement differ."
+        "blue: patched; grey: floor, "
+        + ("chance." if d.gap.floor == 1.0 else "what two halves of the measurement differ by.")
     )
     use = {c.name: c.use for c in d.evidence.conditions} if d.evidence else {}
     held = [name for name in d.gap.by_recording if use.get(name, "holdout") == "holdout"]

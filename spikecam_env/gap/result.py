@@ -33,6 +33,7 @@ class NamedEffect:
     """An effect found.  confidence: 0 to 1.  alternatives: (name, confidence), best first.
 
     where, when: the part of the array or of the time that it acts in; empty for everywhere and always.
+    instead: share of the gap that an alternative would remove in its place, by name.
     """
 
     name: str
@@ -42,6 +43,16 @@ class NamedEffect:
     alternatives: tuple[tuple[str, float], ...] = ()
     where: str = ""
     when: str = ""
+    instead: dict[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """The documented format."""
+        others = [
+            {"name": n, "confidence": c, **({"removed": self.instead[n]} if n in self.instead else {})}
+            for n, c in self.alternatives
+        ]
+        stated = {k: v for k, v in asdict(self).items() if k != "instead"}
+        return {**stated, "alternatives": others}
 
 
 @dataclass(frozen=True)
@@ -157,10 +168,7 @@ class Diagnosis:
             "format": FORMAT,
             "verdict": self.verdict,
             "sentence": self.sentence,
-            "effects": [
-                {**asdict(e), "alternatives": [{"name": n, "confidence": c} for n, c in e.alternatives]}
-                for e in self.effects
-            ],
+            "effects": [e.to_json() for e in self.effects],
             "unknown": self.unknown,
             "class": self.class_,
             "parameters": self.parameters,

@@ -41,6 +41,7 @@ def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
         "time_scale_s": None,
         "history": any(k.group in _MEMORY and k.name not in ("level", "square", "row", "column") for k in keys),
         "neighbours": any(k.group == "neighbours" for k in keys),
+        "clock": any(k.group == "clock" and not k.name.endswith("between") for k in keys),
         "where": where(case) or None,
         "when": when(case) or None,
         "worst_group": order[0] if order else None,

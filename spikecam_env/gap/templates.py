@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
-from spikecam_env.gap.case import Case, case_of, twins
+from spikecam_env.gap.case import Case, case_of, settled, twins
 from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, scale_of
 from spikecam_env.gap.fit import UNITS, bounded, concerned, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
@@ -182,7 +182,7 @@ def build(folder: Path, *, jobs: int = 1, only: Sequence[str] | None = None) -> 
         label = "-".join([name, *(f"{k}={v:g}" for k, v in parameters.items() if k != CATALOGUE[name].strength)])
         path = folder / f"{label}.npz"
         if not path.exists():
-            entry = _simulated(case, model, null, name, parameters)
+            entry = simulated(case, model, null, name, parameters)
             with whole_file(path) as beside, beside.open("wb") as file:
                 np.savez(file, parameters=json.dumps(entry.parameters), shift=entry.shift)
         with np.load(path) as made:
@@ -230,6 +230,8 @@ def unit_as_base(unit: Any) -> Any:
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
     """What a model predicts for a case: twins of its unit, and drawn units for the pattern."""
     base = within(model, case.base)
+    if case.scenes_only:  # too short for the closed law of jitter
+        base = settled(model, base, case.base, [t.base for t in twins(case, model, base, 4, first=50)])
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
     banks = [{**t.bank, **d} for t, d in zip(twins(case, model, base, count), drawn, strict=False)]
     null = null_of(banks, list(case.bank))
@@ -262,7 +264,8 @@ def starts(name: str) -> list[dict[str, float]]:
     return [{**extra, **default, **dict(zip(shapes, values, strict=True))} for values in product(*shapes.values())]
 
 
-def _simulated(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Template:
+def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Template:
+    """A candidate's template on a campaign, at a strength where it shows clearly."""
     strength = CATALOGUE[name].strength
     power = 2.0 if candidate(name).square else 1.0
     now = bounded(name, parameters)

@@ -18,7 +18,10 @@ from spikecam_env.gap.observe import Observation, observe
 from spikecam_env.gap.recordings import Planned
 from spikecam_env.sensor import Keyframes
 
-STATIC = ("dark", "flat", "picture", "unknown")
+KNOWN = ("dark", "flat", "picture")
+"""Steady light that was measured: what a unit can be refitted by."""
+
+STATIC = (*KNOWN, "unknown")
 
 
 @dataclass(frozen=True)

@@ -185,6 +185,8 @@ def test_the_wall_and_the_flat_maps_become_campaigns(tmp_path: Path) -> None:
     assert wall.shape == (64, 64) and [r.frames for r in wall.recordings] == [250, 250]
     assert 0.1 < wall.recordings[0].load().mean() < 0.3 and wall.recordings[0].light() is None
     maps = import_campaign(REAL, tmp_path / "maps", [Label("flat_335lux_maps.npz", "relative")], frame_rate_hz=20_000.0)
-    lit, dark = maps.recordings
+    lit, dark, dim = maps.recordings
+    assert (lit.use, dark.use, dim.use) == ("fit", "fit", "holdout")
+    assert np.median(dim.rate() - dark.rate()) == pytest.approx(dim.static_radiance()[0, 0], rel=1e-6)
     assert np.median(lit.rate() - dark.rate()) == pytest.approx(lit.static_radiance()[0, 0], rel=1e-6)
     assert dark.static_radiance().max() == 0.0

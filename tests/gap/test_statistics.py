@@ -17,7 +17,8 @@ def test_no_group_alarms_where_nothing_is_missing(seed):
 
 
 def test_every_group_says_something_of_the_small_design():
-    assert {k.group for k in null().keys} == {*GROUPS, "pattern"}
+    """But for `clock`, which is of unknown scenes (test_scene.py)."""
+    assert {k.group for k in null().keys} == {*GROUPS, "pattern"} - {"clock"}
 
 
 def test_names_are_given_once():

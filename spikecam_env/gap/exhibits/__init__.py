@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from spikecam_env.gap.evidence import Maps, Panel
 from spikecam_env.gap.exhibits import (
+    clock,
     drift,
     intervals,
     moving,
@@ -43,7 +44,7 @@ class Exhibit:
 def exhibits(evidence: Evidence, frame_rate_hz: float) -> list[Exhibit]:
     """All that these recordings can show; those without a panel are left out."""
     made = []
-    for module in (rates, noise, intervals, drift, spectrum, rows, neighbours, step, moving, pattern):
+    for module in (rates, noise, intervals, drift, spectrum, rows, neighbours, clock, step, moving, pattern):
         panels = tuple(module.panels(evidence, frame_rate_hz))
         maps = tuple(pattern.maps(evidence)) if module is pattern else ()
         made.append(Exhibit(module.__name__.rsplit(".", 1)[1], module.TITLE, module.CAPTION, panels, maps))

@@ -24,6 +24,8 @@ _UNITS = {"gain": "thresholds a frame at radiance 1", "dark": "thresholds a fram
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     """Dark level and response of pixels: how they are spread, and by row and column."""
+    if np.ptp(evidence.measured_base.gain) == 0:  # unknown scenes: no pattern can be told from them
+        return
     for what in _TITLES:
         histogram = _histogram(what, _values(evidence, what))
         if histogram:
@@ -46,7 +48,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
 
 def maps(evidence: Evidence) -> Iterator[Maps]:
     """Maps of dark level and response."""
-    shape = shape_of(evidence)
+    shape = shape_of(evidence) if np.ptp(evidence.measured_base.gain) > 0 else None
     for what, title in _TITLES.items() if shape else ():
         measured, before, after = (None if v is None else v.reshape(shape) for v in _values(evidence, what))
         assert measured is not None and before is not None

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.statistics import (
+    clock,
     drift,
     intervals,
     moving,
@@ -25,7 +26,7 @@ from spikecam_env.gap.statistics.reading import Reading
 
 GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
     module.__name__.rsplit(".", 1)[1]: module.statistics
-    for module in (rates, noise, intervals, drift, spectrum, timing, rows, neighbours, step, moving)
+    for module in (rates, noise, intervals, drift, spectrum, timing, rows, neighbours, clock, step, moving)
 }
 
 
@@ -47,8 +48,12 @@ FLOORS: dict[tuple[str, str], float] = {
     ("moving", "left"): 5e-3,
     ("pattern", ""): 0.02,
     ("pattern", "silent"): 1.0,
+    ("texture", ""): 0.02,
+    ("texture", "field"): 2e-3,
     ("intervals", ""): 1.0,
     ("timing", ""): 0.01,
+    ("clock", ""): 0.02,
+    ("clock", "whole"): 1.0,
 }
 """How exactly labels and laws can be known at all, whatever the number of spikes, by group and start of the name:
 light labels to 2e-5, the first-order laws of noise to 1 %; counts, on the scale of their root, to 1."""

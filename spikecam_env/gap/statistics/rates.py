@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.statistics.reading import STILL, Reading, log, slope
+from spikecam_env.gap.statistics.reading import Reading, log, slope
+from spikecam_env.gap.world import KNOWN
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
@@ -17,9 +18,9 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     corners: mean residual of each quarter of the array less the array's.
     """
     condition = reading.conditions[i]
-    if condition.kind not in STILL or condition.light is None:
+    if condition.kind not in KNOWN:
         return {}
-    order = [j for j, c in enumerate(reading.conditions) if c.kind in ("dark", "flat", "picture")].index(i)
+    order = [j for j, c in enumerate(reading.conditions) if c.kind in KNOWN].index(i)
     residual = reading.base.residual[order]
     known = np.isfinite(residual) & reading.base.live
     if known.sum() < 100:

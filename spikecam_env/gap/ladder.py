@@ -1,0 +1,181 @@
+"""The ladder: from a model that lacks nearly everything to one that leaves nothing, an effect a rung.
+
+What the free refit needed and the model has no effect for (`missing`) is added one after another, each time the one
+that takes away most; then the search for effects goes on as in a diagnosis.  Every rung is judged on the same held-out
+statistics, in the noise of the last.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from spikecam_env.calibration.campaign import Campaign, read_campaign
+from spikecam_env.gap import plots
+from spikecam_env.gap.candidates import chosen, testable
+from spikecam_env.gap.case import Case
+from spikecam_env.gap.compare import Null, adjusted, deviates, values_of
+from spikecam_env.gap.diagnose import ALARM, in_order, read_case, search
+from spikecam_env.gap.missing import Missing, missing
+from spikecam_env.gap.templates import load, model_null
+from spikecam_env.sensor import Effect, SensorModel
+from spikecam_env.whole import whole_file, write_text_whole
+
+Array = NDArray[np.float64]
+
+FORMAT = "spikecam-ladder/1"
+
+TWINS = 2
+"""Twins of a rung that is not the last."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A model on the way.  added: its newest effect, None for the first; sd: of its strength.
+
+    also: names that these recordings cannot tell it from.  gap: mean square of held-out statistics, in noise, 1 is
+    chance.  groups: the same of each group of statistics, over all recordings.  off: statistics of p < 0.05.
+    """
+
+    model: SensorModel
+    added: Effect | None
+    sd: float
+    also: tuple[str, ...]
+    gap: float
+    groups: dict[str, float]
+    off: int
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Rungs, first to last; statistics: how many every rung is judged by."""
+
+    campaign: str
+    seed: int
+    statistics: int
+    rungs: tuple[Rung, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The documented format."""
+        rungs = [
+            {
+                "added": r.added and r.added.name,
+                "parameters": r.added.parameters() if r.added else {},
+                "sd": r.sd,
+                "also": list(r.also),
+                "gap": r.gap,
+                "groups": r.groups,
+                "off": r.off,
+            }
+            for r in self.rungs
+        ]
+        return {"format": FORMAT, "campaign": self.campaign, "seed": self.seed, "statistics": self.statistics,
+                "rungs": rungs}  # fmt: skip
+
+    def write(self, folder: Path) -> None:
+        """ladder.json, ladder.png and model.toml, the last rung's; each whole."""
+        folder.mkdir(parents=True, exist_ok=True)
+        self.rungs[-1].model.to_toml(folder / "model.toml")
+        with whole_file(folder / "ladder.png") as beside:
+            figure(self).savefig(beside, format="png", dpi=130)
+        write_text_whole(folder / "ladder.json", json.dumps(self.to_json(), indent=1))
+
+
+def ladder(
+    campaign: Campaign | str | Path,
+    model: SensorModel | str = "ideal",
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    twin_count: int = 12,
+    progress: bool = False,
+) -> Ladder:
+    """Climb from `model` to one that explains a campaign.  Same seed, same answer; errors as `diagnose`."""
+    measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
+    first = model if isinstance(model, SensorModel) else SensorModel.load(model)
+    case = read_case(measured, seed, jobs)
+    names, _ = testable(chosen(first, None, ()), case.conditions)
+    lacking = missing(case, first, names)
+    full = first
+    for m in lacking:
+        full = full.with_effect(m.effect)
+    null = model_null(case, full, twin_count)
+    values = values_of(case.bank, null.keys)
+
+    def rung(there: SensorModel, found: Missing | None) -> Rung:
+        mean = null.mean if there is full else in_order(model_null(case, there, TWINS), null)
+        return judged(case, null, values, mean, there, found)
+
+    rungs = [rung(first, None)]
+    left = list(lacking)
+    bar = tqdm(total=len(left) * (len(left) + 1) // 2, desc="ladder", unit="model", disable=not progress)
+    while left:
+        tried = []
+        for m in left:
+            tried.append(rung(full if len(left) == 1 else rungs[-1].model.with_effect(m.effect), m))
+            bar.update()
+        best = min(range(len(left)), key=lambda i: tried[i].gap)
+        rungs.append(tried[best])
+        left.pop(best)
+    bar.close()
+    if adjusted(deviates(null, values)).min() < ALARM:
+        rounds = search(case, full, null, values, names, load())
+        for was, now in itertools.pairwise(rounds):
+            if now.model is not was.model:
+                fit = was.fits[0]
+                effect = next(e for e in now.model.effects if e.name == fit.name)
+                sd = next(iter(fit.sd.values()), np.nan)
+                rungs.append(judged(case, null, values, now.predicted, now.model, Missing(effect, sd)))
+    return Ladder(str(measured.folder), seed, len(values), tuple(rungs))
+
+
+def judged(case: Case, null: Null, values: Array, mean: Array, model: SensorModel, found: Missing | None) -> Rung:
+    """A model as a rung.  mean: (S,) what it predicts."""
+    use = {c.name: c.use for c in case.conditions}
+    square = np.nan_to_num((values - mean) / null.noise) ** 2
+    held = np.array([use[k.recording] == "holdout" for k in null.keys])
+    group = np.array([k.group for k in null.keys])
+    off = adjusted(np.sign(values - mean) * np.sqrt(square))
+    return Rung(
+        model,
+        found.effect if found else None,
+        found.sd if found else np.nan,
+        found.also if found else (),
+        float(square[held if held.any() else slice(None)].mean()),
+        {g: float(square[group == g].mean()) for g in dict.fromkeys(group.tolist())},
+        int((off < 0.05).sum()),
+    )
+
+
+def said(rung: Rung) -> str:
+    """A rung in a line: its effect and how large it is."""
+    from spikecam_env.gap.words import human, quantity, unit_of
+
+    if rung.added is None:
+        return rung.model.name
+    key = type(rung.added).strength
+    size = quantity(rung.added.parameters()[key], unit_of(rung.added.name, key), rung.sd)
+    return f"+ {human(rung.added.name)}, {size}"
+
+
+def figure(made: Ladder) -> Figure:
+    """The gap at every rung, and of the groups of statistics that it falls in."""
+    return plots.rungs([said(r) for r in made.rungs], [r.gap for r in made.rungs], [r.groups for r in made.rungs])
+
+
+def table(made: Ladder) -> list[dict[str, Any]]:
+    """A row a rung."""
+    return [{"rung": said(r), "gap": r.gap, "statistics off": r.off, "or": _or(r.also)} for r in made.rungs]
+
+
+def _or(also: Sequence[str]) -> str:
+    return ", ".join(also) or "-"

@@ -1,0 +1,38 @@
+"""The ladder: from `ideal`, the base model's effects are found one after another and the gap falls at every rung."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+
+import pytest
+
+from spikecam_env.gap import Dark, Flat, Step, write_campaign
+from spikecam_env.gap.ladder import figure, ladder, table
+
+
+@pytest.mark.slow
+def test_from_ideal_the_gap_falls_with_every_effect_down_to_chance(tmp_path: Path) -> None:
+    """Twelve twins know the noise of a mean square of some 30 statistics to a third: chance is below 2."""
+    recordings = [Dark(), *(Flat(radiance=x) for x in (0.05, 0.2, 0.5)), Step(), Flat(radiance=0.12, use="holdout")]
+    campaign = write_campaign(tmp_path / "c", "physical", shape=(32, 32), frames=2500, recordings=recordings, seed=3)
+    made = ladder(campaign, "ideal")
+    for row in table(made):
+        print(row)
+    gaps = [r.gap for r in made.rungs]
+    added = [r.added.name for r in made.rungs[1:] if r.added]
+    assert set(added) == {"conversion_gain_spread", "dark_current", "dark_current_spread", "shot_noise"}
+    assert gaps[0] > 1000 * gaps[-1] and gaps[-1] < 2.0
+    assert all(later < 1.3 * earlier for earlier, later in itertools.pairwise(gaps))
+    made.write(tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "ladder.json").read_text())["rungs"][1]["added"] == added[0]
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"ladder.json", "ladder.png", "model.toml"}
+    assert "added" not in figure(made).axes[0].get_title()
+
+
+@pytest.mark.slow
+def test_a_model_that_lacks_nothing_has_one_rung(tmp_path: Path) -> None:
+    recordings = [Dark(), *(Flat(radiance=x) for x in (0.05, 0.2, 0.5))]
+    campaign = write_campaign(tmp_path / "c", "physical", shape=(24, 24), frames=2000, recordings=recordings, seed=5)
+    assert len(ladder(campaign, "physical").rungs) == 1

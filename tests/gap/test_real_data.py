@@ -1,0 +1,49 @@
+"""What a diagnosis says of the real recordings, on parts of them (docs/real_data.md has the whole)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spikecam_env.gap import Label, import_campaign
+from spikecam_env.gap.compare import adjusted, deviates, values_of
+from spikecam_env.gap.diagnose import diagnose, read_case
+from spikecam_env.gap.templates import model_null
+from spikecam_env.sensor import SensorModel
+
+REAL = Path(__file__).parents[2].parent / "shared" / "data" / "real"
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not REAL.is_dir(), reason=f"the real recordings are not at {REAL}"),
+]
+
+
+def test_on_the_wall_pixels_follow_the_clock_and_nothing_else_is_off(tmp_path: Path) -> None:
+    wall = import_campaign(
+        REAL, tmp_path / "wall", [Label("wall.npz", "unknown")], frame_rate_hz=20_000.0, rows=(110, 200),
+        columns=(15, 355),
+    )  # fmt: skip
+    case = read_case(wall)
+    null = model_null(case, SensorModel.preset("scsim"), 8)
+    z = deviates(null, values_of(case.bank, null.keys))
+    off = [k.group for k, p in zip(null.keys, adjusted(z), strict=True) if p < 0.001]
+    print({f"{k.group} {k.name}": round(float(v), 1) for k, v in zip(null.keys, z, strict=True) if abs(v) > 3})
+    assert set(off) == {"clock"}
+
+
+def test_the_maps_have_a_dark_tail_shading_and_a_narrower_spread_than_published(tmp_path: Path) -> None:
+    maps = import_campaign(
+        REAL, tmp_path / "maps", [Label("flat_335lux_maps.npz", "relative")], frame_rate_hz=20_000.0,
+        rows=(50, 200), columns=(100, 350),
+    )  # fmt: skip
+    assert [r.use for r in maps.recordings] == ["fit", "fit", "holdout"]
+    found = diagnose(
+        maps, "scsim", jobs=2, progress=False, candidates=["vignetting", "dark_current_tail", "dead_pixels"]
+    )
+    print(found.sentence, found.parameters, found.gap)
+    assert {"vignetting", "dark_current_tail"} <= {e.name for e in found.effects} or found.verdict == "unknown"
+    assert found.parameters["conversion_gain_spread"]["ratio"] < 0.5
+    assert found.gap is not None and found.gap.after < found.gap.before
+    assert np.isfinite(found.gap.removed)
