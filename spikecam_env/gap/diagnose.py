@@ -304,7 +304,7 @@ def concluded(
     by_chance = float(np.sum(null.weight * np.ones(len(values))))
     left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
     explained = not alarmed(null, rho) or left < UNEXPLAINED
-    chance = not found and bool(p.min() > SURE)
+    chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     place, time_ = where(case), when(case)
     share = lambda f: gap_of(case, null, values, given, f.predicted).removed  # noqa: E731
     effects = tuple(
