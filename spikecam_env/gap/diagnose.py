@@ -34,6 +34,7 @@ from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.place import when, where
+from spikecam_env.gap.polish import Errors, polished
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
@@ -63,7 +64,7 @@ GATE = 0.005
 GAIN = 20.0
 """Misfit that an effect has to remove to be added."""
 
-UNEXPLAINED = 0.08
+UNEXPLAINED = 0.02
 """Share of the evidence that may stay unexplained when something is named."""
 
 SEPARATED = 9.0
@@ -72,7 +73,10 @@ SEPARATED = 9.0
 
 @dataclass(frozen=True)
 class Round:
-    """One turn of the search: the model it started from, what that left, and the candidates that were fitted."""
+    """One turn of the search: the model it started from, what that left, and the candidates that were fitted.
+
+    rivals: names that leave about as little as the best of them.
+    """
 
     model: SensorModel
     base: BaseFit
@@ -82,6 +86,7 @@ class Round:
     rho: Array
     misfit: float
     fits: tuple[Fit, ...]
+    rivals: tuple[str, ...] = ()
 
 
 def diagnose(
@@ -224,18 +229,28 @@ def search(
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
         sure, rest = settle(fits, partial(confirmed, case, now, here, values))
-        rounds.append(Round(now, base, predicted, spread, count, rho, left_over, (*sure, *rest)))
+        rivals = tuple(f.name for f in sure[1:] if f.misfit < sure[0].misfit + SEPARATED)
+        rounds.append(Round(now, base, predicted, spread, count, rho, left_over, (*sure, *rest), rivals))
         if not sure or gain(case, now, here, values, sure[0]) < GAIN:
             break
         best = sure[0]
         earlier = [r.fits[0].name for r in rounds[:-1]]
         if earlier:
             best = rejoined(case, model, null, values, best, earlier)
+        names_now = [n for n in (*earlier, best.name) if n in {e.name for e in best.model.effects}]
+        best, errors = polished(case, model, null, values, best, names_now)
         rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
+        rounds = [with_errors(r, errors) for r in rounds]
         now, base, predicted, spread, count = best.model, best.base, best.predicted, best.spread, best.count
     rho, left_over = judged(null, values, predicted, count, spread)
     rounds.append(Round(now, base, predicted, spread, count, rho, left_over, ()))
     return rounds
+
+
+def with_errors(turn: Round, errors: Errors) -> Round:
+    """The round with its effect's errors as they were found last, together with all others."""
+    best = turn.fits[0]
+    return replace(turn, fits=(replace(best, sd=errors.get(best.name, best.sd)), *turn.fits[1:]))
 
 
 def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:
@@ -311,7 +326,7 @@ def concluded(
         replace(named(f, r, null, values), where=place, when=time_, instead={o.name: share(o) for o in r.fits[1:]})
         for f, r in zip(found, rounds, strict=False)
     )
-    rivals = [f.name for r in rounds[:1] for f in r.fits[1:] if f.count > 1 and f.misfit < r.fits[0].misfit + SEPARATED]
+    rivals = rounds[0].rivals if rounds else ()
     if explained or chance:
         effects = (*(named_missing(m) for m in lacking), *effects)
     parameters = {} if lacking else off_nominal(case, model)

@@ -271,7 +271,7 @@ def gain(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit
 
 
 def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Sequence[str]) -> Fit:
-    """All effects found so far, their strengths fitted together; one that is no longer needed is left out again.
+    """All effects found so far together; one that is no longer needed is left out again.
 
     model, null: as given, before any was added.
     """
@@ -281,33 +281,7 @@ def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found:
         both = confirmed(case, model, null, measured, replace(found, model=whole), 2)
         if fewer.misfit < both.misfit + NEEDED:
             whole = whole.without(name)
-    names = [n for n in (*earlier, found.name) if n in {e.name for e in whole.effects}]
-    if len(names) > 1:
-        whole = _joint_step(case, null, measured, whole, names, found.base)
     return confirmed(case, model, null, measured, replace(found, model=whole))
-
-
-def _joint_step(
-    case: Case, null: Null, measured: Array, model: SensorModel, names: Sequence[str], base: BaseFit
-) -> SensorModel:
-    """One Gauss-Newton step in the logarithms of the strengths."""
-    predicted = _mean_of(case, model, base, null)
-    columns, effects = [], {e.name: e for e in model.effects}
-    for name in names:
-        key = CATALOGUE[name].strength
-        nudged = bounded(name, {**effects[name].parameters(), key: effects[name].parameters()[key] * 1.25})
-        columns.append((_mean_of(case, with_effect(model, name, nudged), base, null) - predicted) / np.log(1.25))
-    step = _damped(null, measured, predicted, np.stack(columns, axis=1))
-    for name, s in zip(names, step, strict=True):
-        key = CATALOGUE[name].strength
-        value = effects[name].parameters()[key] * float(np.exp(np.clip(s, -0.7, 0.7)))
-        model = with_effect(model, name, bounded(name, {**effects[name].parameters(), key: value}))
-    return model
-
-
-def _mean_of(case: Case, model: SensorModel, base: BaseFit, null: Null) -> Array:
-    mean, _ = predict(case, model, within(model, base), null, 1, 400)
-    return with_pattern(case, model, null, mean)
 
 
 def _damped(null: Null, measured: Array, predicted: Array, jacobian: Array) -> Array:

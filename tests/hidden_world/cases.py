@@ -210,7 +210,8 @@ def _lamp(name: str) -> Callable[[int], Case]:
 
 
 def _noise_times_three(seed: int) -> Case:
-    base = str(stream(seed, "case").choice(BASE_CAMERAS))
+    """Of `scsim`: three times kT/C is a fifth of the shot noise, which units differ by."""
+    base = "scsim"
     accept = (Answer(("parameter",), ("reset_noise",)), Answer(("named",), ("excess_threshold_noise",)))
     return _case("tricky", "threshold noise x 3", Recipe(seed, base, reset_noise_times=3.0), accept=accept)
 

@@ -1,0 +1,108 @@
+"""The last touch: all parameters of the effects found, refined together, and how surely each is known.
+
+Gauss-Newton in their logarithms, on means over a few twins with the same draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates import candidate, is_pattern
+from spikecam_env.gap.case import Case
+from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, is_clear
+from spikecam_env.gap.fit import Fit, bounded, concerned, confirmed, predict, with_effect, with_pattern
+from spikecam_env.gap.refit import within
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+COUNT = 2
+"""Twins at each point."""
+
+TURNS = 3
+
+SETTLED = 0.05
+"""Largest step of a logarithm that needs no other."""
+
+FURTHEST = 0.7
+"""Largest step of a logarithm at once."""
+
+WORSE = 3.0
+"""Misfit by which a step may seem worse, by chance of the draws."""
+
+Probe = Callable[[SensorModel], Array]
+"""The statistics (S,) that a model gives."""
+
+Errors = dict[str, dict[str, float]]
+"""Standard deviation of each parameter, by effect and name."""
+
+
+def polished(
+    case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, names: Sequence[str]
+) -> tuple[Fit, Errors]:
+    """`found.model` with the parameters of its effects `names` refined, simulated anew, and their errors.
+
+    model, null: as given, before any was added.
+    """
+    free = [(name, key) for name in names for key in candidate(name).fitted]
+    probe = _probe(case, null, measured, found, names)
+    now, error = found.model, np.full(len(free), np.nan)
+    for _ in range(TURNS):
+        at = probe(now)
+        columns = np.stack([_column(probe, now, at, null, name, key) for name, key in free], axis=1)
+        step, error = solved(null, measured, at, columns)
+        now = moved(now, free, step)
+        if np.abs(step).max() < SETTLED:
+            break
+    again = confirmed(case, model, null, measured, replace(found, model=now))
+    best = again if again.misfit < found.misfit + WORSE else found
+    values = {e.name: e.parameters() for e in best.model.effects}
+    errors: Errors = {name: {} for name in names}
+    for (name, key), e in zip(free, error, strict=True):
+        errors[name][key] = float(abs(values[name][key]) * e)
+    own: Mapping[str, float] = values[found.name]
+    return replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name]), errors
+
+
+def solved(null: Null, measured: Array, predicted: Array, jacobian: Array) -> tuple[Array, Array]:
+    """(step, error), (n,) each: robust least squares for a jacobian (S, n), and standard deviations."""
+    noise2 = null.sd**2 * (1 + 1 / COUNT) + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2
+    gap = np.nan_to_num(measured - predicted)
+    w = null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
+    normal = jacobian.T @ (w[:, None] * jacobian)
+    damped = normal + np.diag(0.02 * np.diag(normal) + 1e-9)
+    step = np.linalg.solve(damped, jacobian.T @ (w * gap))
+    return np.clip(step, -FURTHEST, FURTHEST), np.sqrt(np.diag(np.linalg.inv(damped)))
+
+
+def moved(model: SensorModel, free: Sequence[tuple[str, str]], step: Array) -> SensorModel:
+    """The model with the logarithms of these parameters moved."""
+    for (name, key), s in zip(free, step, strict=True):
+        here = next(e for e in model.effects if e.name == name).parameters()
+        model = with_effect(model, name, bounded(name, {**here, key: here[key] * float(np.exp(s))}))
+    return model
+
+
+def _column(probe: Probe, model: SensorModel, at: Array, null: Null, name: str, key: str) -> Array:
+    """(S,) change of the statistics for one more of a parameter's logarithm, where it stands clear of noise."""
+    peak = float(np.max(np.abs(at - null.mean) / null.noise))
+    nudge = float(np.clip(6.0 / peak, 0.25, 1.0)) if key == candidate(name).fitted[0] else 0.3
+    change = probe(moved(model, [(name, key)], np.array([nudge]))) - at
+    return np.where(is_clear(change, 2 * null.sd**2 / COUNT), change / nudge, 0.0)
+
+
+def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:
+    """Means over twins, and over drawn units where an effect changes the pattern."""
+    only = concerned(case, names, null, measured, found.predicted - null.mean)
+
+    def statistics(model: SensorModel) -> Array:
+        mean = null.mean
+        if not all(is_pattern(name) for name in names):
+            mean, _ = predict(case, model, within(model, found.base), null, COUNT, 400, only)
+        return with_pattern(case, model, null, mean) if any(is_pattern(name) for name in names) else mean
+
+    return statistics
