@@ -67,6 +67,9 @@ GAIN = 20.0
 UNEXPLAINED = 0.02
 """Share of the evidence that may stay unexplained when something is named."""
 
+QUIET = 0.1
+"""The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
+
 SEPARATED = 9.0
 """Difference of misfits from which one candidate is told from another (likelihood ratio of 90)."""
 
@@ -225,7 +228,8 @@ def search(
         left_over = judged(here, values, predicted, count)[1]
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left, line_of(case))
-        tried = worth_fitting(screened, left_over)
+        distance = np.nan_to_num((values - here.mean) / here.noise)
+        tried = worth_fitting(screened, misfit(distance, here.weight))
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
         sure, rest = settle(fits, partial(confirmed, case, now, here, values))
@@ -281,7 +285,7 @@ def line_of(case: Case) -> float | None:
 
 
 def worth_fitting(screened: Sequence[Screened], before: float) -> list[Screened]:
-    """The best by their templates, as long as they explain half of what the best explains."""
+    """The best by their templates, as long as they explain half of what the best explains.  before: misfit of none."""
     if not screened:
         return []
     best = before - screened[0].misfit
@@ -318,7 +322,8 @@ def concluded(
     predicted = last.predicted if last else null.mean
     by_chance = float(np.sum(null.weight * np.ones(len(values))))
     left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
-    explained = not alarmed(null, rho) or left < UNEXPLAINED
+    quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
+    explained = not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet)
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     place, time_ = where(case), when(case)
     share = lambda f: gap_of(case, null, values, given, f.predicted).removed  # noqa: E731

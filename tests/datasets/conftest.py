@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from small import LONG, bytes_in, small_plan
+from small_dataset import LONG, bytes_in, small_plan
 
 from spikecam_env.datasets import build
 

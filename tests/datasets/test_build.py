@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import LONG, bytes_in, small_plan
+from small_dataset import LONG, bytes_in, small_plan
 
 from spikecam_env.datasets import build, verify
 from spikecam_env.datasets.build import UNFINISHED

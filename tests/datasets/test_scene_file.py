@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import SHAPE, small_plan
+from small_dataset import SHAPE, small_plan
 
 from scenes.catalogue import make_scene
 from spikecam_env.datasets import build

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from small import small_plan
+from small_dataset import small_plan
 
 from spikecam_env.datasets import build, verify
 from spikecam_env.errors import InputError
