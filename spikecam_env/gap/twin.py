@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ def expose(
     model: SensorModel, unit: Unit, condition: Shown, shape: tuple[int, int], seed: int, take: int
 ) -> NDArray[np.uint8]:
     """(F, P/8) bits of one recording in known light."""
-    sensor = SpikeSensor(model, shape, seed, engine="auto", take=take, unit=unit)
+    sensor = SpikeSensor(at_any_phase(model, seed, take), shape, seed, engine="auto", take=take, unit=unit)
     light = condition.light
     assert light is not None
     picture: Keyframes | NDArray[np.float32] = light.radiance[0] if not condition.moves else light
@@ -47,3 +48,12 @@ def expose(
     for first in range(0, condition.frames, _BLOCK):
         parts.append(pack_frames(sensor.step(picture, min(_BLOCK, condition.frames - first))))
     return np.concatenate(parts)
+
+
+def at_any_phase(model: SensorModel, seed: int, take: int) -> SensorModel:
+    """The model with its waves at phases drawn for one recording: nobody starts a recording by the mains."""
+    rng = np.random.default_rng([seed, take])
+    for effect in model.effects:
+        if "phase_cycles" in effect.parameters():
+            model = model.with_effect(replace(effect, phase_cycles=float(rng.random())))  # type: ignore[call-arg]
+    return model
