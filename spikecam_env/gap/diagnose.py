@@ -23,7 +23,7 @@ from tqdm import tqdm
 from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.audit import Contradiction, audit
-from spikecam_env.gap.candidates import candidate, chosen, testable
+from spikecam_env.gap.candidates import candidate, chosen, is_pattern, testable
 from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, judged, misfit, normal, residual, values_of
 from spikecam_env.gap.evidence import evidence_of
@@ -51,6 +51,9 @@ ALARM = 0.02
 
 SURE = 0.002
 """Adjusted p-value below which a discrepancy is unknown where no candidate takes it up; above, it may be chance."""
+
+LOUD = 6.0
+"""Noises by which a statistic of the pattern has to stand out for its effects to be tried."""
 
 TRIED = 5
 """Candidates fitted a round, the best by their templates."""
@@ -229,7 +232,7 @@ def search(
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left, line_of(case))
         distance = np.nan_to_num((values - here.mean) / here.noise)
-        tried = worth_fitting(screened, misfit(distance, here.weight))
+        tried = worth_fitting(screened, misfit(distance, here.weight), loud_pattern(here, distance))
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
         sure, rest = settle(fits, partial(confirmed, case, now, here, values))
@@ -284,12 +287,24 @@ def line_of(case: Case) -> float | None:
     return frequency(frame, at) * case.frame_rate_hz if ratio > 30 else None
 
 
-def worth_fitting(screened: Sequence[Screened], before: float) -> list[Screened]:
-    """The best by their templates, as long as they explain half of what the best explains.  before: misfit of none."""
+def worth_fitting(screened: Sequence[Screened], before: float, pattern: bool = False) -> list[Screened]:
+    """The best by their templates, as long as they explain half of what the best explains.  before: misfit of none.
+
+    pattern: with the two best of those that only change the pattern; its statistics are not in proportion to their
+    strength, so that templates say little of them.
+    """
     if not screened:
         return []
     best = before - screened[0].misfit
-    return [s for s in screened if before - s.misfit > 0.5 * best][:TRIED]
+    tried = [s for s in screened if before - s.misfit > 0.5 * best][:TRIED]
+    also = [s for s in screened if is_pattern(s.name)][:2] if pattern else []
+    return tried + [s for s in also if s not in tried]
+
+
+def loud_pattern(null: Null, distance: Array) -> bool:
+    """Whether a statistic of the pattern stands out by itself."""
+    of_pattern = np.array([k.group == "pattern" for k in null.keys])
+    return bool(np.any(np.abs(distance[of_pattern]) > LOUD))
 
 
 def alarmed(null: Null, rho: Array) -> bool:

@@ -88,8 +88,9 @@ def writers(folder: Path) -> set[int]:
 
 
 def start_in_another_process(plan, folder: Path) -> subprocess.Popen:
-    code = "import small, pathlib, sys; from spikecam_env.datasets import build\n"
-    code += f"if __name__ == '__main__': build(small.small_plan({plan.frames}), pathlib.Path({str(folder)!r}), jobs=2)"
+    code = "import small_dataset, pathlib, sys; from spikecam_env.datasets import build\n"
+    made = f"build(small_dataset.small_plan({plan.frames}), pathlib.Path({str(folder)!r}), jobs=2)"
+    code += f"if __name__ == '__main__': {made}"
     script = folder.parent / "make.py"
     script.write_text(code)
     roots = [str(Path(__file__).parent), str(Path(__file__).parents[2])]

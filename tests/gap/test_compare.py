@@ -16,6 +16,7 @@ from spikecam_env.gap.compare import (
     normal,
     null_of,
     residual,
+    spread_of,
     values_of,
 )
 from spikecam_env.gap.statistics import Key, floor_of
@@ -125,3 +126,17 @@ def test_misfit_of_noise_alone_is_about_the_number_of_statistics():
 def test_misfit_grows_with_the_logarithm_of_what_is_far_off():
     far, further = misfit(np.array([1e3])), misfit(np.array([1e4]))
     assert further - far == pytest.approx((HEAVY + 1) * np.log(100), rel=1e-3)
+
+
+def test_rare_events_widen_a_statistic_and_leave_the_others_alone():
+    """Ten statistics of noise alone, ten whose twins scatter five times as much, one of which never moves without."""
+    keys = tuple(Key("quiet" if i < 10 else "rare", f"r{i}", "s") for i in range(20))
+    sd = np.ones(20)
+    sd[10] = 0.0
+    null = Null(keys, np.zeros(20), sd, np.full(20, 0.1), 12)
+    twins = np.random.default_rng(0).standard_normal((200, 20)) * np.where(np.arange(20) < 10, 1.0, 5.0)
+    spread = spread_of(null, twins)
+    print(spread.round(2))
+    assert spread[:10] == pytest.approx(1.0, abs=0.1)
+    assert spread[10:] == pytest.approx(5.0, rel=0.35)
+    assert np.array_equal(spread_of(null, twins[:1]), sd)
