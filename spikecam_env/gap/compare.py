@@ -94,11 +94,13 @@ def judged(
     null: Null, measured: Array, predicted: Array, twins: int, spread: Array | None = None
 ) -> tuple[Array, float]:
     """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squares of what is left, and the price of
-    noise wider than the null's, without which a prediction would win by being vague."""
+    noise wider than the null's, without which a prediction would win by being vague.  What was not measured (NaN, held
+    out) counts for nothing."""
     rho = residual(null, measured, predicted, twins, spread)
     sd = null.sd if spread is None else spread
     wider = (sd**2 + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2) / (null.sd**2 + null.floor**2)
-    return rho, misfit(rho, null.weight) + float((null.weight * np.log(wider)).sum())
+    price = np.where(np.isfinite(measured), null.weight * np.log(wider), 0.0)
+    return rho, misfit(rho, null.weight) + float(price.sum())
 
 
 def spread_of(null: Null, values: Array) -> Array:

@@ -2,7 +2,8 @@
 
     read -> audit -> refit -> twins -> alarm -> [screen -> fit -> confirm -> add]* -> gate -> verdict
 
-Each step is a function of its own, usable by itself; nothing is decided on the held-out recordings but the gap.
+Each step is a function of its own, usable by itself.  Held-out recordings take no part in the alarm, the fits and the
+choice; the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations
@@ -146,11 +147,12 @@ def diagnose(
         before = model_null(case, assumed, 2) if lacking else null
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
-    if adjusted(deviates(null, values)).min() < ALARM:
+    seen = of_fit(case, null, values)
+    if adjusted(deviates(null, seen)).min() < ALARM:
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
-            rounds = search(case, start, null, values, names, templates or load())
+            rounds = search(case, start, null, seen, names, templates or load())
     with timed("verdict"):
         found = concluded(
             case, start, null, in_order(before, null), values, lacking, rounds, contradictions, untestable
@@ -217,6 +219,11 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     )
 
 
+def of_fit(case: Case, null: Null, values: Array) -> Array:
+    """(S,) values of recordings of use fit; NaN for the held-out ones, which take no part in the search."""
+    return np.where([_use(case, k.recording) == "fit" for k in null.keys], values, np.nan)
+
+
 def search(
     case: Case, model: SensorModel, null: Null, values: Array, names: Sequence[str], templates: Templates
 ) -> list[Round]:
@@ -281,7 +288,8 @@ def standing_on(null: Null, predicted: Array, spread: Array) -> Null:
 
 def line_of(case: Case) -> float | None:
     """Frequency [Hz] of the strongest line in steady light; None where no line stands out."""
-    steady = [o.frame for c, o in zip(case.conditions, case.observations, strict=True) if not c.moves]
+    both = zip(case.conditions, case.observations, strict=True)
+    steady = [o.frame for c, o in both if not c.moves and c.use == "fit"]
     lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > 1000]
     (ratio, at), frame = max(lines, key=lambda line: line[0][0], default=((0.0, 0), np.zeros(1)))
     return frequency(frame, at) * case.frame_rate_hz if ratio > 30 else None
@@ -333,7 +341,7 @@ def concluded(
     found = [
         replace(f, parameters={k: kept[f.name].parameters()[k] for k in f.parameters}) for f in added if f.name in kept
     ]
-    rho = last.rho if last else before
+    rho = residual(null, values, last.predicted, last.count, last.spread) if last else before
     predicted = last.predicted if last else null.mean
     by_chance = float(np.sum(null.weight * np.ones(len(values))))
     left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)

@@ -130,8 +130,9 @@ def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
 
 def _scale(null: Null, measured: Array, predicted: Array) -> tuple[float, float]:
     """Scale of a simulated effect that comes nearest to the measured statistics, and its standard error."""
-    gap = np.nan_to_num(measured - null.mean)
-    return scale_of(gap, predicted - null.mean, null.noise**2, null.sd**2)
+    known = np.isfinite(measured)
+    gap, effect = np.where(known, measured - null.mean, 0.0), np.where(known, predicted - null.mean, 0.0)
+    return scale_of(gap, effect, null.noise**2, null.sd**2)
 
 
 def _fit_twins(
@@ -154,7 +155,7 @@ def _fit_twins(
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
         predicted, refits = predict(case, tried, within(tried, base), null, 1, 100, only)
-        seen = float(np.max(np.abs(predicted - null.mean) / null.noise))
+        seen = float(np.max(np.isfinite(measured) * np.abs(predicted - null.mean) / null.noise))
         if seen < VISIBLE and turn < TURNS - 1:
             louder = (2 * VISIBLE / max(seen, 1.0)) ** (1 / power)
             stronger = bounded(name, {**parameters, strength: parameters[strength] * louder})
@@ -288,7 +289,7 @@ def _damped(null: Null, measured: Array, predicted: Array, jacobian: Array) -> A
     """Robust, slightly damped least-squares step (n,) for a jacobian (S, n)."""
     noise2 = null.sd**2 * (2 + 1 / null.twins) + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2
     gap = np.nan_to_num(measured - predicted)
-    w = (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
+    w = np.isfinite(measured) * (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
     normal = jacobian.T @ (w[:, None] * jacobian)
     normal += 0.02 * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(normal))
     return np.asarray(np.linalg.solve(normal, jacobian.T @ (w * gap)), dtype=np.float64)

@@ -24,7 +24,7 @@ from spikecam_env.gap import plots
 from spikecam_env.gap.candidates import chosen, testable
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, adjusted, deviates, values_of
-from spikecam_env.gap.diagnose import ALARM, in_order, read_case, search
+from spikecam_env.gap.diagnose import ALARM, in_order, of_fit, read_case, search
 from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.templates import load, model_null
 from spikecam_env.sensor import Effect, SensorModel
@@ -127,8 +127,9 @@ def ladder(
         rungs.append(tried[best])
         left.pop(best)
     bar.close()
-    if adjusted(deviates(null, values)).min() < ALARM:
-        rounds = search(case, full, null, values, names, load())
+    seen = of_fit(case, null, values)
+    if adjusted(deviates(null, seen)).min() < ALARM:
+        rounds = search(case, full, null, seen, names, load())
         for was, now in itertools.pairwise(rounds):
             if now.model is not was.model:
                 fit = was.fits[0]

@@ -72,7 +72,7 @@ def solved(null: Null, measured: Array, predicted: Array, jacobian: Array) -> tu
     """(step, error), (n,) each: robust least squares for a jacobian (S, n), and standard deviations."""
     noise2 = null.sd**2 * (1 + 1 / COUNT) + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2
     gap = np.nan_to_num(measured - predicted)
-    w = null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
+    w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
     normal = jacobian.T @ (w[:, None] * jacobian)
     damped = normal + np.diag(0.02 * np.diag(normal) + 1e-9)
     step = np.linalg.solve(damped, jacobian.T @ (w * gap))

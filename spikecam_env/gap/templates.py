@@ -9,6 +9,7 @@ fit that follows simulates the campaign at hand and rests on no template.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -105,7 +106,7 @@ def screen(
     for entry in templates.entries:
         if entry.name not in names:
             continue
-        shift = np.where(at >= 0, entry.shift[at], 0.0)
+        shift = np.where((at >= 0) & np.isfinite(measured), entry.shift[at], 0.0)
         scale, _ = scale_of(d, shift, np.ones_like(d), np.ones_like(d), 2 * TOLERANCE)
         strength = CATALOGUE[entry.name].strength
         power = 2.0 if candidate(entry.name).square else 1.0
@@ -248,10 +249,12 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
 
 
 def told(keys: Sequence[Key], conditions: Sequence[Shown]) -> Array:
-    """(S,) how many recordings tell the same statistic of the pattern: those in the dark, or those in light."""
+    """(S,) how many recordings of use fit tell the same statistic of the pattern: those in the dark, or in light."""
     lit = {c.name: c.kind != "dark" for c in conditions}
+    fit = {c.name for c in conditions if c.use == "fit"}
     kind = [(k.name, lit[k.recording]) for k in keys]
-    return np.array([kind.count(k) for k in kind], dtype=np.float64)
+    counts = Counter(one for one, k in zip(kind, keys, strict=True) if k.recording in fit)
+    return np.array([max(counts[one], 1) for one in kind], dtype=np.float64)
 
 
 def starts(name: str) -> list[dict[str, float]]:
