@@ -253,6 +253,8 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
         rho, left = judged(null, measured, predicted, UNITS)
         return replace(found, predicted=predicted, rho=rho, misfit=left)
     only = concerned(case, added or [found.name], null, measured, found.predicted - null.mean)
+    if only is not None:  # held-out recordings did not say whether they are concerned, and are judged
+        only = sorted({*only, *(i for i, c in enumerate(case.conditions) if c.use != "fit")})
     _, refits = predict(case, found.model, within(found.model, found.base), null, 1, 200, only)
     base = settled(found.model, within(found.model, found.base), case.base, refits)
     values, _ = simulated(case, found.model, base, null, count, 300, only)
