@@ -3,7 +3,7 @@
     python -m benchmarks.detection_limits          prints the table and writes it into tests/hidden_world/limits.toml
 
 Limit: the strength at which the statistic that shows the effect best stands CLEAR noises off, in 64 x 64 pixels and
-8000 frames of the standard design; the alarm, over some 600 statistics, rings from about 4.2.  Effects in time are
+8000 frames of the standard design, held-out recordings aside; the alarm, over some 600 statistics, rings from about 4.2.  Effects in time are
 scaled from their template; those of the pattern, whose statistics are not in proportion, are searched for by drawing
 units.  The base model's own effects are not among them: they are hidden from `ideal`.
 """
@@ -11,13 +11,18 @@ units.  The base model's own effects are not among them: they are hidden from `i
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from spikecam_env.gap.campaign import standard_design
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.fit import bounded, with_effect, with_pattern
-from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.templates import FRAMES, SHAPE, load, standard_case
+from spikecam_env.gap.world import planned
 from spikecam_env.sensor import CATALOGUE
 from tests.hidden_world.catalogue import CATALOGUE as HIDDEN
 
@@ -28,24 +33,33 @@ TABLE = Path(__file__).parents[1] / "tests/hidden_world/limits.toml"
 def measured() -> dict[str, float]:
     """Strength by name; of an effect with several shapes the middle one."""
     by_name: dict[str, list[float]] = {}
-    for entry in load().entries:
+    templates = load()
+    to_fit = of_fit(templates.keys)
+    for entry in templates.entries:
         power = 0.5 if candidate(entry.name).square else 1.0
-        peak = float(np.abs(entry.shift).max())
+        peak = float(np.abs(entry.shift[to_fit]).max())
         strength = abs(entry.parameters[CATALOGUE[entry.name].strength])
         by_name.setdefault(entry.name, []).append(strength * (CLEAR / peak) ** power)
     limits = {name: float(np.median(values)) for name, values in by_name.items() if name in HIDDEN}
     return limits | of_pattern([name for name in limits if is_pattern(name)], limits)
 
 
+def of_fit(keys: Sequence[Key]) -> NDArray[np.bool_]:
+    """(S,) which statistics are of recordings of use fit."""
+    names = {c.name for c in planned(standard_design(), SHAPE, FRAMES) if c.use == "fit"}
+    return np.array([k.recording in names for k in keys])
+
+
 def of_pattern(names: list[str], near: dict[str, float]) -> dict[str, float]:
     """Strength by name from which units drawn with the effect stand CLEAR noises off, to 10 %."""
     case, model, null = standard_case()
+    to_fit = of_fit(null.keys)
     found = {}
     for name in names:
         key = CATALOGUE[name].strength
         for strength in near[name] * np.geomspace(0.02, 5.0, 60):
             tried = with_effect(model, name, bounded(name, {key: strength}))
-            shift = (with_pattern(case, tried, null, null.mean) - null.mean) / null.noise
+            shift = ((with_pattern(case, tried, null, null.prediction).mean - null.mean) / null.noise)[to_fit]
             found[name] = float(strength)
             if np.abs(shift).max() > CLEAR:
                 break

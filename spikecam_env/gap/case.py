@@ -40,10 +40,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Twin:
-    """One simulated campaign: its statistics and its own refit."""
+    """One simulated campaign: its statistics, and its own refit where what that rests on was simulated."""
 
     bank: dict[Key, float]
-    base: BaseFit
+    base: BaseFit | None
 
 
 def case_of(
@@ -66,15 +66,13 @@ def twins(
     case: Case,
     model: SensorModel,
     base: BaseFit,
-    count: int,
-    first: int = 0,
+    numbers: Sequence[int],
     only: Sequence[int] | None = None,
 ) -> list[Twin]:
-    """Campaigns of the unit `base` under `model`, numbers first .. first + count; one number is one set of draws.
+    """Campaigns of the unit `base` under `model`; one number is one set of draws, whatever the model.
 
     only: recordings to simulate, by index; without all of those that the refit rests on, `base` stands for it.
     """
-    numbers = range(first, first + count)
     with ThreadPoolExecutor(case.jobs) as pool:
         return list(pool.map(lambda n: _twin(case, model, base, case.seed * 1000 + 17 + n, only), numbers))
 
@@ -84,8 +82,8 @@ def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequen
     conditions = [case.conditions[i] for i in which]
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which)
-    own = measured_base(observations, conditions) if rests_on(case) <= set(which) else base
-    return Twin(bank(Reading(observations, conditions, own, case.films)), own)
+    own = measured_base(observations, conditions) if rests_on(case) <= set(which) else None
+    return Twin(bank(Reading(observations, conditions, own or base, case.films)), own)
 
 
 def rests_on(case: Case) -> set[int]:

@@ -26,9 +26,20 @@ from spikecam_env.errors import InputError
 from spikecam_env.gap.audit import Contradiction, audit
 from spikecam_env.gap.candidates import candidate, chosen, is_pattern, testable
 from spikecam_env.gap.case import Case, case_of
-from spikecam_env.gap.compare import TOLERANCE, Null, adjusted, deviates, judged, misfit, normal, residual, values_of
+from spikecam_env.gap.compare import (
+    TOLERANCE,
+    Null,
+    Prediction,
+    adjusted,
+    deviates,
+    judged,
+    misfit,
+    normal,
+    residual,
+    values_of,
+)
 from spikecam_env.gap.evidence import evidence_of
-from spikecam_env.gap.fit import Fit, confirmed, fit, gain, rejoined
+from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import Missing, missing
@@ -38,6 +49,7 @@ from spikecam_env.gap.place import when, where
 from spikecam_env.gap.polish import Errors, polished
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.rivals import is_rival
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.structure import structure
 from spikecam_env.gap.templates import Screened, Templates, bounds, load, model_null, screen
@@ -74,22 +86,20 @@ UNEXPLAINED = 0.02
 QUIET = 0.1
 """The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
 
-SEPARATED = 9.0
-"""Difference of misfits from which one candidate is told from another (likelihood ratio of 90)."""
+PROMISE = 9.0
+"""Misfit by which a fit that is not confirmed may be worse than the best that is, to be confirmed as well."""
 
 
 @dataclass(frozen=True)
 class Round:
     """One turn of the search: the model it started from, what that left, and the candidates that were fitted.
 
-    rivals: names that leave about as little as the best of them.
+    rivals: names that may as well be true as the best of them.
     """
 
     model: SensorModel
     base: BaseFit
-    predicted: Array
-    spread: Array
-    count: int
+    prediction: Prediction
     rho: Array
     misfit: float
     fits: tuple[Fit, ...]
@@ -229,13 +239,13 @@ def search(
 ) -> list[Round]:
     """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps."""
     rounds: list[Round] = []
-    now, base, predicted, spread, count = model, within(model, case.base), null.mean, null.sd, null.twins
+    now, base, prediction = model, within(model, case.base), null.prediction
     while len(rounds) < MOST:
-        rho = residual(null, values, predicted, count, spread)
+        rho = residual(null, values, prediction)
         if rounds and not alarmed(null, rho):
             break
-        here = standing_on(null, predicted, spread)
-        left_over = judged(here, values, predicted, count)[1]
+        here = standing_on(null, prediction)
+        left_over = judged(here, values, here.prediction)[1]
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, values, left, line_of(case))
         distance = np.nan_to_num((values - here.mean) / here.noise)
@@ -243,9 +253,9 @@ def search(
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
         sure, rest = settle(fits, partial(confirmed, case, now, here, values))
-        rivals = tuple(f.name for f in sure[1:] if f.misfit < sure[0].misfit + SEPARATED)
-        rounds.append(Round(now, base, predicted, spread, count, rho, left_over, (*sure, *rest), rivals))
-        if not sure or gain(case, now, here, values, sure[0]) < GAIN:
+        rivals = rivals_of(null, here, values, (*sure, *rest)) if sure else ()
+        rounds.append(Round(now, base, prediction, rho, left_over, (*sure, *rest), rivals))
+        if not sure or left_over - sure[0].misfit < GAIN:
             break
         best = sure[0]
         earlier = [r.fits[0].name for r in rounds[:-1]]
@@ -255,9 +265,9 @@ def search(
         best, errors = polished(case, model, null, values, best, names_now)
         rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
         rounds = [with_errors(r, errors) for r in rounds]
-        now, base, predicted, spread, count = best.model, best.base, best.predicted, best.spread, best.count
-    rho, left_over = judged(null, values, predicted, count, spread)
-    rounds.append(Round(now, base, predicted, spread, count, rho, left_over, ()))
+        now, base, prediction = best.model, best.base, best.prediction
+    rho, left_over = judged(null, values, prediction)
+    rounds.append(Round(now, base, prediction, rho, left_over, ()))
     return rounds
 
 
@@ -271,19 +281,27 @@ def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit
     """(confirmed, best first; the others).  A fit has been adjusted to its one twin and looks better than it is: they
     are confirmed from the best on, until one stands below all that the others promise."""
     waiting, sure = sorted(fits, key=lambda f: f.misfit), list[Fit]()
-    while waiting and (not sure or waiting[0].misfit < min(f.misfit for f in sure) + SEPARATED):
+    while waiting and (not sure or waiting[0].misfit < min(f.misfit for f in sure) + PROMISE):
         sure.append(confirm(waiting.pop(0)))
     return sorted(sure, key=lambda f: f.misfit), waiting
+
+
+def rivals_of(null: Null, here: Null, values: Array, fits: Sequence[Fit]) -> tuple[str, ...]:
+    """Names of candidates that may as well be true as the first, and leave nothing that it does not."""
+    best = fits[0]
+    enough = [f for f in fits[1:] if alarmed(here, best.rho) or not alarmed(here, f.rho)]
+    return tuple(f.name for f in enough if is_rival(here, null.draws, values, best.prediction, f.prediction))
 
 
 def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screened) -> Fit:
     return fit(case, model, null, values, s.name, s.start, s.expected)
 
 
-def standing_on(null: Null, predicted: Array, spread: Array) -> Null:
+def standing_on(null: Null, predicted: Prediction) -> Null:
     """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
-    floor = np.hypot(null.floor, TOLERANCE * (predicted - null.mean))
-    return replace(null, mean=predicted, sd=spread, floor=floor)
+    off = np.sqrt(np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0))
+    floor = np.sqrt(null.floor**2 + (TOLERANCE * (predicted.mean - null.mean)) ** 2 + off**2)
+    return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, draws=predicted.draws)
 
 
 def line_of(case: Case) -> float | None:
@@ -334,22 +352,22 @@ def concluded(
     """From the search to a verdict.  given: (S,) predictions of the model as it was given."""
     z = deviates(replace(null, mean=given), values)
     p = adjusted(z)
-    before = residual(null, values, null.mean, null.twins)
+    before = residual(null, values, null.prediction)
     last = rounds[-1] if rounds else None
     kept = {e.name: e for e in last.model.effects} if last else {}
     added = [r.fits[0] for r, after in itertools.pairwise(rounds) if after.model is not r.model]
     found = [
         replace(f, parameters={k: kept[f.name].parameters()[k] for k in f.parameters}) for f in added if f.name in kept
     ]
-    rho = residual(null, values, last.predicted, last.count, last.spread) if last else before
-    predicted = last.predicted if last else null.mean
+    rho = residual(null, values, last.prediction) if last else before
+    predicted = last.prediction.mean if last else null.mean
     by_chance = float(np.sum(null.weight * np.ones(len(values))))
     left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
     quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
     explained = not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet)
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     place, time_ = where(case), when(case)
-    share = lambda f: gap_of(case, null, values, given, f.predicted).removed  # noqa: E731
+    share = lambda f: gap_of(case, null, values, given, f.prediction.mean).removed  # noqa: E731
     effects = tuple(
         replace(named(f, r, null, values), where=place, when=time_, instead={o.name: share(o) for o in r.fits[1:]})
         for f, r in zip(found, rounds, strict=False)

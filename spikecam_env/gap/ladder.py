@@ -135,7 +135,7 @@ def ladder(
                 fit = was.fits[0]
                 effect = next(e for e in now.model.effects if e.name == fit.name)
                 sd = next(iter(fit.sd.values()), np.nan)
-                rungs.append(judged(case, null, values, now.predicted, now.model, Missing(effect, sd)))
+                rungs.append(judged(case, null, values, now.prediction.mean, now.model, Missing(effect, sd)))
     return Ladder(str(measured.folder), seed, len(values), tuple(rungs))
 
 

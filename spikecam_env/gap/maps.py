@@ -21,7 +21,18 @@ from numpy.typing import NDArray
 from spikecam_env.calibration.campaign import Campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.candidates import candidate, chosen, is_pattern
-from spikecam_env.gap.compare import HEAVY, Null, adjusted, deviates, misfit, normal, null_of, residual, values_of
+from spikecam_env.gap.compare import (
+    HEAVY,
+    Null,
+    Prediction,
+    adjusted,
+    deviates,
+    misfit,
+    normal,
+    null_of,
+    residual,
+    values_of,
+)
 from spikecam_env.gap.fit import bounded, with_effect
 from spikecam_env.gap.parameters import USUAL
 from spikecam_env.gap.refit import BaseFit
@@ -177,6 +188,11 @@ def unit_levels(model: SensorModel, case: Maps, number: int) -> tuple[Array, Arr
     return gain.reshape(case.shape), dark.reshape(case.shape)
 
 
+def predicted_by(null: Null, mean: Array, units: int) -> Prediction:
+    """A mean over that many units."""
+    return Prediction(mean, null.sd / np.sqrt(units), null.sd)
+
+
 def predict(state: State, case: Maps, keys: Sequence[Key], units: Sequence[int]) -> Array:
     """(S,) mean statistics over units."""
     return np.mean([values_of(bank(unit_maps(state.fitted, case, n)), keys) for n in units], axis=0)
@@ -264,7 +280,7 @@ def fitted(case: Maps, start: State, null: Null, values: Array, name: str) -> Tr
     damping, best, least = 0.02, state, np.inf
     for _ in range(STEPS):
         at = predict(state, case, null.keys, [0])
-        now = misfit(residual(null, values, at, 1)[use])
+        now = misfit(residual(null, values, predicted_by(null, at, 1))[use])
         if now > least:
             damping *= 8.0
         else:
@@ -283,7 +299,7 @@ def fitted(case: Maps, start: State, null: Null, values: Array, name: str) -> Tr
         if np.abs(step).max() < 0.01:
             break
     predicted = predict(best, case, null.keys, range(UNITS))
-    rho = residual(null, values, predicted, UNITS)
+    rho = residual(null, values, predicted_by(null, predicted, UNITS))
     return Tried(name, best, sd, predicted, rho, misfit(rho[use]))
 
 
@@ -314,7 +330,7 @@ def _step(
     null: Null, values: Array, predicted: Array, jacobian: Array, use: NDArray[np.bool_], damping: float
 ) -> tuple[Array, Array]:
     """Damped Gauss-Newton step under the heavy-tailed loss, and the covariance of parameters."""
-    rho = residual(null, values, predicted, 1)
+    rho = residual(null, values, predicted_by(null, predicted, 1))
     gap = np.nan_to_num(values - predicted)
     noise = np.where(np.abs(rho) > 1e-9, np.abs(gap) / np.maximum(np.abs(rho), 1e-9), null.noise)
     w = np.where(use, (HEAVY + 1) / (HEAVY + rho**2) / noise**2, 0.0)
@@ -330,7 +346,7 @@ def concluded(
     """From the search to a verdict."""
     last = rounds[-1][0] if rounds else None
     use = of_use(case, null.keys, "fit")
-    rho = last.rho if last else residual(null, values, null.mean, null.twins)
+    rho = last.rho if last else residual(null, values, null.prediction)
     predicted = last.predicted if last else null.mean
     square = [float(np.mean(((values - mean) / null.noise) ** 2)) for mean in (null.mean, predicted)]
     left = (square[1] - 1.0) / max(square[0] - 1.0, 1e-9)

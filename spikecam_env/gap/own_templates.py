@@ -22,7 +22,9 @@ _SETTLED = 4
 def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[str]) -> Templates:
     """Templates of the candidates in `names` on this very campaign, whose model predicts `null`."""
     base = within(model, case.base)
-    base = settled(model, base, case.base, [t.base for t in twins(case, model, base, _SETTLED, first=50)])
+    base = settled(
+        model, base, case.base, [t.base for t in twins(case, model, base, range(50, 50 + _SETTLED)) if t.base]
+    )
     unit = replace(case, base=base, jobs=1)
     todo = [(n, p) for n in names if not is_pattern(n) for p in starts(n)]
     with ThreadPoolExecutor(case.jobs) as pool:

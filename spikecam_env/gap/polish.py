@@ -1,6 +1,6 @@
 """The last touch: all parameters of the effects found, refined together, and how surely each is known.
 
-Gauss-Newton in their logarithms, on means over a few twins with the same draws.
+Gauss-Newton in their logarithms, on twins of the same draws as the null's.
 """
 
 from __future__ import annotations
@@ -13,15 +13,12 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.compare import HEAVY, TOLERANCE, Null, is_clear
+from spikecam_env.gap.compare import Null, Prediction, step_of
 from spikecam_env.gap.fit import Fit, bounded, concerned, confirmed, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-COUNT = 2
-"""Twins at each point."""
 
 TURNS = 3
 
@@ -34,8 +31,8 @@ FURTHEST = 0.7
 WORSE = 3.0
 """Misfit by which a step may seem worse, by chance of the draws."""
 
-Probe = Callable[[SensorModel], Array]
-"""The statistics (S,) that a model gives."""
+Probe = Callable[[SensorModel], Prediction]
+"""What a model gives."""
 
 Errors = dict[str, dict[str, float]]
 """Standard deviation of each parameter, by effect and name."""
@@ -54,7 +51,8 @@ def polished(
     for _ in range(TURNS):
         at = probe(now)
         columns = np.stack([_column(probe, now, at, null, name, key) for name, key in free], axis=1)
-        step, error = solved(null, measured, at, columns)
+        step, error = step_of(null, measured, at, columns)
+        step = np.clip(step, -FURTHEST, FURTHEST)
         now = moved(now, free, step)
         if np.abs(step).max() < SETTLED:
             break
@@ -68,17 +66,6 @@ def polished(
     return replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name]), errors
 
 
-def solved(null: Null, measured: Array, predicted: Array, jacobian: Array) -> tuple[Array, Array]:
-    """(step, error), (n,) each: robust least squares for a jacobian (S, n), and standard deviations."""
-    noise2 = null.sd**2 * (1 + 1 / COUNT) + null.floor**2 + (TOLERANCE * (predicted - null.mean)) ** 2
-    gap = np.nan_to_num(measured - predicted)
-    w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
-    normal = jacobian.T @ (w[:, None] * jacobian)
-    damped = normal + np.diag(0.02 * np.diag(normal) + 1e-9)
-    step = np.linalg.solve(damped, jacobian.T @ (w * gap))
-    return np.clip(step, -FURTHEST, FURTHEST), np.sqrt(np.diag(np.linalg.inv(damped)))
-
-
 def moved(model: SensorModel, free: Sequence[tuple[str, str]], step: Array) -> SensorModel:
     """The model with the logarithms of these parameters moved."""
     for (name, key), s in zip(free, step, strict=True):
@@ -87,22 +74,21 @@ def moved(model: SensorModel, free: Sequence[tuple[str, str]], step: Array) -> S
     return model
 
 
-def _column(probe: Probe, model: SensorModel, at: Array, null: Null, name: str, key: str) -> Array:
-    """(S,) change of the statistics for one more of a parameter's logarithm, where it stands clear of noise."""
-    peak = float(np.max(np.abs(at - null.mean) / null.noise))
-    nudge = float(np.clip(6.0 / peak, 0.25, 1.0)) if key == candidate(name).fitted[0] else 0.3
-    change = probe(moved(model, [(name, key)], np.array([nudge]))) - at
-    return np.where(is_clear(change, 2 * null.sd**2 / COUNT), change / nudge, 0.0)
+def _column(probe: Probe, model: SensorModel, at: Prediction, null: Null, name: str, key: str) -> Array:
+    """(S,) change of the statistics for one more of a parameter's logarithm."""
+    peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
+    nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if key == candidate(name).fitted[0] else 0.3
+    return (probe(moved(model, [(name, key)], np.array([nudge]))).mean - at.mean) / nudge
 
 
 def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:
-    """Means over twins, and over drawn units where an effect changes the pattern."""
-    only = concerned(case, names, null, measured, found.predicted - null.mean)
+    """One twin, and drawn units where an effect changes the pattern."""
+    only = concerned(case, names, null, measured, found.prediction.mean - null.mean)
 
-    def statistics(model: SensorModel) -> Array:
-        mean = null.mean
+    def statistics(model: SensorModel) -> Prediction:
+        made = null.prediction
         if not all(is_pattern(name) for name in names):
-            mean, _ = predict(case, model, within(model, found.base), null, COUNT, 400, only)
-        return with_pattern(case, model, null, mean) if any(is_pattern(name) for name in names) else mean
+            made = predict(case, model, within(model, found.base), null, 1, only)
+        return with_pattern(case, model, null, made) if any(is_pattern(name) for name in names) else made
 
     return statistics

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from itertools import product
 from pathlib import Path
@@ -232,19 +232,18 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
     """What a model predicts for a case: twins of its unit, and drawn units for the pattern."""
     base = within(model, case.base)
     if case.scenes_only:  # too short for the closed law of jitter
-        base = settled(model, base, case.base, [t.base for t in twins(case, model, base, 4, first=50)])
+        base = settled(model, base, case.base, [t.base for t in twins(case, model, base, range(50, 54)) if t.base])
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
-    banks = [{**t.bank, **d} for t, d in zip(twins(case, model, base, count), drawn, strict=False)]
-    null = null_of(banks, list(case.bank))
+    made = twins(case, model, base, range(count))
+    banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]
+    null = null_of(banks, list(case.bank), [t.base for t in made if t.base])
     values = np.array([[d.get(k, np.nan) for k in null.keys] for d in drawn])
     of_pattern = np.array([k.group == "pattern" for k in null.keys])
-    return Null(
-        null.keys,
-        np.where(of_pattern, values.mean(axis=0), null.mean),
-        np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
-        null.floor,
-        count,
-        np.where(of_pattern, 1.0 / told(null.keys, case.conditions), 1.0),
+    return replace(
+        null,
+        mean=np.where(of_pattern, values.mean(axis=0), null.mean),
+        sd=np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
+        weight=np.where(of_pattern, 1.0 / told(null.keys, case.conditions), 1.0),
     )
 
 
@@ -273,7 +272,7 @@ def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters:
     power = 2.0 if candidate(name).square else 1.0
     now = bounded(name, parameters)
     only: list[int] | None = None
-    shift = _shift(case, model, null, name, now, 1, only)
+    shift = _shift(case, model, null, name, now, only)
     for _ in range(4):
         peak = float(np.abs(shift).max())
         if 0.5 * PEAK < peak < 2.5 * PEAK:
@@ -284,7 +283,7 @@ def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters:
             break
         now = then
         only = concerned(case, [name], null, null.mean, shift * null.noise * factor**power)
-        shift = _shift(case, model, null, name, now, 1, only)
+        shift = _shift(case, model, null, name, now, only)
     return Template(name, now, shift)
 
 
@@ -294,15 +293,14 @@ def _shift(
     null: Null,
     name: str,
     parameters: Mapping[str, float],
-    count: int,
     only: Sequence[int] | None,
 ) -> Array:
     there = with_effect(model, name, parameters)
     if is_pattern(name):
-        mean = with_pattern(case, there, null, null.mean)
+        made = with_pattern(case, there, null, null.prediction)
     else:
-        mean, _ = predict(case, there, within(there, case.base), null, count, 100, only)
-    return np.nan_to_num((mean - null.mean) / null.noise)
+        made = predict(case, there, within(there, case.base), null, 1, only)
+    return np.nan_to_num((made.mean - null.mean) / null.noise)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ CASES = [
     (effect("lamp_drift", sigma_per_root_s=0.02), "flat-0.65", ["trend", "bend"], ["dark", "intervals", "rows"]),
     (effect("dark_current_drift", rise=0.3, tau_ms=50.0), "dark", ["trend"], ["intervals", "step"]),
     (effect("random_telegraph_noise", amplitude_pA=1.0, fraction=0.1, dwell_ms=20.0), "flat-0.08", ["pixel tail"], []),
-    (effect("threshold_flicker_noise", sigma_mV=1.0), "flat-0.4", ["pixel tail"], ["dark"]),
+    (effect("threshold_flicker_noise", sigma_mV=2.0), "flat-0.4", ["pixels"], ["dark"]),
 ]
 
 

@@ -66,12 +66,13 @@ def _light_flicker(ph: Physics, camera: Camera, frames: int, p: Parameters, rng:
 def _optical_blur(light: Light, shape: tuple[int, int], p: Parameters) -> Light:
     if light.radiance.shape[1:] == (1, 1):
         return light
-    s = p["sigma_pixels"]
-    reach = int(np.ceil(4.5 * s)) + 1
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / s) ** 2)
-    kernel /= kernel.sum()
-    blurred = convolve1d(convolve1d(light.radiance, kernel, axis=1, mode="nearest"), kernel, axis=2, mode="nearest")
-    return Light(light.key_frame, np.maximum(blurred, 0.0))
+    steps = max(8, int(np.ceil(10.0 * p["sigma_pixels"] ** 2)))
+    share = p["sigma_pixels"] ** 2 / 2.0 / steps  # light diffuses to the pixels beside: variance 2 share a step
+    blurred = light.radiance
+    for _ in range(steps):
+        for axis in (1, 2):
+            blurred = convolve1d(blurred, np.array([share, 1.0 - 2.0 * share, share]), axis=axis, mode="nearest")
+    return Light(light.key_frame, blurred)
 
 
 def _vignetting(camera: Camera, p: Parameters, rng: Rng) -> Camera:
@@ -378,7 +379,7 @@ CATALOGUE = {
         Mechanism("row_fixed_pattern", "V_d of a row", camera=_row_or_column_pattern(0)),
         Mechanism("column_fixed_pattern", "V_d of a column", camera=_row_or_column_pattern(1)),
         Mechanism("vignetting", "alpha (1 - v r^2/r_corner^2)", camera=_vignetting),
-        Mechanism("optical_blur", "Gaussian spread of light", light=_optical_blur),
+        Mechanism("optical_blur", "light diffuses: heat equation of variance s^2", light=_optical_blur),
         Mechanism("crosstalk", "a spike kicks its four neighbours, at the end of the frame", physics=_crosstalk),
         Mechanism(
             "blooming",

@@ -1,0 +1,46 @@
+"""Whether a measurement tells one candidate from another.
+
+Had the other been true, would the first have looked as much better as it does?  The noise of the null's own draws, on
+top of what the other predicts, makes campaigns in which it is true: they say what lead of the first over it is chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from spikecam_env.gap.compare import Draw, Null, Prediction, judged, scale_of, scaled
+
+Array = NDArray[np.float64]
+
+DOUBT = 0.01
+"""Chance of so large a lead below which a candidate is no rival."""
+
+
+def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Prediction, other: Prediction) -> bool:
+    """Whether `measured` may as well be of `other`; null: what both were added to.  draws: of the model as given."""
+    noise = np.array([d.values for d in draws])
+    noise = noise - noise.mean(axis=0)
+    known = np.isfinite(measured)
+    middle = rescaled(null, measured, other).mean
+    by_chance = [lead(null, np.where(known, middle + n, np.nan), best, other) for n in noise]
+    above = lead(null, measured, best, other) - np.mean(by_chance)
+    sd = np.std(by_chance, ddof=1) * np.sqrt(1 + 1 / len(noise))
+    return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > DOUBT)
+
+
+def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
+    """Misfit by which `best` is better than `other`, each at the strength that suits `seen`."""
+    left = [judged(null, seen, rescaled(null, seen, p))[1] for p in (other, best)]
+    return left[0] - left[1]
+
+
+def rescaled(null: Null, seen: Array, predicted: Prediction) -> Prediction:
+    """A prediction with its change from the null scaled to come nearest to what is seen."""
+    known = np.isfinite(seen)
+    gap, effect = (np.where(known, v - null.mean, 0.0) for v in (seen, predicted.mean))
+    scale, _ = scale_of(gap, effect, null.noise**2, np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0))
+    return scaled(null, predicted, scale)
