@@ -3,9 +3,9 @@
     python -m benchmarks.detection_limits          prints the table and writes it into tests/hidden_world/limits.toml
 
 Limit: the strength at which the statistic that shows the effect best stands CLEAR noises off, in 64 x 64 pixels and
-8000 frames of the standard design, held-out recordings aside; the alarm, over some 600 statistics, rings from about 4.2.  Effects in time are
-scaled from their template; those of the pattern, whose statistics are not in proportion, are searched for by drawing
-units.  The base model's own effects are not among them: they are hidden from `ideal`.
+8000 frames of the standard design, held-out recordings aside; the alarm, over some 450 statistics, rings from about
+4.2.  Effects in time are scaled from their template; those of the pattern, whose statistics are not in proportion, are
+searched for by drawing units.  The base model's own effects are not among them: they are hidden from `ideal`.
 """
 
 from __future__ import annotations

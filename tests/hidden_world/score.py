@@ -57,8 +57,8 @@ INSEPARABLE = (
     {"photo_response_nonlinearity", "ir_drop", "dead_time", "synchronous_reset"},
 )
 """Sets whose `class` counts as right (DESIGN section 9).  x / (1 + tau x) and x (1 - tau x) differ by (tau x)^2: at the
-strengths drawn, some 0.002 frames, by parts in a million, which no recording of this length holds.  A share f of the
-charge between crossing and read-out, half a frame in the mean, is a dead time of f / 2 frames that scatters by 0.3 f."""
+strengths drawn, some 0.002 frames, by parts in a million, which no recording of this length holds.  Of charge between
+crossing and read-out, half a frame's in the mean, a share f is a dead time of f / 2 frames that scatters by 0.3 f."""
 
 
 RIVAL_LESS = 0.02
