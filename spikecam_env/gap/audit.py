@@ -26,6 +26,10 @@ LEAST_DARK = 0.02
 """Relative difference of a dark recording from what the flats extrapolate to that is worth a word: of few spikes a
 pixel, the rate between first and last is biased by their number squared."""
 
+UNEVEN = 0.5
+"""Spread over pixels of what a recording is off by, as a share of it, from which no label is to blame: a label is one
+number, and an effect that sets in there depends on the pixel."""
+
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
 
@@ -168,6 +172,8 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
     off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0) if light[i] > 0 else np.inf
     if left > MENDED * before or abs(off) < max(LEAST_LABEL, 4 * left):
         return []
+    if light[i] > 0 and uneven(case, names[i], names) > UNEVEN * abs(off):
+        return []
     if light[i] == 0:
         off = float(rate[i] / max(dark, 1e-9) - 1)
         if abs(off) < LEAST_DARK or abs(rate[i] - dark) < 4 * left * rate[keep].min():
@@ -179,6 +185,20 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
         )
         text += f"{100 * left:.1g} %"
     return [Contradiction("label", (names[i],), text)]
+
+
+def uneven(case: Case, name: str, names: Sequence[str]) -> float:
+    """Half of the middle 68 % of pixels by how far their rates in recording `name` are off their own lines, beyond what
+    it is in the recording of nearest light."""
+    live, base = case.base.live, case.base
+    spread: dict[str, float] = {}
+    level = {c.name: c.level for c in case.conditions}
+    for c, o in zip(case.conditions, case.observations, strict=True):
+        if c.name in names and c.level > 0:
+            off = o.rate[live] / (base.gain * c.level + base.dark)[live]
+            spread[c.name] = float(np.diff(np.quantile(off, [0.1587, 0.8413]))[0]) / 2
+    near = min((n for n in spread if n != name), key=lambda n: abs(np.log(level[n] / level[name])))
+    return float(np.sqrt(max(spread[name] ** 2 - spread[near] ** 2, 0.0)))
 
 
 def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.gap.observe import Observation
 from spikecam_env.gap.refit import BaseFit, measured_base, within
@@ -16,6 +17,8 @@ from spikecam_env.gap.statistics.moving import Film, films
 from spikecam_env.gap.statistics.reading import Reading
 from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -87,15 +90,29 @@ def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequen
 
 
 def rests_on(case: Case) -> set[int]:
-    """Recordings that the base refit rests on: of known light, or where there is none, of unknown scenes."""
-    known = {i for i, c in enumerate(case.conditions) if c.kind in KNOWN}
+    """Recordings that the base refit rests on: of use fit and of known light, or where none is, of unknown scenes."""
+    known = {i for i, c in enumerate(case.conditions) if c.kind in KNOWN and c.use == "fit"}
     return known or {i for i, c in enumerate(case.conditions) if c.kind == "unknown"}
 
 
-def settled(model: SensorModel, used: BaseFit, measured: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
-    """Indirect inference: shift the unit so that a twin's refit comes out as the measurement's does."""
-    gain = used.gain * measured.gain / np.maximum(np.mean([s.gain for s in simulated], axis=0), 1e-9)
-    dark = used.dark + measured.dark - np.mean([s.dark for s in simulated], axis=0)
-    ratio = measured.white / np.mean([s.white for s in simulated])
-    return within(model, replace(used, gain=np.where(measured.live, gain, used.gain), dark=np.maximum(dark, 0.0),
-                                 white=used.white * float(np.clip(ratio, 0.3, 3.0))))  # fmt: skip
+def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
+    """Indirect inference: shift the unit `used` so that its twins, refitted as `simulated`, are refitted as `wanted`.
+
+    The shift of a pixel is a straight line in its own response and dark level: pixel by pixel it would be tuned to the
+    noise of these very twins.
+    """
+    live = wanted.live & (wanted.gain > 0) & np.all([s.gain > 0 for s in simulated], axis=0)
+    ratio = np.log(wanted.gain[live] / np.mean([s.gain[live] for s in simulated], axis=0))
+    gain = used.gain * np.exp(_line(used.gain, live, ratio))
+    dark = used.dark + _line(used.dark, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))
+    white = used.white * float(np.clip(wanted.white / np.mean([s.white for s in simulated]), 0.3, 3.0))
+    return within(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
+
+
+def _line(x: Array, known: NDArray[np.bool_], y: Array) -> Array:
+    """(P,) least-squares line through y, of the pixels `known`, over x, outliers cut; its mean where x is one."""
+    y = np.clip(y, *np.quantile(y, [0.02, 0.98]))
+    off = x - x[known].mean()
+    square = float(np.mean(off[known] ** 2))
+    slope = float(np.mean(off[known] * y)) / square if square > 0 else 0.0
+    return np.asarray(y.mean() + slope * off, np.float64)

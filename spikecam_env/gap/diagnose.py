@@ -86,7 +86,7 @@ UNEXPLAINED = 0.02
 QUIET = 0.1
 """The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
 
-PROMISE = 9.0
+PROMISE = 15.0
 """Misfit by which a fit that is not confirmed may be worse than the best that is, to be confirmed as well."""
 
 
@@ -253,7 +253,7 @@ def search(
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
         sure, rest = settle(fits, partial(confirmed, case, now, here, values))
-        rivals = rivals_of(null, here, values, (*sure, *rest)) if sure else ()
+        rivals = rivals_of(null, here, values, sure)
         rounds.append(Round(now, base, prediction, rho, left_over, (*sure, *rest), rivals))
         if not sure or left_over - sure[0].misfit < GAIN:
             break
@@ -263,7 +263,9 @@ def search(
             best = rejoined(case, model, null, values, best, earlier)
         names_now = [n for n in (*earlier, best.name) if n in {e.name for e in best.model.effects}]
         best, errors = polished(case, model, null, values, best, names_now)
-        rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
+        others = rounds[-1].fits[1:]
+        second = [confirmed(case, now, here, values, f, held_out=True) for f in others[:1]]
+        rounds[-1] = replace(rounds[-1], fits=(best, *second, *others[1:]))
         rounds = [with_errors(r, errors) for r in rounds]
         now, base, prediction = best.model, best.base, best.prediction
     rho, left_over = judged(null, values, prediction)
@@ -278,16 +280,19 @@ def with_errors(turn: Round, errors: Errors) -> Round:
 
 
 def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:
-    """(confirmed, best first; the others).  A fit has been adjusted to its one twin and looks better than it is: they
-    are confirmed from the best on, until one stands below all that the others promise."""
-    waiting, sure = sorted(fits, key=lambda f: f.misfit), list[Fit]()
-    while waiting and (not sure or waiting[0].misfit < min(f.misfit for f in sure) + PROMISE):
-        sure.append(confirm(waiting.pop(0)))
+    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, until
+    one, as much better as that made the others, still stands PROMISE above the best."""
+    waiting, sure, better = sorted(fits, key=lambda f: f.misfit), list[Fit](), 0.0
+    while waiting and (not sure or waiting[0].misfit - better < min(f.misfit for f in sure) + PROMISE):
+        sure.append(confirm(waiting[0]))
+        better = max(better, waiting.pop(0).misfit - sure[-1].misfit)
     return sorted(sure, key=lambda f: f.misfit), waiting
 
 
 def rivals_of(null: Null, here: Null, values: Array, fits: Sequence[Fit]) -> tuple[str, ...]:
     """Names of candidates that may as well be true as the first, and leave nothing that it does not."""
+    if not fits:
+        return ()
     best = fits[0]
     enough = [f for f in fits[1:] if alarmed(here, best.rho) or not alarmed(here, f.rho)]
     return tuple(f.name for f in enough if is_rival(here, null.draws, values, best.prediction, f.prediction))
@@ -369,7 +374,7 @@ def concluded(
     place, time_ = where(case), when(case)
     share = lambda f: gap_of(case, null, values, given, f.prediction.mean).removed  # noqa: E731
     effects = tuple(
-        replace(named(f, r, null, values), where=place, when=time_, instead={o.name: share(o) for o in r.fits[1:]})
+        replace(named(f, r, null, values), where=place, when=time_, instead={o.name: share(o) for o in r.fits[1:2]})
         for f, r in zip(found, rounds, strict=False)
     )
     rivals = rounds[0].rivals if rounds else ()

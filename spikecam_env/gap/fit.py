@@ -135,26 +135,26 @@ def _fit_twins(
     parameters: dict[str, float],
     expected: Array | None,
 ) -> Fit:
-    """Twins at the start, made stronger until they show, scaled until the strength is right to a third; then, with
-    shapes, Gauss-Newton; the last step is a scaling of what was simulated, without another twin."""
+    """Twins at the start, made stronger until they show, scaled until the strength is right to a third and the unit has
+    settled; then, with shapes, Gauss-Newton; the last step is a scaling of what was simulated, without another twin."""
     what = candidate(name)
     strength = what.fitted[0]
     power = 2.0 if what.square else 1.0
-    base = within(model, case.base)
     parameters = bounded(name, parameters)
-    only = None if expected is None else concerned(case, [name], null, measured, expected)
+    base = bare = within(with_effect(model, name, parameters), within(model, case.base))
+    everywhere = np.full(len(null.keys), np.inf)
+    only = concerned(case, [name], null, measured, everywhere if expected is None else expected)
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
-        used = within(tried, base)
-        predicted = predict(case, tried, used, null, 1, only)
+        predicted = predict(case, tried, base, null, 1, only)
         seen = float(np.max(np.isfinite(measured) * np.abs(predicted.mean - null.mean) / null.noise))
         if seen < VISIBLE and turn < TURNS - 1:
             louder = (2 * VISIBLE / max(seen, 0.2)) ** (1 / power)
             stronger = bounded(name, {**parameters, strength: parameters[strength] * louder})
             if stronger != parameters:
-                parameters, only = stronger, None
+                parameters, only = stronger, concerned(case, [name], null, measured, everywhere)
                 continue
-        base = as_seen(tried, used, null, predicted)
+        base = as_seen(tried, base, null, predicted)
         scale, sd = _scale(null, measured, predicted)
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
         if factor < 0 and not _may_be_negative(name):
@@ -168,35 +168,43 @@ def _fit_twins(
             predicted = predict(case, with_effect(model, name, parameters), base, null, 1, only)
             scale, sd = _scale(null, measured, predicted)
             factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
-        too_weak_to_show = abs(scale) * seen < VISIBLE
-        near |= too_weak_to_show
-        if near or turn == TURNS - 1:
+        near |= abs(scale) * seen < VISIBLE
+        if (near and turn) or turn == TURNS - 1:
             break
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
+        base = shifted(bare, base, factor**power)
         only = concerned(case, [name], null, measured, (predicted.mean - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
     predicted = scaled(null, predicted, moved)
     rho, left = judged(null, measured, predicted)
     relative = sd / max(abs(scale), 1e-9) / power
-    there = with_effect(model, name, final)
-    return Fit(name, final, {strength: abs(final[strength]) * relative}, predicted, base, rho, left, there)
+    sds, there = {strength: abs(final[strength]) * relative}, with_effect(model, name, final)
+    return Fit(name, final, sds, predicted, shifted(bare, base, moved), rho, left, there)
 
 
-def concerned(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int] | None:
-    """Recordings on which effects show, or something has to be explained, by index; None for all.
+def shifted(bare: BaseFit, settled: BaseFit, factor: float) -> BaseFit:
+    """The unit for an effect `factor` times as strong as the one under which `bare` became `settled`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(bare.gain > 0, settled.gain / bare.gain, 1.0)
+    dark = np.maximum(bare.dark + factor * (settled.dark - bare.dark), 0.0)
+    white = bare.white * (settled.white / bare.white) ** factor if bare.white > 0 else settled.white
+    return replace(settled, gain=bare.gain * ratio**factor, dark=dark, white=white)
+
+
+def concerned(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int]:
+    """Recordings of use fit on which effects show, or something has to be explained, by index; all where none does.
 
     With those that the refit rests on, unless the effects leave steady uniform light alone: the refit takes up their
     mean, and the others are judged by that refit.
     """
     seen = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean))) > 5 * null.noise
     shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
-    which = {i for i, c in enumerate(case.conditions) if c.name in shows}
-    if not which:
-        return None
+    fitted = {i for i, c in enumerate(case.conditions) if c.use == "fit"}
+    which = {i for i in fitted if case.conditions[i].name in shows} or fitted
     if which & rests_on(case) or not all(candidate(name).only_contrast for name in names):
         which |= rests_on(case)
-    return sorted(which) if len(which) < len(case.conditions) else None
+    return sorted(which)
 
 
 def _may_be_negative(name: str) -> bool:
@@ -214,7 +222,7 @@ def _gauss_newton(
     parameters: dict[str, float],
     predicted: Prediction,
     base: BaseFit,
-    only: Sequence[int] | None,
+    only: Sequence[int],
 ) -> dict[str, float]:
     """Factors to multiply the fitted parameters by: one damped step in their logarithms, differences of 30 %."""
     columns, fitted = [], candidate(name).fitted
@@ -226,17 +234,19 @@ def _gauss_newton(
     return {key: float(np.exp(s)) for key, s in zip(fitted, np.clip(step, -1.0, 1.0), strict=True)}
 
 
-def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, count: int = SURE) -> Fit:
-    """The fit simulated with more draws, its unit settled once more: for the gate."""
+def confirmed(
+    case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, *, held_out: bool = False
+) -> Fit:
+    """The fit simulated with more draws, its unit settled once more; held_out: on recordings held out as well."""
     added = [e.name for e in found.model.effects if e not in model.effects]
     predicted = null.prediction
     base = within(found.model, found.base)
     if not (added and all(is_pattern(name) for name in added)):
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
-        if only is not None:  # held-out recordings did not say whether they are concerned, and are judged
-            only = sorted({*only, *(i for i, c in enumerate(case.conditions) if c.use != "fit")})
         base = as_seen(found.model, base, null, predict(case, found.model, base, null, 1, only))
-        predicted = predict(case, found.model, base, null, count, only)
+        if held_out:
+            only = sorted({*only, *(i for i, c in enumerate(case.conditions) if c.use != "fit")})
+        predicted = predict(case, found.model, base, null, SURE, only)
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)
     rho, left = judged(null, measured, predicted)

@@ -20,7 +20,7 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-TURNS = 3
+TURNS = 2
 
 SETTLED = 0.05
 """Largest step of a logarithm that needs no other."""
@@ -56,8 +56,9 @@ def polished(
         now = moved(now, free, step)
         if np.abs(step).max() < SETTLED:
             break
-    again = confirmed(case, model, null, measured, replace(found, model=now))
-    best = again if again.misfit < found.misfit + WORSE else found
+    best = confirmed(case, model, null, measured, replace(found, model=now), held_out=True)
+    if best.misfit > found.misfit + WORSE:
+        best = confirmed(case, model, null, measured, found, held_out=True)
     values = {e.name: e.parameters() for e in best.model.effects}
     errors: Errors = {name: {} for name in names}
     for (name, key), e in zip(free, error, strict=True):

@@ -60,7 +60,7 @@ def measured_base(observations: list[Observation], conditions: list[Shown]) -> B
     rates = together([rates_from_times([o.times]) for o, _ in static])
     light = np.stack([np.broadcast_to(c.picture, o.times.count.shape) for o, c in static])
     use = np.array([c.use == "fit" for _, c in static])
-    white = jitter_of([o for o, _ in static])
+    white = jitter_of([o for o, c in static if c.use == "fit"] or [o for o, _ in static])
     lines = fit_lines(light, rates, white, use)
     gain, dark = np.nan_to_num(lines.gain), np.nan_to_num(lines.dark)
     expected = gain * light + dark

@@ -20,14 +20,22 @@ DOUBT = 0.01
 """Chance of so large a lead below which a candidate is no rival."""
 
 
+LEAST = 6.0
+"""Lead that tells nothing, whatever the draws say: a likelihood ratio of 20."""
+
+
 def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Prediction, other: Prediction) -> bool:
     """Whether `measured` may as well be of `other`; null: what both were added to.  draws: of the model as given."""
+    observed = lead(null, measured, best, other)
+    if observed < LEAST:
+        return True
     noise = np.array([d.values for d in draws])
-    noise = noise - noise.mean(axis=0)
+    own = np.sqrt(np.maximum(other.error**2 - null.sd**2 / null.twins, 0.0))
+    noise = noise - noise.mean(axis=0) + own * np.random.default_rng(len(noise)).standard_normal(noise.shape)
     known = np.isfinite(measured)
     middle = rescaled(null, measured, other).mean
     by_chance = [lead(null, np.where(known, middle + n, np.nan), best, other) for n in noise]
-    above = lead(null, measured, best, other) - np.mean(by_chance)
+    above = observed - np.mean(by_chance)
     sd = np.std(by_chance, ddof=1) * np.sqrt(1 + 1 / len(noise))
     return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > DOUBT)
 

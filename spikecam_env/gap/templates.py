@@ -24,7 +24,7 @@ from tqdm import tqdm
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.case import Case, case_of, settled, twins
 from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, scale_of
-from spikecam_env.gap.fit import UNITS, bounded, concerned, predict, with_effect, with_pattern
+from spikecam_env.gap.fit import UNITS, bounded, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.statistics import Key
@@ -271,8 +271,7 @@ def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters:
     strength = CATALOGUE[name].strength
     power = 2.0 if candidate(name).square else 1.0
     now = bounded(name, parameters)
-    only: list[int] | None = None
-    shift = _shift(case, model, null, name, now, only)
+    shift = _shift(case, model, null, name, now)
     for _ in range(4):
         peak = float(np.abs(shift).max())
         if 0.5 * PEAK < peak < 2.5 * PEAK:
@@ -282,8 +281,7 @@ def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters:
         if then == now:
             break
         now = then
-        only = concerned(case, [name], null, null.mean, shift * null.noise * factor**power)
-        shift = _shift(case, model, null, name, now, only)
+        shift = _shift(case, model, null, name, now)
     return Template(name, now, shift)
 
 
@@ -293,13 +291,12 @@ def _shift(
     null: Null,
     name: str,
     parameters: Mapping[str, float],
-    only: Sequence[int] | None,
 ) -> Array:
     there = with_effect(model, name, parameters)
     if is_pattern(name):
         made = with_pattern(case, there, null, null.prediction)
     else:
-        made = predict(case, there, within(there, case.base), null, 1, only)
+        made = predict(case, there, within(there, case.base), null, 1)
     return np.nan_to_num((made.mean - null.mean) / null.noise)
 
 

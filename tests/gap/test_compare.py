@@ -170,7 +170,10 @@ def test_the_noise_of_a_twin_cancels_against_the_nulls_of_the_same_draws():
     assert found.mean - null.mean == pytest.approx(3.0)
     assert found.error == pytest.approx(null.sd / np.sqrt(12))
     one = paired(null, made[:1])
-    assert one.error**2 == pytest.approx(null.sd**2 / 12 + (PAIRED * null.sd) ** 2)
+    assert one.error**2 == pytest.approx(null.sd**2 / 12 + null.sd**2)
+    rates = replace(null, keys=tuple(Key("rates", "r", str(i)) for i in range(40)))
+    of_rates = paired(rates, made[:1])
+    assert of_rates.error**2 == pytest.approx(null.sd**2 / 12 + (PAIRED["rates"] * null.sd) ** 2)
 
 
 def test_what_was_not_simulated_is_the_nulls_and_is_known_as_well():
@@ -186,7 +189,7 @@ def test_a_scaled_prediction_has_the_error_of_its_pairs_scaled_too():
     one = paired(null, [Draw(0, null.draws[0].values + 2.0, None)])
     twice = scaled(null, one, 2.0)
     assert twice.mean - null.mean == pytest.approx(4.0)
-    assert twice.error**2 - null.sd**2 / 12 == pytest.approx(4 * (PAIRED * null.sd) ** 2)
+    assert twice.error**2 - null.sd**2 / 12 == pytest.approx(4 * null.sd**2)
 
 
 def test_step_finds_a_parameter_within_its_error_though_statistics_go_together():

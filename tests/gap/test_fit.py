@@ -57,7 +57,7 @@ def test_an_effect_of_moving_light_concerns_the_moving_recordings_only():
     case = recorded()
     noise = null().noise
     change = np.array([20.0 * n if k.group == "step" else 0.0 for k, n in zip(null().keys, noise, strict=True)])
-    names = [case.conditions[i].name for i in concerned(case, ["photodiode_lag"], null(), null().mean, change) or ()]
+    names = [case.conditions[i].name for i in concerned(case, ["photodiode_lag"], null(), null().mean, change)]
     assert names == ["step"]
 
 
@@ -66,16 +66,23 @@ def test_an_effect_that_changes_rates_is_never_simulated_without_what_the_refit_
     noise = null().noise
     change = np.array([20.0 * n if k.group == "step" else 0.0 for k, n in zip(null().keys, noise, strict=True)])
     which = concerned(case, ["crosstalk"], null(), null().mean, change)
-    still = {i for i, c in enumerate(case.conditions) if c.kind in ("dark", "flat")}
-    assert which is None or still < set(which)
+    still = {i for i, c in enumerate(case.conditions) if c.kind in ("dark", "flat") and c.use == "fit"}
+    assert still < set(which)
 
 
 def test_an_effect_on_one_flat_concerns_all_that_the_refit_rests_on():
     case = recorded()
     there = [(k.group, k.recording) == ("rates", "flat-0.65") for k in null().keys]
     which = concerned(case, ["photodiode_lag"], null(), null().mean, np.where(there, 20.0 * null().noise, 0.0))
-    still = {i for i, c in enumerate(case.conditions) if c.kind in ("dark", "flat")}
-    assert which is None or still <= set(which)
+    still = {i for i, c in enumerate(case.conditions) if c.kind in ("dark", "flat") and c.use == "fit"}
+    assert still <= set(which)
+
+
+def test_held_out_recordings_take_no_part_in_a_fit_even_if_the_effect_shows_on_them():
+    case = recorded()
+    held = {i for i, c in enumerate(case.conditions) if c.use == "holdout"}
+    everywhere = np.full(len(null().keys), np.inf)
+    assert held and not held & set(concerned(case, ["crosstalk"], null(), null().mean, everywhere))
 
 
 @pytest.mark.parametrize("start", [0.5, 2.0])

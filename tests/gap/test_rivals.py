@@ -1,0 +1,60 @@
+"""Whether a measurement tells one candidate from another: on made-up statistics of known noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spikecam_env.gap.compare import Draw, Null, Prediction
+from spikecam_env.gap.rivals import LEAST, is_rival, lead
+from spikecam_env.gap.statistics import Key
+
+COUNT, TWINS = 200, 12
+
+
+def null(seed: int) -> Null:
+    values = np.random.default_rng(seed).standard_normal((TWINS, COUNT))
+    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
+    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, draws=draws)
+
+
+def shown(n: Null, change: np.ndarray) -> Prediction:
+    return Prediction(n.mean + change, n.sd / np.sqrt(TWINS), n.sd)
+
+
+def share_of_rivals(apart: float, cases: int = 60) -> float:
+    """Campaigns in which the second of two effects is true, and is still a rival of the first: they are the same on
+    half of the statistics, and `apart` noises apart on ten others."""
+    found = 0
+    for seed in range(cases):
+        n = null(seed)
+        common = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
+        other = common + np.where(np.arange(COUNT) >= 190, apart, 0.0)
+        measured = other + np.random.default_rng([seed, 1]).standard_normal(COUNT)
+        found += is_rival(n, n.draws, measured, shown(n, common), shown(n, other))
+    return found / cases
+
+
+def test_the_true_effect_is_nearly_always_a_rival_of_a_wrong_one():
+    """In 60 campaigns: at 1 % doubt, three or more misses happen once in fifty times."""
+    share = share_of_rivals(apart=1.0)
+    print(f"{share:.3f}")
+    assert share > 57 / 60
+
+
+def test_a_wrong_effect_is_no_rival_of_the_true_one_when_it_is_far():
+    n = null(0)
+    change = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
+    wrong = np.where(np.arange(COUNT) >= 100, 3.0, 0.0)
+    measured = n.mean + change + np.random.default_rng(1).standard_normal(COUNT)
+    print(f"lead {lead(n, measured, shown(n, change), shown(n, wrong)):.0f}")
+    assert not is_rival(n, n.draws, measured, shown(n, change), shown(n, wrong))
+
+
+def test_two_that_predict_the_same_are_rivals_whichever_leads():
+    n = null(0)
+    change = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
+    measured = n.mean + change
+    one, two = shown(n, change), shown(n, 1.001 * change)
+    assert abs(lead(n, measured, one, two)) < LEAST
+    assert is_rival(n, n.draws, measured, one, two) and is_rival(n, n.draws, measured, two, one)
