@@ -207,6 +207,16 @@ def concerned(case: Case, names: Sequence[str], null: Null, measured: Array, eff
     return sorted(which)
 
 
+def with_held_out(case: Case, only: Sequence[int]) -> list[int]:
+    """With the recordings held out: those in motion, and all where there is a refit to judge the others by."""
+    held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
+    if any(case.conditions[i].kind == "picture" for i in held):
+        held |= rests_on(case)
+    if not rests_on(case) <= {*only, *held}:
+        held = {i for i in held if case.conditions[i].moves}
+    return sorted({*only, *held})
+
+
 def _may_be_negative(name: str) -> bool:
     strength = CATALOGUE[name].strength
     bounds = CATALOGUE[name].__dataclass_fields__[strength].metadata["bounds"]
@@ -245,7 +255,7 @@ def confirmed(
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
         base = as_seen(found.model, base, null, predict(case, found.model, base, null, 1, only))
         if held_out:
-            only = sorted({*only, *(i for i, c in enumerate(case.conditions) if c.use != "fit")})
+            only = with_held_out(case, only)
         predicted = predict(case, found.model, base, null, SURE, only)
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)
