@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from small import MODEL, effect, null, recorded
+from small import MODEL, effect, null, recorded, unit
 
 from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_pattern
 from spikecam_env.gap.candidates import testable as split_testable
+from spikecam_env.gap.case import settled
 from spikecam_env.gap.compare import misfit, scale_of, values_of
-from spikecam_env.gap.fit import bounded, concerned, fit, with_effect
+from spikecam_env.gap.fit import bounded, concerned, fit, with_effect, with_held_out
 from spikecam_env.sensor import CATALOGUE
 
 ONE, NONE = np.ones(200), np.zeros(200)
@@ -138,3 +141,28 @@ def test_what_needs_motion_is_not_testable_in_steady_light():
     still = [c for c in recorded().conditions if not c.moves]
     kept, lacking = split_testable(["dead_time", "readout_skew", "optical_blur"], still)
     assert kept == ["dead_time"] and [n for n, _ in lacking] == ["readout_skew", "optical_blur"]
+
+
+# ---- the unit under an effect
+
+
+def test_a_unit_is_settled_along_a_line_and_not_to_the_noise_of_each_pixel():
+    """Refits 1 % low at the dimmest pixel to 3 % at the brightest, each with 0.5 % of noise of its own: what is left of
+    the noise is that of a line through 1024 pixels, at its ends some 4 sigma / sqrt(n)."""
+    base = unit()
+    x = (base.gain - base.gain.min()) / np.ptp(base.gain)
+    noise = 0.005 * np.random.default_rng(0).standard_normal(x.size)
+    seen = replace(base, gain=base.gain * np.exp(-(0.01 + 0.02 * x) + noise))
+    ratio = np.log(settled(MODEL, base, base, [seen]).gain / base.gain)
+    off = ratio - (0.01 + 0.02 * x)
+    print(f"off by {np.abs(off).max():.2g} at most, noise {noise.std():.2g}")
+    assert np.abs(off).max() < 4.5 * 4 * 0.005 / np.sqrt(x.size)
+
+
+def test_held_out_flats_are_simulated_only_where_a_refit_can_judge_them():
+    case = recorded()
+    moving = [i for i, c in enumerate(case.conditions) if c.moves and c.use == "fit"]
+    still = {i for i, c in enumerate(case.conditions) if not c.moves and c.use == "fit"}
+    held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
+    assert set(with_held_out(case, moving)) == set(moving)
+    assert set(with_held_out(case, sorted(still))) == still | held
