@@ -2,8 +2,8 @@
 
     read -> audit -> refit -> twins -> alarm -> [screen -> fit -> confirm -> add]* -> gate -> verdict
 
-Each step is a function of its own, usable by itself.  Held-out recordings take no part in the alarm, the fits and the
-choice; the gate is on all, and the gap on them alone.
+Each step is a function of its own, usable by itself.  Held-out recordings take no part in the alarm and the fits; of the
+choice they decide what the others cannot tell apart; the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations
@@ -157,12 +157,11 @@ def diagnose(
         before = model_null(case, assumed, 2) if lacking else null
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
-    seen = of_fit(case, null, values)
-    if adjusted(deviates(null, seen)).min() < ALARM:
+    if adjusted(deviates(null, of_fit(case, null, values))).min() < ALARM:
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
-            rounds = search(case, start, null, seen, names, templates or load())
+            rounds = search(case, start, null, values, names, templates or load())
     with timed("verdict"):
         found = concluded(
             case, start, null, in_order(before, null), values, lacking, rounds, contradictions, untestable
@@ -237,38 +236,40 @@ def of_fit(case: Case, null: Null, values: Array) -> Array:
 def search(
     case: Case, model: SensorModel, null: Null, values: Array, names: Sequence[str], templates: Templates
 ) -> list[Round]:
-    """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps."""
+    """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps.
+
+    values: (S,) of all recordings; those held out decide between rivals and nothing else.
+    """
     rounds: list[Round] = []
+    seen = of_fit(case, null, values)
     now, base, prediction = model, within(model, case.base), null.prediction
     while len(rounds) < MOST:
-        rho = residual(null, values, prediction)
+        rho = residual(null, seen, prediction)
         if rounds and not alarmed(null, rho):
             break
         here = standing_on(null, prediction)
-        left_over = judged(here, values, here.prediction)[1]
+        left_over = judged(here, seen, here.prediction)[1]
         left = [n for n in names if n not in {e.name for e in now.effects}]
-        screened = screen(templates, case.conditions, here, values, left, line_of(case))
-        distance = np.nan_to_num((values - here.mean) / here.noise)
+        screened = screen(templates, case.conditions, here, seen, left, line_of(case))
+        distance = np.nan_to_num((seen - here.mean) / here.noise)
         tried = worth_fitting(screened, misfit(distance, here.weight), loud_pattern(here, distance))
         with ThreadPoolExecutor(case.jobs) as pool:
-            fits = list(pool.map(partial(_fitted, case, now, here, values), tried))
-        sure, rest = settle(fits, partial(confirmed, case, now, here, values))
-        rivals = rivals_of(null, here, values, sure)
+            fits = list(pool.map(partial(_fitted, case, now, here, seen), tried))
+        sure, rest = settle(fits, partial(confirmed, case, now, here, seen))
+        sure, rivals = chosen_of(null, here, seen, values, sure)
         rounds.append(Round(now, base, prediction, rho, left_over, (*sure, *rest), rivals))
         if not sure or left_over - sure[0].misfit < GAIN:
             break
         best = sure[0]
         earlier = [r.fits[0].name for r in rounds[:-1]]
         if earlier:
-            best = rejoined(case, model, null, values, best, earlier)
+            best = rejoined(case, model, null, seen, best, earlier)
         names_now = [n for n in (*earlier, best.name) if n in {e.name for e in best.model.effects}]
-        best, errors = polished(case, model, null, values, best, names_now)
-        others = rounds[-1].fits[1:]
-        second = [confirmed(case, now, here, values, f, held_out=True) for f in others[:1]]
-        rounds[-1] = replace(rounds[-1], fits=(best, *second, *others[1:]))
+        best, errors = polished(case, model, null, seen, best, names_now)
+        rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
         rounds = [with_errors(r, errors) for r in rounds]
         now, base, prediction = best.model, best.base, best.prediction
-    rho, left_over = judged(null, values, prediction)
+    rho, left_over = judged(null, seen, prediction)
     rounds.append(Round(now, base, prediction, rho, left_over, ()))
     return rounds
 
@@ -280,22 +281,33 @@ def with_errors(turn: Round, errors: Errors) -> Round:
 
 
 def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:
-    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, until
-    one, as much better as that made the others, still stands PROMISE above the best."""
+    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, two at
+    least, until one, as much better as that made the others, still stands PROMISE above the best."""
     waiting, sure, better = sorted(fits, key=lambda f: f.misfit), list[Fit](), 0.0
-    while waiting and (not sure or waiting[0].misfit - better < min(f.misfit for f in sure) + PROMISE):
+    while waiting and (len(sure) < 2 or waiting[0].misfit - better < min(f.misfit for f in sure) + PROMISE):
         sure.append(confirm(waiting[0]))
         better = max(better, waiting.pop(0).misfit - sure[-1].misfit)
     return sorted(sure, key=lambda f: f.misfit), waiting
 
 
-def rivals_of(null: Null, here: Null, values: Array, fits: Sequence[Fit]) -> tuple[str, ...]:
-    """Names of candidates that may as well be true as the first, and leave nothing that it does not."""
-    if not fits:
-        return ()
-    best = fits[0]
-    enough = [f for f in fits[1:] if alarmed(here, best.rho) or not alarmed(here, f.rho)]
-    return tuple(f.name for f in enough if is_rival(here, null.draws, values, best.prediction, f.prediction))
+def chosen_of(
+    null: Null, here: Null, seen: Array, values: Array, sure: Sequence[Fit]
+) -> tuple[list[Fit], tuple[str, ...]]:
+    """(fits, the chosen one first; names of its rivals).  What may as well be true as the first, by the recordings to
+    fit (`seen`), is put in order by all recordings (`values`), and has to remain a rival by them."""
+    if not sure:
+        return [], ()
+    close = [f for f in sure if f is sure[0] or is_rival(here, null.draws, seen, sure[0].prediction, f.prediction)]
+    close.sort(key=lambda f: judged(here, values, f.prediction)[1])
+    best = close[0]
+    left = residual(here, values, best.prediction)
+    rivals = [
+        f.name
+        for f in close[1:]
+        if is_rival(here, null.draws, values, best.prediction, f.prediction)
+        and (alarmed(here, left) or not alarmed(here, residual(here, values, f.prediction)))
+    ]
+    return [*close, *(f for f in sure if f not in close)], tuple(rivals)
 
 
 def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screened) -> Fit:
@@ -373,8 +385,9 @@ def concluded(
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     place, time_ = where(case), when(case)
     share = lambda f: gap_of(case, null, values, given, f.prediction.mean).removed  # noqa: E731
+    others = lambda r: {o.name: share(o) for o in r.fits[1:] if len(o.prediction.draws) > 1}  # noqa: E731
     effects = tuple(
-        replace(named(f, r, null, values), where=place, when=time_, instead={o.name: share(o) for o in r.fits[1:2]})
+        replace(named(f, r, null, values), where=place, when=time_, instead=others(r))
         for f, r in zip(found, rounds, strict=False)
     )
     rivals = rounds[0].rivals if rounds else ()

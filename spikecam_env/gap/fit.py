@@ -244,19 +244,15 @@ def _gauss_newton(
     return {key: float(np.exp(s)) for key, s in zip(fitted, np.clip(step, -1.0, 1.0), strict=True)}
 
 
-def confirmed(
-    case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, *, held_out: bool = False
-) -> Fit:
-    """The fit simulated with more draws, its unit settled once more; held_out: on recordings held out as well."""
+def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit) -> Fit:
+    """The fit simulated with more draws, its unit settled once more, on the recordings held out as well."""
     added = [e.name for e in found.model.effects if e not in model.effects]
     predicted = null.prediction
     base = within(found.model, found.base)
     if not (added and all(is_pattern(name) for name in added)):
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
         base = as_seen(found.model, base, null, predict(case, found.model, base, null, 1, only))
-        if held_out:
-            only = with_held_out(case, only)
-        predicted = predict(case, found.model, base, null, SURE, only)
+        predicted = predict(case, found.model, base, null, SURE, with_held_out(case, only))
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)
     rho, left = judged(null, measured, predicted)

@@ -127,9 +127,8 @@ def ladder(
         rungs.append(tried[best])
         left.pop(best)
     bar.close()
-    seen = of_fit(case, null, values)
-    if adjusted(deviates(null, seen)).min() < ALARM:
-        rounds = search(case, full, null, seen, names, load())
+    if adjusted(deviates(null, of_fit(case, null, values))).min() < ALARM:
+        rounds = search(case, full, null, values, names, load())
         for was, now in itertools.pairwise(rounds):
             if now.model is not was.model:
                 fit = was.fits[0]

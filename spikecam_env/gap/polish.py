@@ -56,9 +56,9 @@ def polished(
         now = moved(now, free, step)
         if np.abs(step).max() < SETTLED:
             break
-    best = confirmed(case, model, null, measured, replace(found, model=now), held_out=True)
+    best = confirmed(case, model, null, measured, replace(found, model=now))
     if best.misfit > found.misfit + WORSE:
-        best = confirmed(case, model, null, measured, found, held_out=True)
+        best = confirmed(case, model, null, measured, found)
     values = {e.name: e.parameters() for e in best.model.effects}
     errors: Errors = {name: {} for name in names}
     for (name, key), e in zip(free, error, strict=True):
