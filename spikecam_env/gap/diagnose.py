@@ -2,8 +2,8 @@
 
     read -> audit -> refit -> twins -> alarm -> [screen -> fit -> confirm -> add]* -> gate -> verdict
 
-Each step is a function of its own, usable by itself.  Held-out recordings take no part in the alarm and the fits; of the
-choice they decide what the others cannot tell apart; the gate is on all, and the gap on them alone.
+Each step is a function of its own, usable by itself.  Held-out recordings take no part in alarm and fits; in the
+choice they decide what others cannot tell apart; the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations
@@ -281,8 +281,8 @@ def with_errors(turn: Round, errors: Errors) -> Round:
 
 
 def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:
-    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, two at
-    least, until one, as much better as that made the others, still stands PROMISE above the best."""
+    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, two
+    at least, until one, as much better as that made the others, still stands PROMISE above the best."""
     waiting, sure, better = sorted(fits, key=lambda f: f.misfit), list[Fit](), 0.0
     while waiting and (len(sure) < 2 or waiting[0].misfit - better < min(f.misfit for f in sure) + PROMISE):
         sure.append(confirm(waiting[0]))
