@@ -1,0 +1,79 @@
+"""Which candidate is chosen: by the recordings to fit, and between rivals by those held out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from small import MODEL, unit
+
+from spikecam_env.gap.compare import Draw, Null, Prediction, judged
+from spikecam_env.gap.diagnose import PROMISE, chosen_of, settle
+from spikecam_env.gap.fit import Fit
+from spikecam_env.gap.statistics import Key
+
+COUNT, TWINS = 200, 12
+FIT = np.arange(COUNT) < 150
+"""Statistics of the recordings to fit; the others are held out."""
+
+
+def null() -> Null:
+    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
+    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
+    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, draws=draws)
+
+
+def a_fit(n: Null, name: str, change, seen) -> Fit:
+    prediction = Prediction(n.mean + change, n.sd / np.sqrt(TWINS), n.sd)
+    rho, left = judged(n, seen, prediction)
+    return Fit(name, {}, {}, prediction, unit(), rho, left, MODEL)
+
+
+def campaign():
+    """An effect of 4 noises on 50 statistics to fit and on all that are held out."""
+    n = null()
+    effect = np.where((np.arange(COUNT) < 50) | ~FIT, 4.0, 0.0)
+    values = n.mean + effect + n.sd * np.random.default_rng(1).standard_normal(COUNT)
+    return n, effect, values, np.where(FIT, values, np.nan)
+
+
+def test_recordings_held_out_decide_between_what_the_others_cannot_tell_apart():
+    """A twin that is a little better on the recordings to fit, and wrong on those held out."""
+    n, effect, values, seen = campaign()
+    nudge = np.where(np.arange(COUNT) < 50, 0.1 * np.sign(values - n.mean - effect), 0.0)
+    true, twin = a_fit(n, "true", effect, seen), a_fit(n, "twin", np.where(FIT, effect + nudge, 0.0), seen)
+    assert twin.misfit < true.misfit
+    fits, rivals = chosen_of(n, n, seen, values, [twin, true])
+    assert [f.name for f in fits] == ["true", "twin"] and rivals == ()
+
+
+def test_what_all_recordings_together_cannot_tell_apart_are_rivals():
+    n, effect, values, seen = campaign()
+    one, other = a_fit(n, "one", effect, seen), a_fit(n, "other", 1.002 * effect, seen)
+    assert chosen_of(n, n, seen, values, [one, other])[1]
+
+
+def test_recordings_held_out_have_no_say_where_the_others_tell():
+    """The wrong one is perfect where it is not asked, and has nothing to offer where it is."""
+    n, effect, values, seen = campaign()
+    wrong = a_fit(n, "wrong", np.where(FIT, np.roll(effect * FIT, 60), values - n.mean), seen)
+    fits, rivals = chosen_of(n, n, seen, values, [a_fit(n, "true", effect, seen), wrong])
+    assert fits[0].name == "true" and rivals == ()
+    assert chosen_of(n, n, seen, values, []) == ([], ())
+
+
+def test_fits_are_confirmed_until_one_stands_clear_above_the_best():
+    """Confirmation makes each 10 better; the third promises less than the best by more than that and PROMISE."""
+    n, effect, _values, seen = campaign()
+    base = a_fit(n, "", effect, seen)
+    asked = []
+
+    def confirm(f: Fit) -> Fit:
+        asked.append(f.name)
+        return replace(f, misfit=f.misfit - 10.0)
+
+    near, far = 100.0 + PROMISE - 1.0, 100.0 + PROMISE + 11.0
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 100.0), ("b", near), ("c", near), ("d", far))]
+    sure, rest = settle(fits, confirm)
+    assert asked == ["a", "b", "c"] and [f.name for f in sure] == ["a", "b", "c"] and [f.name for f in rest] == ["d"]
