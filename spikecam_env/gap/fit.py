@@ -32,8 +32,8 @@ TURNS = 5
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
-SURE = 4
-"""Twins by which a fit is confirmed."""
+AGAIN, FINAL = 2, 4
+"""Twins by which a candidate is confirmed, and what was chosen of them in the end."""
 
 UNITS = 24
 """Units drawn for the pattern statistics of one model."""
@@ -244,19 +244,23 @@ def _gauss_newton(
     return {key: float(np.exp(s)) for key, s in zip(fitted, np.clip(step, -1.0, 1.0), strict=True)}
 
 
-def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit) -> Fit:
-    """The fit simulated with more draws, its unit settled once more, on the recordings held out as well."""
+def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, count: int = AGAIN) -> Fit:
+    """The fit simulated with more draws, on the recordings held out as well."""
     added = [e.name for e in found.model.effects if e not in model.effects]
     predicted = null.prediction
-    base = within(found.model, found.base)
     if not (added and all(is_pattern(name) for name in added)):
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
-        base = as_seen(found.model, base, null, predict(case, found.model, base, null, 1, only))
-        predicted = predict(case, found.model, base, null, SURE, with_held_out(case, only))
+        predicted = predict(case, found.model, within(found.model, found.base), null, count, with_held_out(case, only))
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)
     rho, left = judged(null, measured, predicted)
-    return replace(found, prediction=predicted, base=base, rho=rho, misfit=left)
+    return replace(found, prediction=predicted, rho=rho, misfit=left)
+
+
+def resettled(case: Case, null: Null, found: Fit, model: SensorModel) -> Fit:
+    """The fit with another model, and its unit settled under it."""
+    base = within(model, found.base)
+    return replace(found, model=model, base=as_seen(model, base, null, predict(case, model, base, null, 1)))
 
 
 def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Sequence[str]) -> Fit:
@@ -264,9 +268,9 @@ def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found:
 
     model, null: as given, before any was added.
     """
-    both = confirmed(case, model, null, measured, found)
+    both = confirmed(case, model, null, measured, resettled(case, null, found, found.model))
     for name in earlier:
-        fewer = confirmed(case, model, null, measured, replace(found, model=both.model.without(name)))
+        fewer = confirmed(case, model, null, measured, resettled(case, null, both, both.model.without(name)))
         if fewer.misfit < both.misfit + NEEDED:
             both = fewer
     return both

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, step_of
-from spikecam_env.gap.fit import Fit, bounded, concerned, confirmed, predict, with_effect, with_pattern
+from spikecam_env.gap.fit import FINAL, Fit, as_seen, bounded, concerned, confirmed, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
 from spikecam_env.sensor import SensorModel
 
@@ -47,18 +47,19 @@ def polished(
     """
     free = [(name, key) for name in names for key in candidate(name).fitted]
     probe = _probe(case, null, measured, found, names)
-    now, error = found.model, np.full(len(free), np.nan)
+    now, base, error = found.model, found.base, np.full(len(free), np.nan)
     for _ in range(TURNS):
         at = probe(now)
         columns = np.stack([_column(probe, now, at, null, name, key) for name, key in free], axis=1)
         step, error = step_of(null, measured, at, columns)
         step = np.clip(step, -FURTHEST, FURTHEST)
+        base = as_seen(now, within(now, found.base), null, at)
         now = moved(now, free, step)
         if np.abs(step).max() < SETTLED:
             break
-    best = confirmed(case, model, null, measured, replace(found, model=now))
+    best = confirmed(case, model, null, measured, replace(found, model=now, base=base), FINAL)
     if best.misfit > found.misfit + WORSE:
-        best = confirmed(case, model, null, measured, found)
+        best = found
     values = {e.name: e.parameters() for e in best.model.effects}
     errors: Errors = {name: {} for name in names}
     for (name, key), e in zip(free, error, strict=True):
