@@ -269,7 +269,7 @@ def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found:
     model, null: as given, before any was added.
     """
     both = confirmed(case, model, null, measured, resettled(case, null, found, found.model))
-    for name in earlier:
+    for name in [n for n in earlier if n in {e.name for e in both.model.effects}]:
         fewer = confirmed(case, model, null, measured, resettled(case, null, both, both.model.without(name)))
         if fewer.misfit < both.misfit + NEEDED:
             both = fewer
