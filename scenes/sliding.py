@@ -8,6 +8,8 @@ either side of a pixel, and read between them.
 
 from __future__ import annotations
 
+import copy
+
 import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,6 +79,12 @@ class SlidingTexture:
             np.zeros(self.shape, np.int32),
             poses={"texture": self.corner_at(frame, gaze), "camera": camera},
         )
+
+    def lit(self, gain: float) -> SlidingTexture:
+        """The same texture with `gain` times its light."""
+        other = copy.copy(self)
+        other._samples = self._samples * np.float32(gain)
+        return other
 
     def velocity(self, gaze: Gaze | None = None) -> tuple[float, float]:
         """(x, y) in the picture [pixels/frame]."""

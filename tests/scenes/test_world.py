@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 
 import cv2
@@ -180,8 +181,17 @@ def test_light_is_scaled_to_the_wanted_mean_interval(renderer: Embree) -> None:
     scene = expose(busy(renderer), 12.5)
     mean = np.mean([scene.truth(frame).radiance.mean() for frame in METERED_FRAMES])
     assert 1 / mean == pytest.approx(12.5, rel=1e-4)
+    unlit = np.mean([busy(renderer).truth(frame).radiance.mean() for frame in METERED_FRAMES])
     ratio = scene.radiance(0, 2).radiance[0].mean() / busy(renderer).radiance(0, 2).radiance[0].mean()
-    assert ratio == pytest.approx(scene.gain, rel=1e-4)
+    assert ratio == pytest.approx(1 / (12.5 * unlit), rel=1e-4)
+
+
+def test_light_multiplies_all_that_shines(renderer: Embree) -> None:
+    glowing = dataclasses.replace(assemble(sphere(0.4, 0.5)), emission=0.3)
+    world = World(SHAPE, (Body("lamp", glowing, Spinning((0, 1, 0), 600)),), Camera((0, 0, 3)), renderer=renderer)
+    thrice = world.lit(3.0)
+    np.testing.assert_allclose(thrice.truth(5.5).radiance, 3 * world.truth(5.5).radiance, rtol=1e-5)
+    np.testing.assert_allclose(thrice.radiance(0, 8).radiance, 3 * world.radiance(0, 8).radiance, rtol=1e-5)
 
 
 def test_a_pickled_world_gives_the_same_light(renderer: Embree) -> None:
