@@ -66,7 +66,8 @@ TURN = 0.07
 PROBES = 256
 """Points of a body's surface that stand for it in the plan."""
 
-TRUTH_SUPERSAMPLE = 4
+TRUTH_RAYS = 4
+"""Of a pixel, along either side."""
 
 Array = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -167,6 +168,10 @@ class World:
         poses = {body.name: _pose_numbers(self._body_pose(body, np.array(frame))) for body in self.bodies}
         camera = (gaze or _AT_REST).at(frame)
         return Truth(radiance, (ahead - behind).astype(np.float32), owner, depth, poses | {"camera": camera})
+
+    def picture(self, frame: float, gaze: Gaze | None = None, rays: int = TRUTH_RAYS) -> Array:
+        """The radiance (H, W) at an instant, by rays x rays a pixel."""
+        return self._seen(frame, gaze, rays)[0]
 
     def displacement(self, frame: float, frames: float, gaze: Gaze | None = None) -> Array:
         """How far the surface seen in each pixel at a frame has moved so many frames later, (H, W, 2) [pixels]."""
@@ -305,7 +310,7 @@ class World:
         picture = self._sky(frame, np.zeros(2))
         for number, body in enumerate(self.bodies):
             if body.backdrop:
-                _over(picture, self._sprite(number, frame, None), np.full_like(picture, np.inf))
+                _over(picture, self._sprite(number, frame, None, TRUTH_RAYS), np.full_like(picture, np.inf))
         return picture
 
     def _sky(self, frame: float, offset: Floats) -> Array:
@@ -336,14 +341,14 @@ class World:
 
     # -- truth -------------------------------------------------------------------------------------------------
 
-    def _seen(self, frame: float, gaze: Gaze | None) -> tuple[Array, Array, NDArray[np.int32]]:
+    def _seen(self, frame: float, gaze: Gaze | None, rays: int = TRUTH_RAYS) -> tuple[Array, Array, NDArray[np.int32]]:
         """Radiance, depth and owner, of bodies rendered at this instant."""
         picture = self._sky(frame, _offsets(gaze, np.array([frame]))[0])
         depth = np.full(self.shape, np.inf, np.float32)
         nearest = depth.copy()
         owner = np.zeros(self.shape, np.int32)
         for body in self._plan(int(frame // BLOCK)).order:
-            sprite = self._sprite(body, frame, gaze)
+            sprite = self._sprite(body, frame, gaze, rays)
             shown = _over(picture, sprite, nearest)
             place = _place(sprite.window)
             depth[place][shown] = sprite.depth[shown]
@@ -352,7 +357,7 @@ class World:
                 nearest[place][shown] = sprite.depth[shown]
         return picture, depth, owner
 
-    def _sprite(self, body: int, frame: float, gaze: Gaze | None) -> Sprite:
+    def _sprite(self, body: int, frame: float, gaze: Gaze | None, rays: int) -> Sprite:
         at = np.array(float(frame))
         offset = _offsets(gaze, at[None])[0]
         rest = self._pinhole(at)
@@ -362,9 +367,15 @@ class World:
         if not (window.rows and window.columns):
             nothing = np.zeros((0, 0), np.float32)
             return Sprite(Window(0, 0, 0, 0), nothing, nothing, nothing)
-        surface = self.bodies[body].surface
-        sprite = self._draw.render(surface, pose, camera, self.lighting, window, TRUTH_SUPERSAMPLE)
-        return dataclasses.replace(sprite, radiance=sprite.radiance * np.float32(self.light))
+
+        def drawn() -> Sprite:
+            sprite = self._draw.render(self.bodies[body].surface, pose, camera, self.lighting, window, rays)
+            return dataclasses.replace(sprite, radiance=sprite.radiance * np.float32(self.light))
+
+        if not self.bodies[body].backdrop:
+            return drawn()
+        name = (body, pose.tobytes(), camera.centre, camera.pose.tobytes(), rays)
+        return self._kept.get("backdrop", name, 2 * len(self.bodies), drawn)
 
     def _displaced(self, owner: NDArray[np.int32], depth: Array, frame: float, by: float, gaze: Gaze | None) -> Floats:
         """(H, W, 2): where what is seen at a frame has gone `by` frames later."""
