@@ -17,7 +17,7 @@ from scenes.catalogue import SCENES, make_scene
 from scenes.collage import Collage
 from scenes.disk import RotatingDisk, disk_texture
 from scenes.exact import supersampled
-from scenes.flow_check import check_flow
+from scenes.flow import check_flow
 from scenes.keys import side_by_side
 from scenes.protocol import Scene
 from scenes.renderers.compare import compare_backends
@@ -144,7 +144,7 @@ def bench_end_to_end(seconds: float = 2.0) -> Rows:
 
 
 def flow_table(names: Iterable[str]) -> Rows:
-    """`scenes.flow_check.check_flow` of scenes of the catalogue, in per cent."""
+    """`scenes.flow.check_flow` of scenes of the catalogue, in per cent."""
     rows = []
     for name in tqdm(list(names), desc="flow", unit="scene", leave=False):
         check = check_flow(make_scene(name, SHAPE))
@@ -153,7 +153,6 @@ def flow_table(names: Iterable[str]) -> Rows:
                 "scene": name,
                 "rms, %": 100 * check.error,
                 "shade aside, %": 100 * check.shade_aside,
-                "sharp, %": 100 * check.sharp,
                 "not moved, %": 100 * check.unmoved,
                 "compared, %": 100 * check.compared,
             }

@@ -11,9 +11,7 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scenes.flow import displacement
 from scenes.protocol import Dimmable, Gaze, Placed, Scene, Truth
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
@@ -67,7 +65,3 @@ class Exposed:
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """The scene's places; none where it has nothing to follow."""
         return self.scene.places(frame, gaze) if isinstance(self.scene, Placed) else {}
-
-    def displacement(self, frame: float, frames: float, gaze: Gaze | None = None) -> NDArray[np.float32]:
-        """As `scenes.flow.displacement` has it."""
-        return displacement(self.scene, frame, frames, gaze)

@@ -173,11 +173,6 @@ class World:
         """The radiance (H, W) at an instant, by rays x rays a pixel."""
         return self._seen(frame, gaze, rays)[0]
 
-    def displacement(self, frame: float, frames: float, gaze: Gaze | None = None) -> Array:
-        """How far the surface seen in each pixel at a frame has moved so many frames later, (H, W, 2) [pixels]."""
-        _, depth, owner = self._seen(frame, gaze)
-        return self._displaced(owner, depth, frame, frames, gaze).astype(np.float32)
-
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """Where the middle of every body that moves is seen, see `scenes.protocol.Placed`."""
         at = np.array(float(frame))
