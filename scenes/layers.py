@@ -65,6 +65,8 @@ def render_key(
     renderer: Renderer, surface: Surface, pose: Floats, camera: Pinhole, lighting: Lighting, window: Window, gain: float
 ) -> Key:
     """The surface at a pose in a window of the picture [pixels], its light multiplied by a gain."""
+    if not (window.rows and window.columns):
+        return _NOTHING
     dense = Pinhole(camera.focal * DENSITY, _dense(camera.centre), camera.pose)
     left, top = np.floor(_dense((window.left, window.top))).astype(int)
     right, bottom = np.ceil(_dense((window.left + window.columns, window.top + window.rows))).astype(int)
@@ -87,6 +89,12 @@ def render_key(
     return Key(tints, brightest * gain, _filled(sprite), points, texels, lens)
 
 
+_NOTHING = Key(
+    np.zeros((0, 0), np.uint32), 1.0, np.zeros((0, 0), np.float32), np.zeros((0, 3)), np.zeros((0, 2)), np.eye(3)
+)
+"""Of a body that is out of sight."""
+
+
 def _tints(light: Array, cover: Array) -> NDArray[np.uint32]:
     """Both in 0..1, in 16 bits each."""
     lower, upper = (np.minimum(share * 65535 + 0.5, 65535).astype(np.uint32) for share in (light, cover))
@@ -99,7 +107,7 @@ def _lens(focal: float, centre: tuple[float, float]) -> Floats:
 
 def _filled(sprite: Sprite) -> Array:
     """Depth, and beside the body that of the texel nearest to there; 0 where nothing is seen at all."""
-    nothing = (sprite.coverage <= 0).astype(np.uint8)
+    nothing = np.logical_not((sprite.coverage > 0) & np.isfinite(sprite.depth)).astype(np.uint8)
     if nothing.all():
         return np.zeros_like(sprite.depth)
     _, nearest = cv2.distanceTransformWithLabels(nothing, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
@@ -268,7 +276,7 @@ def _add(
         np.empty(most, np.float32),
         np.empty(most, np.float32),
     )
-    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
+    zero, half, one, nearest = np.float32(0), np.float32(0.5), np.float32(1), np.float32(1e-9)
     last_s, last_t = np.float32(width - 1.001), np.float32(height - 1.001)
     columns, right_of, bits, upper = np.int32(width), np.uint32(1), np.uint32(0xFFFF), np.uint32(16)
     under = np.uint32(width)
@@ -297,7 +305,7 @@ def _add(
             row_w = step_w * x + rigid[13] * y + rigid[14]
             for i in range(most):
                 away, along = z[i] * (of_s * s[i] + of_t * t[i] + rest) + nearer, np.float32(i)
-                w = one / (away * (row_w + step_w * along) + shift_w)
+                w = one / max(away * (row_w + step_w * along) + shift_w, nearest)
                 s[i] = min(max((away * (row_s + step_s * along) + shift_s) * w, zero), last_s)
                 t[i] = min(max((away * (row_t + step_t * along) + shift_t) * w, zero), last_t)
         for i in range(most):

@@ -184,6 +184,13 @@ def test_light_is_scaled_to_the_wanted_mean_interval(renderer: Embree) -> None:
     assert ratio == pytest.approx(1 / (12.5 * unlit), rel=1e-4)
 
 
+def test_what_comes_into_sight_between_two_keys_is_drawn(renderer: Embree) -> None:
+    ball = Body("ball", assemble(sphere(0.4, 0.9)), Ballistic((-5, 0, 0), (8000, 0, 0)))
+    world = World(SHAPE, (ball,), Camera((0, 0, 3)), background=0.0, renderer=renderer)
+    light = world.radiance(0, 48).radiance.max(axis=(1, 2))
+    assert light[0] == 0 and light.max() > 0.3
+
+
 def test_light_multiplies_all_that_shines(renderer: Embree) -> None:
     glowing = dataclasses.replace(assemble(sphere(0.4, 0.5)), emission=0.3)
     world = World(SHAPE, (Body("lamp", glowing, Spinning((0, 1, 0), 600)),), Camera((0, 0, 3)), renderer=renderer)
