@@ -153,6 +153,7 @@ def flow_table(names: Iterable[str]) -> Rows:
                 "scene": name,
                 "rms, %": 100 * check.error,
                 "shade aside, %": 100 * check.shade_aside,
+                "from pixels, %": 100 * check.from_pixels,
                 "not moved, %": 100 * check.unmoved,
                 "compared, %": 100 * check.compared,
             }

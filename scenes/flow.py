@@ -35,12 +35,13 @@ Places = NDArray[np.floating]
 class FlowCheck:
     """error: rms of what came along the flow against what is there, share of full scale (the brightest light).
     shade_aside: the same once what turned in the light is given its new shade, taken as smooth over `SHADE` within an
-    object.  unmoved: had nothing been moved.  compared: share of the picture that was: the rest left the picture, was
-    covered, or lies beside an object's edge.
+    object.  from_pixels: had the light been interpolated from one later picture.  unmoved: had nothing been moved.
+    compared: share of the picture that was: the rest left the picture, was covered, or lies beside an object's edge.
     """
 
     error: float
     shade_aside: float
+    from_pixels: float
     unmoved: float
     compared: float
 
@@ -63,6 +64,7 @@ def check_flow(scene: Scene, frame: float = 100, frames: int = 40, gaze: Gaze | 
     expected = {
         "error": (before, after),
         "shade_aside": (before * _shade(before, after, first.object_id, alone), after),
+        "from_pixels": (before, _read(at.radiance, x, y, cv2.INTER_LANCZOS4)),
         "unmoved": (before, at.radiance),
     }
     full = float(before.max())
