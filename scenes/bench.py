@@ -24,7 +24,7 @@ from scenes.renderers.compare import compare_backends
 from scenes.sliding import SlidingTexture
 from scenes.world import World
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import Keyframes, SpikeSensor
+from spikecam_env.sensor import SpikeSensor
 
 SHAPE = (250, 400)
 BLOCK = 64
@@ -118,15 +118,13 @@ def bench_end_to_end(seconds: float = 2.0) -> Rows:
         sensor = SpikeSensor("scsim", SHAPE, seed=0, engine="fast")
         light_s = camera_s = 0.0
         frames = keys = 0
-        start = -2 * BLOCK
         while light_s + camera_s < seconds:
             begin = time.perf_counter()
-            light = scene.radiance(start + 2 * BLOCK, start + 3 * BLOCK)
+            light = scene.radiance(sensor.frame, sensor.frame + BLOCK)
             lit = time.perf_counter()
-            sensor.step(Keyframes(light.frame - start - 2 * BLOCK + sensor.frame, light.radiance), BLOCK)
+            sensor.step(light, BLOCK)
             end = time.perf_counter()
-            start += BLOCK
-            if start >= 0:  # the first two blocks compile
+            if sensor.frame > 2 * BLOCK:  # the first two blocks compile
                 light_s, camera_s = light_s + lit - begin, camera_s + end - lit
                 frames, keys = frames + BLOCK, keys + len(light.frame) - 1
         total = light_s + camera_s
