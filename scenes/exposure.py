@@ -11,10 +11,8 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scenes.flow import displacement
-from scenes.protocol import Gaze, Placed, Scene, Truth
+from scenes.protocol import Dimmable, Gaze, Placed, Scene, Truth
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -22,7 +20,7 @@ METERED_FRAMES = (0.5, 333.5, 666.5, 999.5)
 """Where the light is measured: over the first thousand frames, a common length of a clip."""
 
 
-def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = None) -> Exposed:
+def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = None) -> Scene:
     """The scene with its light scaled to a mean interval [frames].
 
     metered   measure this one instead, e.g. the same scene at a smaller shape
@@ -33,7 +31,8 @@ def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = No
     mean = float(np.mean([(metered or scene).truth(frame).radiance.mean() for frame in METERED_FRAMES]))
     if not mean > 0:
         raise InputError("the scene has no light to expose; give it a lamp, an emission or a background")
-    return Exposed(scene, 1.0 / (mean_interval * mean))
+    gain = 1.0 / (mean_interval * mean)
+    return scene.lit(gain) if isinstance(scene, Dimmable) else Exposed(scene, gain)
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class Exposed:
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, scaled."""
         keys = self.scene.radiance(start, stop, gaze)
-        return Keyframes(keys.frame, keys.radiance * np.float32(self.gain))
+        return Keyframes.known(keys.frame, keys.radiance * np.float32(self.gain))
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """The scene's truth, its radiance scaled."""
@@ -66,7 +65,3 @@ class Exposed:
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """The scene's places; none where it has nothing to follow."""
         return self.scene.places(frame, gaze) if isinstance(self.scene, Placed) else {}
-
-    def displacement(self, frame: float, frames: float, gaze: Gaze | None = None) -> NDArray[np.float32]:
-        """As `scenes.flow.displacement` has it."""
-        return displacement(self.scene, frame, frames, gaze)

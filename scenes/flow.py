@@ -1,89 +1,126 @@
-"""Is the optical flow true?  Frame t warped by it must be frame t + n, where the same surface is still seen.
+"""Is the flow right?  Light carried along it must be the light that is there later.
 
-`flow_error` looks up, for every pixel of frame t, where its surface has gone n frames later, and compares the light.
-Left out is what cannot be compared: surfaces that leave the picture, are hidden by then, or lie at an edge, where a
-pixel is a mixture of two.  What turns also changes its shade; that is part of the error.
-
-Both pictures are smoothed a little first: a pixel's area lets detail through that no interpolation can place (on the
-disk of the paper 2.1 % rms without, 1.2 % with; the flow is the same).
+Only the truth of the scene is asked, step by step, as any user of its flow would.  What is carried comes to lie between
+pixels, and no interpolation of pixels tells the light there: a pixel's area lets detail of two pixels' width and less
+through, which its grid cannot hold.  So the later picture is taken `FINER` x `FINER` times, the camera turned by parts
+of a pixel, and the light that a pixel would have at the place is read from those.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.protocol import Gaze, Scene
+from scenes.protocol import Gaze, Scene, Truth
 
-STEP = 2.0
-"""Frames of a step along the flow, for scenes that give no displacement themselves."""
+STEP = 5
+"""Frames that a point is carried on at a time, by the flow at the middle of them."""
 
-SMOOTHING = 0.5
-"""Standard deviation [pixels]."""
+NEAR = 5
+"""Pixels: the square about a point within which only one object may be seen, or the point is left out."""
 
-Array = NDArray[np.float32]
+FINER = 2
+"""Pictures a pixel, along either side.  A pixel's area lets next to nothing through that these do not hold."""
+
+SHADE = 8.0
+"""Pixels, standard deviation: wide beside what a texture shows, narrow beside how shade falls on a body."""
+
+Places = NDArray[np.floating]
 
 
-def displacement(scene: Scene, frame: float, frames: float, gaze: Gaze | None = None) -> Array:
-    """How far the surface seen in each pixel at a frame has moved so many frames later, (H, W, 2) [pixels].
-
-    From the scene itself where it knows (`World`), else along its flow (midpoint rule), which holds until the
-    surface is hidden.
+@dataclass(frozen=True)
+class FlowCheck:
+    """error: rms of what came along the flow against what is there, share of full scale (the brightest light).
+    shade_aside: the same once what turned in the light is given its new shade, taken as smooth over `SHADE` within an
+    object.  from_pixels: had the light been interpolated from one later picture.  unmoved: had nothing been moved.
+    compared: share of the picture that was: the rest left the picture, was covered, or lies beside an object's edge.
     """
-    own: Any = getattr(scene, "displacement", None)
-    if own is not None:
-        return np.asarray(own(frame, frames, gaze), np.float32)
-    here = _grid(scene.shape)
-    place = here.copy()
-    count = max(1, round(abs(frames) / STEP))
-    step = frames / count
-    for k in range(count):
-        at = frame + k * step
-        half = place + np.float32(step / 2) * _read(scene.truth(at, gaze).flow, place)
-        place = place + np.float32(step) * _read(scene.truth(at + step / 2, gaze).flow, half)
-    return np.asarray(place - here, np.float32)
+
+    error: float
+    shade_aside: float
+    from_pixels: float
+    unmoved: float
+    compared: float
 
 
-def flow_error(
-    scene: Scene, frame: float, frames: float = 40.0, gaze: Gaze | None = None, smoothing: float = SMOOTHING
-) -> tuple[float, float]:
-    """(error, share): rms difference of light outside occlusions, of the scene's brightest; share of pixels compared.
-
-    smoothing   of both pictures, standard deviation [pixels]; 0 for none
-    """
-    now, then = scene.truth(frame, gaze), scene.truth(frame + frames, gaze)
-    ahead, back = displacement(scene, frame, frames, gaze), displacement(scene, frame + frames, -frames, gaze)
-    place = _grid(scene.shape) + ahead
-    inside = (place >= 0).all(-1) & (place <= np.array(scene.shape[::-1]) - 1).all(-1)
-    returned = np.linalg.norm(ahead + _read(back, place), axis=-1) < 0.5
-    same = _read(_inner(then.object_id), place) == now.object_id + 1
-    compared = inside & returned & same & (_inner(now.object_id) > 0)
-    before, after = (_smoothed(truth.radiance, smoothing) for truth in (now, then))
-    difference = (_read(after, place, cv2.INTER_LANCZOS4) - before)[compared].astype(np.float64)
-    scale = max(float(now.radiance.max()), 1e-9)
-    return float(np.sqrt(np.mean(difference**2))) / scale, float(compared.mean())
-
-
-def _inner(owner: NDArray[np.int32]) -> Array:
-    """Object id + 1 where all the neighbours are of the same object, else 0."""
-    names = (owner + 1).astype(np.float32)
-    kernel = np.ones((3, 3), np.uint8)
-    return np.where(cv2.erode(names, kernel) == cv2.dilate(names, kernel), names, 0).astype(np.float32)
-
-
-def _smoothed(picture: Array, deviation: float) -> Array:
-    return np.asarray(cv2.GaussianBlur(picture, (0, 0), deviation), np.float32) if deviation > 0 else picture
+def check_flow(scene: Scene, frame: float = 100, frames: int = 40, gaze: Gaze | None = None) -> FlowCheck:
+    """Carry every point of the picture at `frame` along the flow for so many frames, and compare its light with that of
+    a pixel at the place where it comes to."""
+    y, x = np.indices(scene.shape).astype(np.float32)
+    first = scene.truth(frame, gaze)
+    alone, at = _alone(first), first
+    for since in range(0, frames, STEP):
+        step = min(STEP, frames - since)
+        here = _read(at.flow, x, y, cv2.INTER_LINEAR)
+        middle = scene.truth(frame + since + step / 2, gaze)
+        flow = _read(middle.flow, x + here[..., 0] * step / 2, y + here[..., 1] * step / 2, cv2.INTER_LINEAR)
+        x, y = x + flow[..., 0] * step, y + flow[..., 1] * step
+        at = scene.truth(frame + since + step, gaze)
+        alone &= _inside(x, y, scene.shape) & (_alone_at(at, x, y) == first.object_id)
+    before, after = first.radiance, _read(_finer(scene, frame + frames, gaze), FINER * x, FINER * y, cv2.INTER_LANCZOS4)
+    expected = {
+        "error": (before, after),
+        "shade_aside": (before * _shade(before, after, first.object_id, alone), after),
+        "from_pixels": (before, _read(at.radiance, x, y, cv2.INTER_LANCZOS4)),
+        "unmoved": (before, at.radiance),
+    }
+    full = float(before.max())
+    errors = {name: _rms((now - then)[alone]) / full for name, (then, now) in expected.items()}
+    return FlowCheck(**errors, compared=float(alone.mean()))
 
 
-def _grid(shape: tuple[int, int]) -> Array:
-    rows, columns = np.indices(shape, np.float32)
-    return np.stack([columns, rows], -1)
+def _finer(scene: Scene, frame: float, gaze: Gaze | None) -> NDArray[np.float32]:
+    """The light of a pixel at every place of a grid `FINER` times as fine, (FINER H, FINER W)."""
+    rows, columns = scene.shape
+    light = np.empty((FINER * rows, FINER * columns), np.float32)
+    for down in range(FINER):
+        for right in range(FINER):
+            aside = _turned(gaze or Gaze.fixed(0.0, 0.0), right / FINER, down / FINER)
+            light[down::FINER, right::FINER] = scene.truth(frame, aside).radiance
+    return light
 
 
-def _read(image: Array, place: Array, way: int = cv2.INTER_LINEAR) -> Array:
-    """The image at places between its pixels, the edge repeated."""
-    x, y = np.ascontiguousarray(place[..., 0], np.float32), np.ascontiguousarray(place[..., 1], np.float32)
-    return np.asarray(cv2.remap(image, x, y, way, borderMode=cv2.BORDER_REPLICATE), np.float32)
+def _turned(gaze: Gaze, pan: float, tilt: float) -> Gaze:
+    (p, q), (r, s) = gaze.start, gaze.stop
+    return Gaze((p + pan, q + tilt), (r + pan, s + tilt), gaze.frames)
+
+
+def _shade(
+    before: NDArray[np.float32], after: NDArray[np.float32], owner: NDArray[np.int32], compared: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Smooth ratio of both within each object: light about a pixel afterwards, over light about it before."""
+    ratio = np.ones_like(before)
+    for number in np.unique(owner[compared]):
+        mine = (compared & (owner == number)).astype(np.float32)
+        then, now = (cv2.GaussianBlur(mine * light, (0, 0), SHADE) for light in (after, before))
+        ratio = np.where((mine > 0) & (now > 0), then / np.maximum(now, 1e-9), ratio)
+    return ratio
+
+
+def _alone(truth: Truth) -> NDArray[np.bool_]:
+    """Pixels with one object only about them."""
+    square, owner = np.ones((NEAR, NEAR), np.uint8), truth.object_id.astype(np.int16)
+    return cv2.erode(owner, square) == cv2.dilate(owner, square)
+
+
+def _alone_at(truth: Truth, x: Places, y: Places) -> NDArray[np.int32]:
+    """The object at places, -1 where it is not alone."""
+    owner = np.where(_alone(truth), truth.object_id, -1).astype(np.float32)
+    return _read(owner, x, y, cv2.INTER_NEAREST).astype(np.int32)
+
+
+def _inside(x: Places, y: Places, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Far enough from the border to read about a place."""
+    return (x >= 2) & (x <= shape[1] - 3) & (y >= 2) & (y <= shape[0] - 3)
+
+
+def _read(picture: NDArray[np.float32], x: Places, y: Places, how: int) -> NDArray[np.float32]:
+    places = x.astype(np.float32), y.astype(np.float32)
+    return np.asarray(cv2.remap(picture, *places, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
+
+
+def _rms(difference: NDArray[np.floating]) -> float:
+    return float(np.sqrt(np.mean(np.square(difference, dtype=np.float64)))) if difference.size else float("nan")

@@ -50,7 +50,7 @@ def painted(
         frame = np.concatenate([[start], inner, [stop]])
     light = np.empty((len(frame), *shape), np.float32)
     side_by_side(lambda key: paint(float(frame[key]), light[key]), len(frame))
-    return Keyframes(frame.astype(np.float64), light)
+    return Keyframes.known(frame.astype(np.float64), light)
 
 
 def side_by_side(paint: Callable[[int], None], keys: int, threads: int | None = None) -> None:

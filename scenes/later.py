@@ -33,7 +33,7 @@ class Later:
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, at their frames here."""
         keys = self.scene.radiance(start + self.frames, stop + self.frames, self._there(gaze))
-        return Keyframes(keys.frame - self.frames, keys.radiance)
+        return Keyframes.known(keys.frame - self.frames, keys.radiance)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """The scene's truth; its camera pose has the offset in it."""

@@ -9,7 +9,13 @@ The motion of the points is summed up by a polynomial of second degree from pict
 
     s = C (1, u, v, u^2, u v, v^2),   (u, v): the pixel relative to the points' middle, in units of their spread
 
-fitted by least squares: exact for planes seen in parallel, and close for the dome that a ball is.
+fitted by least squares: exact for planes seen in parallel, and close for the dome that a ball is.  A `solid` body goes
+on in `STEPS`: the depth that the key has at s tells how far off, z, the pixel x is now, and the motion where that was,
+
+    s' = K (R z K^-1 x + t),   K: lenses, (R, t): from the camera now to the camera at the key
+
+Of what the polynomial had misplaced each step leaves the slope of the surface times the turn of the line of sight;
+none may lead further than the polynomial is off where it is worst.
 """
 
 from __future__ import annotations
@@ -21,11 +27,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Surface, Window
+from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
 
 DENSITY = 3
-"""Texels a pixel, one ray each.  On the scene `tumble` 0.8 % rms off 16 x 16 supersampling where things move; 1.0 % at
-2.5, 1.2 % at 2 (four rays a texel there)."""
+"""Texels a pixel, one ray each.  On the scene `tumble` 0.9 % rms off 16 x 16 rays a pixel where things move."""
 
 _BLUR = (DENSITY**2 / 12 - 1 / 4) / 2
 _FILTER = np.array([_BLUR, 1 - 2 * _BLUR, _BLUR])
@@ -34,6 +39,9 @@ pixel's area."""
 
 SAMPLES = 10
 """Points of a sprite's side whose motion is followed."""
+
+STEPS = 2
+"""Times that depth is read to find a place.  Where that does not settle, at rims, even numbers come out nearer."""
 
 RIDGE = 1e-4
 """Weight, against one point, that keeps the turn and bend of a sprite seen in few points at rest."""
@@ -46,34 +54,75 @@ Floats = NDArray[np.float64]
 class Key:
     """A body seen alone at one instant.
 
-    planes   (3, h, w) float32: light x coverage, coverage, depth x coverage
+    tints    (h, w) uint32: light x coverage in the lower 16 bits, full at `brightest`, and coverage in the upper, full
+             at 1.  Four are read for a pixel, and to fetch them is what takes the time.
+    depth    (h, w) float32; beside the body, that of what is nearest to there
     points   (J, 3) of the body that it shows, in the body's coordinates;  texels  (J, 2) where, x then y
+    lens     (3, 3) directions (right, down, 1) to texels
     """
 
-    planes: Array
+    tints: NDArray[np.uint32]
+    brightest: float
+    depth: Array
     points: Floats
     texels: Floats
+    lens: Floats
 
 
 def render_key(
-    renderer: Renderer, surface: Surface, pose: Floats, camera: Pinhole, lighting: Lighting, window: Window
+    renderer: Renderer, surface: Surface, pose: Floats, camera: Pinhole, lighting: Lighting, window: Window, gain: float
 ) -> Key:
-    """The surface at a pose in a window of the picture [pixels]."""
+    """The surface at a pose in a window of the picture [pixels], its light multiplied by a gain."""
+    if not (window.rows and window.columns):
+        return _NOTHING
     dense = Pinhole(camera.focal * DENSITY, _dense(camera.centre), camera.pose)
     left, top = np.floor(_dense((window.left, window.top))).astype(int)
     right, bottom = np.ceil(_dense((window.left + window.columns, window.top + window.rows))).astype(int)
     cut = Window(int(top), int(left), int(bottom - top), int(right - left))
     sprite = renderer.render(surface, pose, dense, lighting, cut, 1)
-    depth = np.where(sprite.coverage > 0, sprite.depth, 0).astype(np.float32)
-    planes = np.stack([sprite.radiance, sprite.coverage, sprite.coverage * depth]).astype(np.float32)
-    planes = np.stack([cv2.sepFilter2D(plane, -1, _FILTER, _FILTER) for plane in planes])
+    light, cover = (
+        np.asarray(cv2.sepFilter2D(plane, -1, _FILTER, _FILTER), np.float32)
+        for plane in (sprite.radiance, sprite.coverage)
+    )
     rows, columns = _sampled(sprite.coverage)
-    z = depth[rows, columns].astype(np.float64)
+    z = sprite.depth[rows, columns].astype(np.float64)
     x = (columns + left - dense.centre[0]) / dense.focal * z
     y = (dense.centre[1] - rows - top) / dense.focal * z
     to_body = np.linalg.inv(pose) @ camera.pose
     points = np.stack([x, y, -z], -1) @ to_body[:3, :3].T + to_body[:3, 3]
-    return Key(planes, points, np.stack([columns, rows], -1).astype(np.float64))
+    texels = np.stack([columns, rows], -1).astype(np.float64)
+    brightest = max(float(light.max()), 1e-30)
+    tints = _tints(light / brightest, cover)
+    lens = _lens(dense.focal, (dense.centre[0] - left, dense.centre[1] - top))
+    return Key(tints, brightest * gain, _filled(sprite), points, texels, lens)
+
+
+_NOTHING = Key(
+    np.zeros((0, 0), np.uint32), 1.0, np.zeros((0, 0), np.float32), np.zeros((0, 3)), np.zeros((0, 2)), np.eye(3)
+)
+"""Of a body that is out of sight."""
+
+
+def _tints(light: Array, cover: Array) -> NDArray[np.uint32]:
+    """Both in 0..1, in 16 bits each."""
+    lower, upper = (np.minimum(share * 65535 + 0.5, 65535).astype(np.uint32) for share in (light, cover))
+    return np.bitwise_or(lower, upper << np.uint32(16))
+
+
+def _lens(focal: float, centre: tuple[float, float]) -> Floats:
+    return np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])
+
+
+def _filled(sprite: Sprite) -> Array:
+    """Depth, and beside the body that of the texel nearest to there; 0 where nothing is seen at all."""
+    nothing = np.logical_not((sprite.coverage > 0) & np.isfinite(sprite.depth)).astype(np.uint8)
+    if nothing.all():
+        return np.zeros_like(sprite.depth)
+    _, nearest = cv2.distanceTransformWithLabels(nothing, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
+    depth_of = np.zeros(nearest.max() + 1, np.float32)
+    seen = nothing == 0
+    depth_of[nearest[seen]] = sprite.depth[seen]
+    return depth_of[nearest]
 
 
 def _dense(xy: tuple[float, float]) -> tuple[float, float]:
@@ -134,36 +183,50 @@ def fit(key_pixels: Floats, pixels: Floats) -> tuple[Floats, Floats]:
     return np.concatenate([middle, 1 / spread[:, None]], -1), np.swapaxes(found, -1, -2)
 
 
+def _texels(reference: Floats, coefficients: Floats, pixels: Floats) -> Floats:
+    """Where the polynomials put pixels (n, J, 2)."""
+    u, v = np.moveaxis((pixels - reference[:, None, :2]) * reference[:, 2, None, None], -1, 0)
+    basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], -1)
+    return np.asarray(basis @ np.swapaxes(coefficients, -1, -2))
+
+
 @dataclass(frozen=True, eq=False)
 class Carried:
     """A key carried to n instants: frames of reference (n, 3) and coefficients (n, 2, 6) as `fit` gives them, and the
-    change of depth, (n, 3) on (1, u, v)."""
+    motion itself: `rigid` (n, 17), four numbers that give the depth now of a texel (x, y) of depth z, as
+    z (a x + b y + c) + d, and a matrix (3, 4) from a pixel (x, y) of depth z, as (z x, z y, z, 1), to its texel, and
+    how far the polynomial is off at most, of the points that the key shows [texels]."""
 
     key: Key
     reference: Array
     coefficients: Array
-    deeper: Array
+    rigid: Array
 
     def at(self, instants: slice) -> Carried:
         """At some of the instants."""
-        return Carried(self.key, self.reference[instants], self.coefficients[instants], self.deeper[instants])
+        return Carried(self.key, self.reference[instants], self.coefficients[instants], self.rigid[instants])
 
 
 def carry(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Carried:
     """The key seen under maps from body to camera (n, 4, 4), with the picture's centre at `centre` (n, 2)."""
-    pixels, depth = project(view, key.points, focal, (0.0, 0.0))
+    pixels, _ = project(view, key.points, focal, (0.0, 0.0))
     pixels += centre[:, None]
-    _, before = project(key_view, key.points, focal, (0.0, 0.0))
     reference, coefficients = fit(key.texels, pixels)
-    u, v = np.moveaxis((pixels - reference[:, None, :2]) * reference[:, 2, None, None], -1, 0)
-    basis = np.stack([np.ones_like(u), u, v], -1)
-    transposed = np.swapaxes(basis, -1, -2)
-    deeper = np.linalg.solve(
-        transposed @ basis + RIDGE * np.diag([0.0, 1, 1]), transposed @ (depth - before)[..., None]
-    )
-    return Carried(
-        key, reference.astype(np.float32), coefficients.astype(np.float32), deeper[..., 0].astype(np.float32)
-    )
+    astray = np.abs(_texels(reference, coefficients, pixels) - key.texels).max((1, 2))
+    rigid = np.concatenate([_rigid(key, view, key_view, focal, centre), astray[:, None]], -1)
+    return Carried(key, reference.astype(np.float32), coefficients.astype(np.float32), rigid.astype(np.float32))
+
+
+def _rigid(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Floats:
+    """See `Carried`."""
+    flip = np.diag([1.0, -1.0, -1.0, 1.0])
+    now = flip @ view @ np.linalg.inv(key_view) @ flip
+    back = np.linalg.inv(now)
+    unlens = np.broadcast_to(np.diag([1 / focal, 1 / focal, 1.0]), (len(view), 3, 3)).copy()
+    unlens[:, :2, 2] = -centre / focal
+    depth = np.concatenate([now[:, 2:3, :3] @ np.linalg.inv(key.lens), now[:, 2:3, 3:]], -1)
+    texel = np.concatenate([key.lens @ back[:, :3, :3] @ unlens, key.lens @ back[:, :3, 3:]], -1)
+    return np.concatenate([depth[:, 0], texel.reshape(-1, 12)], -1)
 
 
 def lay(
@@ -173,6 +236,7 @@ def lay(
     before: Carried,
     after: Carried,
     share: Array,
+    solid: bool,
     tested: bool,
     marked: bool,
 ) -> None:
@@ -180,54 +244,136 @@ def lay(
 
     boxes    (n, 4) where it may be seen: top, left, bottom, right
     share    (n,) of the later key, 0..1
+    solid    whether depth carries the keys too
     depths   (n, H, W), of what has been laid so far; used if `tested` (hide where deeper) or `marked` (write)
     """
     _lay(
         pictures,
         depths,
         boxes,
-        before.key.planes,
+        before.key.tints,
+        before.key.depth,
+        np.float32(before.key.brightest),
         before.reference,
         before.coefficients,
-        before.deeper,
-        after.key.planes,
+        before.rigid,
+        after.key.tints,
+        after.key.depth,
+        np.float32(after.key.brightest),
         after.reference,
         after.coefficients,
-        after.deeper,
+        after.rigid,
         share,
+        solid,
         tested,
         marked,
     )
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def _locate(coefficients, reference, height, width, y, left, right, at, across, down):  # pragma: no cover - compiled
-    """Where pixels left .. right of row y lie in a key: the texel at their upper left, and how far they are past it."""
-    c, k = coefficients, reference[2]
-    v = (np.float32(y) - reference[1]) * k
-    a, b, bend = c[0, 0] + v * (c[0, 2] + v * c[0, 5]), (c[0, 1] + v * c[0, 4]) * k, c[0, 3] * k * k
-    d, e, sag = c[1, 0] + v * (c[1, 2] + v * c[1, 5]), (c[1, 1] + v * c[1, 4]) * k, c[1, 3] * k * k
-    zero, last_x, last_y = np.float32(0), np.float32(width - 1.001), np.float32(height - 1.001)
-    for x in range(left, right):
-        u = np.float32(x) - reference[0]
-        s = min(max(a + u * (b + u * bend), zero), last_x)
-        t = min(max(d + u * (e + u * sag), zero), last_y)
-        i, j = np.int32(s), np.int32(t)
-        at[x] = j * np.int32(width) + i
-        across[x] = s - np.float32(i)
-        down[x] = t - np.float32(j)
+@numba.njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
+def _add(
+    layer, box, weight, tints, brightest, depth, reference, coefficients, rigid, solid, deep
+):  # pragma: no cover - compiled
+    """Add weight x key, read bilinear, to a layer (3, h, w) of light, coverage and distance, the box of the picture.
+
+    Each row goes through short loops over arrays of its own, places, texels, light: all but those that fetch are
+    vectors then.  Pixels at either end that read nothing of the key are left out.
+    """
+    top, left, bottom, right = box
+    height, width = tints.shape
+    cells, depths = tints.reshape(-1), depth.reshape(-1)
+    most = right - left
+    s, t = np.empty(most, np.float32), np.empty(most, np.float32)
+    first_s, first_t = np.empty(most, np.float32), np.empty(most, np.float32)
+    p, q = np.empty(most, np.float32), np.empty(most, np.float32)
+    at, z = np.empty(most, np.uint32), np.empty(most, np.float32)
+    here, next_here = np.empty(most, np.uint32), np.empty(most, np.uint32)
+    below, next_below = np.empty(most, np.uint32), np.empty(most, np.uint32)
+    e, f, g, h = (
+        np.empty(most, np.float32),
+        np.empty(most, np.float32),
+        np.empty(most, np.float32),
+        np.empty(most, np.float32),
+    )
+    zero, half, one, nearest = np.float32(0), np.float32(0.5), np.float32(1), np.float32(1e-9)
+    last_s, last_t = np.float32(width - 1.001), np.float32(height - 1.001)
+    columns, right_of, bits, upper = np.int32(width), np.uint32(1), np.uint32(0xFFFF), np.uint32(16)
+    under = np.uint32(width)
+    of_light, of_cover = weight * brightest / np.float32(65535), weight / np.float32(65535)
+    c, k, x = coefficients, reference[2], np.float32(left)
+    bend, sag, u0 = c[0, 3] * k * k, c[1, 3] * k * k, x - reference[0]
+    of_s, of_t, rest, nearer = rigid[0], rigid[1], rigid[2], rigid[3]
+    step_s, step_t, step_w = rigid[4], rigid[8], rigid[12]
+    shift_s, shift_t, shift_w, astray = rigid[7], rigid[11], rigid[15], rigid[16]
+    for row in range(bottom - top):
+        y = np.float32(top + row)
+        v = (y - reference[1]) * k
+        a, b = c[0, 0] + v * (c[0, 2] + v * c[0, 5]), (c[0, 1] + v * c[0, 4]) * k
+        d, r = c[1, 0] + v * (c[1, 2] + v * c[1, 5]), (c[1, 1] + v * c[1, 4]) * k
+        for i in range(most):
+            u = u0 + np.float32(i)
+            s[i] = min(max(a + u * (b + u * bend), zero), last_s)
+            t[i] = min(max(d + u * (r + u * sag), zero), last_t)
+        if solid:
+            row_s = step_s * x + rigid[5] * y + rigid[6]
+            row_t = step_t * x + rigid[9] * y + rigid[10]
+            row_w = step_w * x + rigid[13] * y + rigid[14]
+            for i in range(most):
+                first_s[i], first_t[i] = s[i], t[i]
+            for _ in range(STEPS):
+                for i in range(most):
+                    at[i] = np.int32(t[i] + half) * columns + np.int32(s[i] + half)
+                for i in range(most):
+                    z[i] = depths[at[i]]
+                for i in range(most):
+                    away, along = z[i] * (of_s * s[i] + of_t * t[i] + rest) + nearer, np.float32(i)
+                    w = one / max(away * (row_w + step_w * along) + shift_w, nearest)
+                    by_depth_s = (away * (row_s + step_s * along) + shift_s) * w
+                    by_depth_t = (away * (row_t + step_t * along) + shift_t) * w
+                    s[i] = min(max(by_depth_s, first_s[i] - astray, zero), first_s[i] + astray, last_s)
+                    t[i] = min(max(by_depth_t, first_t[i] - astray, zero), first_t[i] + astray, last_t)
+        for i in range(most):
+            j = np.int32(t[i])
+            m = np.int32(s[i])
+            at[i] = j * columns + m
+            p[i], q[i] = s[i] - np.float32(m), t[i] - np.float32(j)
+        start, stop = 0, most
+        while start < stop and _empty(cells, at[start], under):
+            start += 1
+        while start < stop and _empty(cells, at[stop - 1], under):
+            stop -= 1
+        count = stop - start
+        ats, ps, qs = at[start:stop], p[start:stop], q[start:stop]
+        for i in range(count):
+            m = ats[i]
+            here[i], next_here[i] = cells[m], cells[m + right_of]
+            below[i], next_below[i] = cells[m + under], cells[m + under + right_of]
+        light, cover = layer[0, row, start:stop], layer[1, row, start:stop]
+        for i in range(count):
+            high, low = np.float32(np.int32(here[i] & bits)), np.float32(np.int32(below[i] & bits))
+            high += ps[i] * (np.float32(np.int32(next_here[i] & bits)) - high)
+            low += ps[i] * (np.float32(np.int32(next_below[i] & bits)) - low)
+            light[i] += of_light * (high + qs[i] * (low - high))
+            high, low = np.float32(np.int32(here[i] >> upper)), np.float32(np.int32(below[i] >> upper))
+            high += ps[i] * (np.float32(np.int32(next_here[i] >> upper)) - high)
+            low += ps[i] * (np.float32(np.int32(next_below[i] >> upper)) - low)
+            cover[i] += of_cover * (high + qs[i] * (low - high))
+        if deep:
+            for i in range(count):
+                m = ats[i]
+                e[i], f[i] = depths[m], depths[m + right_of]
+                g[i], h[i] = depths[m + under], depths[m + under + right_of]
+            ss, ts, away_row = s[start:stop], t[start:stop], layer[2, row, start:stop]
+            for i in range(count):
+                high, low = e[i] + ps[i] * (f[i] - e[i]), g[i] + ps[i] * (h[i] - g[i])
+                seen = high + qs[i] * (low - high)
+                away_row[i] += weight * (seen * (of_s * ss[i] + of_t * ts[i] + rest) + nearer)
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def _add(plane, width, at, across, down, left, right, weight, row):  # pragma: no cover - compiled
-    """Add weight x plane, bilinear, to pixels left .. right of a row."""
-    one = np.float32(1)
-    for x in range(left, right):
-        k, p, q = at[x], across[x], down[x]
-        below = k + np.uint32(width)
-        upper = plane[k] * (one - p) + plane[k + np.uint32(1)] * p
-        lower = plane[below] * (one - p) + plane[below + np.uint32(1)] * p
-        row[x] += weight * (upper * (one - q) + lower * q)
+@numba.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _empty(cells, at, under):  # pragma: no cover - compiled
+    one = np.uint32(1)
+    return cells[at] | cells[at + one] | cells[at + under] | cells[at + under + one] == 0
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -235,70 +381,77 @@ def _lay(
     pictures,
     depths,
     boxes,
-    planes0,
+    tints0,
+    depth0,
+    brightest0,
     reference0,
     coefficients0,
-    deeper0,
-    planes1,
+    rigid0,
+    tints1,
+    depth1,
+    brightest1,
     reference1,
     coefficients1,
-    deeper1,
+    rigid1,
     share,
+    solid,
     tested,
     marked,
 ):  # pragma: no cover - compiled
-    columns = pictures.shape[2]
-    light, cover, depth = np.zeros(columns, np.float32), np.zeros(columns, np.float32), np.zeros(columns, np.float32)
-    at = np.zeros(columns, np.uint32)
-    across, down = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     deep = tested or marked
-    flat0, flat1 = planes0.reshape(3, -1), planes1.reshape(3, -1)
     resting = _resting(boxes, reference0, coefficients0, share)
-    for y in range(boxes[:, 0].min(), boxes[:, 2].max()):
-        held = False
-        for n in range(len(pictures)):
-            top, left, bottom, right = boxes[n]
-            if y < top or y >= bottom or left >= right:
-                held = False
-                continue
+    rows, columns = max((boxes[:, 2] - boxes[:, 0]).max(), 0), max((boxes[:, 3] - boxes[:, 1]).max(), 0)
+    layer = np.empty((3, rows, columns), np.float32)
+    for n in range(len(pictures)):
+        top, left, bottom, right = boxes[n]
+        if top >= bottom or left >= right:
+            continue
+        if not resting[n]:
+            layer[:, : bottom - top, : right - left] = zero
             w = share[n]
-            if not (held and resting[n]):
-                light[left:right] = 0
-                cover[left:right] = 0
-                depth[left:right] = 0
-                if w < one:
-                    height, width = planes0.shape[1:]
-                    _locate(coefficients0[n], reference0[n], height, width, y, left, right, at, across, down)
-                    _add(flat0[0], width, at, across, down, left, right, one - w, light)
-                    _add(flat0[1], width, at, across, down, left, right, one - w, cover)
-                    if deep:
-                        _add(flat0[2], width, at, across, down, left, right, one - w, depth)
-                if w > zero:
-                    height, width = planes1.shape[1:]
-                    _locate(coefficients1[n], reference1[n], height, width, y, left, right, at, across, down)
-                    _add(flat1[0], width, at, across, down, left, right, w, light)
-                    _add(flat1[1], width, at, across, down, left, right, w, cover)
-                    if deep:
-                        _add(flat1[2], width, at, across, down, left, right, w, depth)
-            held = True
-            row = pictures[n, y]
+            if w < one:
+                _add(
+                    layer,
+                    boxes[n],
+                    one - w,
+                    tints0,
+                    brightest0,
+                    depth0,
+                    reference0[n],
+                    coefficients0[n],
+                    rigid0[n],
+                    solid,
+                    deep,
+                )
+            if w > zero:
+                _add(
+                    layer,
+                    boxes[n],
+                    w,
+                    tints1,
+                    brightest1,
+                    depth1,
+                    reference1[n],
+                    coefficients1[n],
+                    rigid1[n],
+                    solid,
+                    deep,
+                )
+        for row in range(bottom - top):
+            light, cover, away = layer[0, row], layer[1, row], layer[2, row]
+            picture = pictures[n, top + row, left:right]
             if not deep:
-                for x in range(left, right):
-                    row[x] = light[x] + max(one - cover[x], zero) * row[x]
+                for x in range(len(picture)):
+                    picture[x] = light[x] + max(one - cover[x], zero) * picture[x]
                 continue
-            middle_x, middle_y, k = reference0[n] if w < one else reference1[n]
-            deeper = (one - w) * deeper0[n] + w * deeper1[n]
-            nearer = deeper[0] + deeper[2] * (np.float32(y) - middle_y) * k
-            for x in range(left, right):
-                if cover[x] <= zero:
+            nearest = depths[n, top + row, left:right]
+            for x in range(len(picture)):
+                if cover[x] <= zero or (tested and away[x] > nearest[x]):
                     continue
-                z = depth[x] / cover[x] + nearer + deeper[1] * (np.float32(x) - middle_x) * k
-                if tested and z > depths[n, y, x]:
-                    continue
-                row[x] = light[x] + max(one - cover[x], zero) * row[x]
+                picture[x] = light[x] + max(one - cover[x], zero) * picture[x]
                 if marked and cover[x] > half:
-                    depths[n, y, x] = z
+                    nearest[x] = away[x]
 
 
 @numba.njit(nogil=True, cache=True)

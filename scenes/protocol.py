@@ -111,3 +111,12 @@ class Placed(Scene, Protocol):
         Nothing is rendered for it.
         """
         ...
+
+
+@runtime_checkable
+class Dimmable(Scene, Protocol):
+    """A scene that can be made brighter without a look at its pictures."""
+
+    def lit(self, gain: float) -> Scene:
+        """The same with `gain` times its light."""
+        ...

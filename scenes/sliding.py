@@ -8,6 +8,8 @@ either side of a pixel, and read between them.
 
 from __future__ import annotations
 
+import copy
+
 import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,7 +56,8 @@ class SlidingTexture:
         self.velocity_px_s, self.frame_rate_hz = velocity_px_s, float(frame_rate_hz)
         self.motion_per_key = float(motion_per_key)
         samples = _area_average(_area_average(values.T, texel_px).T, texel_px)
-        self._samples = np.ascontiguousarray(light[0] + (light[1] - light[0]) * samples, np.float32)
+        self._period = samples.shape[1]
+        self._samples = _by_phase((light[0] + (light[1] - light[0]) * samples).astype(np.float32), self.shape[1])
 
     def __repr__(self) -> str:
         return f"SlidingTexture(shape={self.shape}, velocity_px_s={self.velocity_px_s})"
@@ -78,6 +81,12 @@ class SlidingTexture:
             poses={"texture": self.corner_at(frame, gaze), "camera": camera},
         )
 
+    def lit(self, gain: float) -> SlidingTexture:
+        """The same texture with `gain` times its light."""
+        other = copy.copy(self)
+        other._samples = self._samples * np.float32(gain)
+        return other
+
     def velocity(self, gaze: Gaze | None = None) -> tuple[float, float]:
         """(x, y) in the picture [pixels/frame]."""
         pan, tilt = gaze.rate if gaze else (0.0, 0.0)
@@ -90,9 +99,8 @@ class SlidingTexture:
         return self.velocity_px_s[0] * seconds - pan - 0.5, self.velocity_px_s[1] * seconds - tilt - 0.5
 
     def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
-        rows, columns = self._samples.shape
         x, y = (-SAMPLES_PER_PIXEL * (corner + 0.5) for corner in self.corner_at(frame, gaze))
-        _paint(self._samples, x % columns, y % rows, picture)
+        _paint(self._samples, x % self._period, y % len(self._samples), picture)
 
 
 def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.float64]:
@@ -119,22 +127,33 @@ def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.f
     return (up_to(middle + half) - up_to(middle - half)) / (2 * half)
 
 
+def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
+    """(rows, SAMPLES_PER_PIXEL, n): samples (rows, period) so that those a pixel apart are neighbours, on and on over
+    the period's end for as many columns as a picture has from any of them."""
+    period = samples.shape[1]
+    pixels = np.arange(np.lcm(period, SAMPLES_PER_PIXEL) // SAMPLES_PER_PIXEL + columns)
+    place = (SAMPLES_PER_PIXEL * pixels + np.arange(SAMPLES_PER_PIXEL)[:, None]) % period
+    return np.ascontiguousarray(samples[:, place])
+
+
 @numba.njit(cache=True, nogil=True)
 def _paint(samples, x, y, picture):  # pragma: no cover - compiled
     """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
-    height, width = samples.shape
+    height, (rows, columns) = samples.shape[0], picture.shape
     left, top = int(x), int(y)
     right_share, lower_share = np.float32(x - left), np.float32(y - top)
-    columns = picture.shape[1]
-    near = (left + SAMPLES_PER_PIXEL * np.arange(columns)) % width
-    far = (near + 1) % width
-    for r in range(picture.shape[0]):
-        row = (top + SAMPLES_PER_PIXEL * r) % height
-        upper, lower = samples[row], samples[(row + 1) % height]
+    here, place = left % SAMPLES_PER_PIXEL, left // SAMPLES_PER_PIXEL
+    right, beside = (left + 1) % SAMPLES_PER_PIXEL, (left + 1) // SAMPLES_PER_PIXEL
+    for r in range(rows):
+        upper = samples[(top + SAMPLES_PER_PIXEL * r) % height]
+        lower = samples[(top + SAMPLES_PER_PIXEL * r + 1) % height]
+        upper_left, upper_right = upper[here, place : place + columns], upper[right, beside : beside + columns]
+        lower_left, lower_right = lower[here, place : place + columns], lower[right, beside : beside + columns]
+        row = picture[r]
         for c in range(columns):
-            above = upper[near[c]] + right_share * (upper[far[c]] - upper[near[c]])
-            below = lower[near[c]] + right_share * (lower[far[c]] - lower[near[c]])
-            picture[r, c] = above + lower_share * (below - above)
+            above = upper_left[c] + right_share * (upper_right[c] - upper_left[c])
+            below = lower_left[c] + right_share * (lower_right[c] - lower_left[c])
+            row[c] = above + lower_share * (below - above)
 
 
 def _check(

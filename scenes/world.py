@@ -53,17 +53,21 @@ SHORTEST_KEY_STEP = 16
 BLUR = 0.5
 """Most that the two keys of a body may disagree on a place half-way between them, rms [pixels]."""
 
+FLAT = 0.1
+"""The same, of keys that are carried by a polynomial alone: what is off by more is carried by its depth too."""
+
 SHADE = 0.01
 """Most that shading half-way may differ from the mean of both keys, rms of full light."""
 
-TURN = 0.12
+TURN = 0.07
 """Most that a surface's slant to the line of sight changes from key to key, rms of its cosine: a ball may turn by
-0.2 radians, and what comes round its edge is 2 % of its radius."""
+0.12 radians, and what comes round its edge is 0.7 % of its radius."""
 
 PROBES = 256
 """Points of a body's surface that stand for it in the plan."""
 
-TRUTH_SUPERSAMPLE = 4
+TRUTH_RAYS = 4
+"""Of a pixel, along either side."""
 
 Array = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -146,10 +150,13 @@ class World:
         frames = self._key_frames(start, stop, gaze)
         pictures = np.empty((len(frames), *self.shape), np.float32)
         work: list[Future[None]] = []
-        for piece in range(int(frames[0] // _PIECE), int(frames[-1] // _PIECE) + 1):
-            first, last = np.searchsorted(frames, [piece * _PIECE, (piece + 1) * _PIECE])
-            if first < last:
-                work += self._paint(piece * _PIECE // BLOCK, frames[first:last], gaze, pictures[first:last])
+        blocks = frames // BLOCK
+        for block in np.unique(blocks):
+            first, last = np.searchsorted(blocks, [block, block + 1])
+            pieces = max(1, int(frames[last - 1] - frames[first]) // _PIECE)
+            for piece in np.array_split(np.arange(first, last), pieces):
+                here = slice(int(piece[0]), int(piece[-1]) + 1)
+                work += self._paint(int(block), frames[here], gaze, pictures[here])
         for part in work:
             part.result()
         return Keyframes(frames, pictures)
@@ -162,10 +169,9 @@ class World:
         camera = (gaze or _AT_REST).at(frame)
         return Truth(radiance, (ahead - behind).astype(np.float32), owner, depth, poses | {"camera": camera})
 
-    def displacement(self, frame: float, frames: float, gaze: Gaze | None = None) -> Array:
-        """How far the surface seen in each pixel at a frame has moved so many frames later, (H, W, 2) [pixels]."""
-        _, depth, owner = self._seen(frame, gaze)
-        return self._displaced(owner, depth, frame, frames, gaze).astype(np.float32)
+    def picture(self, frame: float, gaze: Gaze | None = None, rays: int = TRUTH_RAYS) -> Array:
+        """The radiance (H, W) at an instant, by rays x rays a pixel."""
+        return self._seen(frame, gaze, rays)[0]
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """Where the middle of every body that moves is seen, see `scenes.protocol.Placed`."""
@@ -183,6 +189,10 @@ class World:
                     float(centre[1] - self._focal * up / away),
                 )
         return places
+
+    def lit(self, gain: float) -> World:
+        """The same world with `gain` times its light."""
+        return dataclasses.replace(self, light=self.light * gain)
 
     # -- the plan ----------------------------------------------------------------------------------------------
 
@@ -247,7 +257,7 @@ class World:
             if carried[0].key is carried[-1].key:
                 share = np.zeros_like(share)
             parts.append(_Part(int(first), int(last), carried[0], carried[-1], share))
-        return _Layer(parts, boxes, body in plan.tested, body in plan.marked)
+        return _Layer(parts, boxes, body in plan.solid, body in plan.tested, body in plan.marked)
 
     def _key(self, body: int, frame: int, gaze: Gaze | None) -> tuple[Key, Floats]:
         """A body's key at a frame, and the map from its coordinates to the camera's then."""
@@ -261,7 +271,7 @@ class World:
             "key",
             name,
             4 * len(self.bodies) + 8,
-            lambda: render_key(self._draw, surface, pose, camera, self._lit, window),
+            lambda: render_key(self._draw, surface, pose, camera, self.lighting, window, self.light),
         )
         return key, view
 
@@ -295,7 +305,7 @@ class World:
         picture = self._sky(frame, np.zeros(2))
         for number, body in enumerate(self.bodies):
             if body.backdrop:
-                _over(picture, self._sprite(number, frame, None), np.full_like(picture, np.inf))
+                _over(picture, self._sprite(number, frame, None, TRUTH_RAYS), np.full_like(picture, np.inf))
         return picture
 
     def _sky(self, frame: float, offset: Floats) -> Array:
@@ -326,14 +336,14 @@ class World:
 
     # -- truth -------------------------------------------------------------------------------------------------
 
-    def _seen(self, frame: float, gaze: Gaze | None) -> tuple[Array, Array, NDArray[np.int32]]:
+    def _seen(self, frame: float, gaze: Gaze | None, rays: int = TRUTH_RAYS) -> tuple[Array, Array, NDArray[np.int32]]:
         """Radiance, depth and owner, of bodies rendered at this instant."""
         picture = self._sky(frame, _offsets(gaze, np.array([frame]))[0])
         depth = np.full(self.shape, np.inf, np.float32)
         nearest = depth.copy()
         owner = np.zeros(self.shape, np.int32)
         for body in self._plan(int(frame // BLOCK)).order:
-            sprite = self._sprite(body, frame, gaze)
+            sprite = self._sprite(body, frame, gaze, rays)
             shown = _over(picture, sprite, nearest)
             place = _place(sprite.window)
             depth[place][shown] = sprite.depth[shown]
@@ -342,7 +352,7 @@ class World:
                 nearest[place][shown] = sprite.depth[shown]
         return picture, depth, owner
 
-    def _sprite(self, body: int, frame: float, gaze: Gaze | None) -> Sprite:
+    def _sprite(self, body: int, frame: float, gaze: Gaze | None, rays: int) -> Sprite:
         at = np.array(float(frame))
         offset = _offsets(gaze, at[None])[0]
         rest = self._pinhole(at)
@@ -352,7 +362,15 @@ class World:
         if not (window.rows and window.columns):
             nothing = np.zeros((0, 0), np.float32)
             return Sprite(Window(0, 0, 0, 0), nothing, nothing, nothing)
-        return self._draw.render(self.bodies[body].surface, pose, camera, self._lit, window, TRUTH_SUPERSAMPLE)
+
+        def drawn() -> Sprite:
+            sprite = self._draw.render(self.bodies[body].surface, pose, camera, self.lighting, window, rays)
+            return dataclasses.replace(sprite, radiance=sprite.radiance * np.float32(self.light))
+
+        if not self.bodies[body].backdrop:
+            return drawn()
+        name = (body, pose.tobytes(), camera.centre, camera.pose.tobytes(), rays)
+        return self._kept.get("backdrop", name, 2 * len(self.bodies), drawn)
 
     def _displaced(self, owner: NDArray[np.int32], depth: Array, frame: float, by: float, gaze: Gaze | None) -> Floats:
         """(H, W, 2): where what is seen at a frame has gone `by` frames later."""
@@ -389,11 +407,6 @@ class World:
         return (self.shape[1] - 1) / 2, (self.shape[0] - 1) / 2
 
     @property
-    def _lit(self) -> Lighting:
-        lamp = self.lighting
-        return Lighting(lamp.ambient * self.light, lamp.intensity * self.light, lamp.towards)
-
-    @property
     def _draw(self) -> Renderer:
         if self.renderer is not None:
             return self.renderer
@@ -421,6 +434,7 @@ class _Plan:
     """What follows from the motion in a block.
 
     steps    frames between the keys of each body
+    solid    bodies whose keys are carried by depth
     speed    fastest point in the picture [pixels/frame]
     order    bodies from the back to the front
     tested   bodies whose depth is compared with what lies there;  marked: those that are compared with
@@ -428,6 +442,7 @@ class _Plan:
     """
 
     steps: tuple[int, ...]
+    solid: frozenset[int]
     speed: float
     order: tuple[int, ...]
     tested: frozenset[int]
@@ -438,10 +453,12 @@ class _Plan:
 def _plan_block(world: World, block: int) -> _Plan:
     frames: Floats = block * BLOCK + np.linspace(0.0, BLOCK, _NODES + 1, dtype=np.float64)
     centre = np.broadcast_to(world._centre, (len(frames), 2))
-    steps, ranges, boxes, speeds, resting = [], [], [], [_sky_speed(world, frames)], []
+    steps, solid, ranges, boxes, speeds, resting = [], [], [], [], [_sky_speed(world, frames)], []
     for number, body in enumerate(world.bodies):
         probe, view = world._probe(number), world._view(body, frames)
-        steps.append(_key_step(probe, view, world._focal, world.lighting, world._body_pose(body, frames)))
+        step, by_depth = _key_step(probe, view, world._focal, world.lighting, world._body_pose(body, frames))
+        steps.append(step)
+        solid += [number] * by_depth
         pixels, depth = project(view, probe.extreme, world._focal, (0.0, 0.0))
         box = _extent(probe.extreme, view, world._focal, centre)
         ranges.append((depth.min(), depth.max()))
@@ -460,6 +477,7 @@ def _plan_block(world: World, block: int) -> _Plan:
     ]
     return _Plan(
         steps=tuple(steps),
+        solid=frozenset(solid),
         speed=max(speeds),
         order=(*backdrops, *others),
         tested=frozenset(front for _, front in pairs),
@@ -468,8 +486,9 @@ def _plan_block(world: World, block: int) -> _Plan:
     )
 
 
-def _key_step(probe: _Probe, view: Floats, focal: float, lighting: Lighting, pose: Floats) -> int:
-    """The longest step, a power of two, at which two keys stand for all between; view, pose (NODES + 1, 4, 4)."""
+def _key_step(probe: _Probe, view: Floats, focal: float, lighting: Lighting, pose: Floats) -> tuple[int, bool]:
+    """The longest step, a power of two, at which two keys stand for all between, and whether they do so only if carried
+    by depth; view, pose (NODES + 1, 4, 4)."""
     pixels, depth = project(view, probe.points, focal, (0.0, 0.0))
     eye = np.linalg.inv(view)[:, :3, 3]
     sight = eye[:, None] - probe.points
@@ -479,32 +498,51 @@ def _key_step(probe: _Probe, view: Floats, focal: float, lighting: Lighting, pos
     normals = probe.normals @ np.swapaxes(pose[:, :3, :3], -1, -2)
     shade = lighting.intensity * np.maximum(normals @ lamp, 0) / max(lighting.intensity + lighting.ambient, 1e-9)
     stride = _NODES
-    while stride * BLOCK // _NODES > SHORTEST_KEY_STEP:
+    while True:
         pieces = [slice(a, a + stride + 1) for a in range(0, _NODES, stride)]
-        if all(_carries(pixels[p], depth[p], facing[p], shade[p]) for p in pieces):
-            break
+        shortest = stride * BLOCK // _NODES <= SHORTEST_KEY_STEP
+        if shortest or all(_alike(facing[p], depth[p], shade[p]) for p in pieces):
+            off = [_astray(pixels[p], depth[p], facing[p], sight[p]) for p in pieces]
+            if shortest or max(left for _, left in off) <= BLUR:
+                return stride * BLOCK // _NODES, max(flat for flat, _ in off) > FLAT
         stride //= 2
-    return stride * BLOCK // _NODES
 
 
-def _carries(pixels: Floats, depth: Floats, facing: Floats, shade: Floats) -> bool:
-    """Whether the ends stand for the middle."""
-    middle = len(pixels) // 2
+def _alike(facing: Floats, depth: Floats, shade: Floats) -> bool:
+    """Whether the ends show what the middle shows, in its light."""
     if np.sqrt(((facing[-1] - facing[0]) ** 2).mean()) > TURN:
         return False
-    shown = (facing[middle] > 0.05) & (depth > 0).all(0)
+    middle = len(facing) // 2
+    shown = _shown(facing, depth)
+    shading = shade[middle, shown] - (shade[0, shown] + shade[-1, shown]) / 2
+    return bool(not shown.any() or np.sqrt((shading**2).mean()) <= SHADE)
+
+
+def _shown(facing: Floats, depth: Floats) -> NDArray[np.bool_]:
+    """Points that are seen half-way."""
+    return np.asarray((facing[len(facing) // 2] > 0.05) & (depth > 0).all(0))
+
+
+def _astray(pixels: Floats, depth: Floats, facing: Floats, sight: Floats) -> tuple[float, float]:
+    """How far apart the ends put a place of the middle, rms [pixels]: carried by a polynomial, and by depth after that.
+
+    Depth is read where the polynomial leads: off by its error times the slope of the surface, of which as much is seen
+    as the line of sight has turned."""
+    middle, shown = len(pixels) // 2, _shown(facing, depth)
     if shown.sum() < 3:
-        return True
-    ends = pixels[[0, -1]][:, shown]
-    residuals = []
-    for end in ends:
-        reference, found = fit(end, pixels[middle : middle + 1, shown])
+        return 0.0, 0.0
+    cosine = facing[middle, shown]
+    slope = np.sqrt(np.maximum(1 - cosine**2, 0)) / cosine
+    flat, left = [], []
+    for end in (0, -1):
+        reference, found = fit(pixels[end, shown], pixels[middle : middle + 1, shown])
         u, v = ((pixels[middle, shown] - reference[0, :2]) * reference[0, 2]).T
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v])
-        residuals.append((found[0] @ basis).T - end)
-    apart = np.sqrt(((residuals[0] - residuals[1]) ** 2).sum(-1).mean())
-    shading = shade[middle, shown] - (shade[0, shown] + shade[-1, shown]) / 2
-    return bool(apart <= BLUR and np.sqrt((shading**2).mean()) <= SHADE)
+        flat.append((found[0] @ basis).T - pixels[end, shown])
+        turned = np.linalg.norm(sight[end, shown] - sight[middle, shown], axis=-1)
+        left.append(flat[-1] * np.minimum(turned * slope, 1)[:, None])
+    by_polynomial, by_depth = (float(np.sqrt(((a - b) ** 2).sum(-1).mean())) for a, b in (flat, left))
+    return by_polynomial, by_depth
 
 
 def _sky_speed(world: World, frames: Floats) -> float:
@@ -585,6 +623,7 @@ class _Part:
 class _Layer:
     parts: list[_Part]
     boxes: NDArray[np.int64]
+    solid: bool
     tested: bool
     marked: bool
 
@@ -608,6 +647,7 @@ def _compose(pictures: Array, base: Array, layers: list[_Layer], start: int, sto
                 part.before.at(of_part),
                 part.after.at(of_part),
                 part.share[of_part],
+                layer.solid,
                 layer.tested,
                 layer.marked,
             )

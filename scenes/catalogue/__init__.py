@@ -11,6 +11,7 @@ from them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from scenes.catalogue import (
     ball,
@@ -34,6 +35,7 @@ from scenes.catalogue import (
 from scenes.exposure import expose
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer
+from scenes.world import World
 from spikecam_env.errors import unknown_name
 
 SCENES: dict[str, Callable[..., Scene]] = {
@@ -57,7 +59,7 @@ SCENES: dict[str, Callable[..., Scene]] = {
 }
 
 METERED_ROWS = 60
-"""Exposure is measured on a small picture of the scene."""
+"""Exposure is measured on a small picture of a world."""
 
 
 def make_scene(
@@ -76,10 +78,10 @@ def make_scene(
     """
     if name not in SCENES:
         raise unknown_name("scene", name, SCENES)
-    build = SCENES[name]
-    small = (METERED_ROWS, max(1, round(METERED_ROWS * shape[1] / shape[0])))
-    metered = build(small, seed, frame_rate_hz, renderer) if shape[0] > METERED_ROWS else None
-    return expose(build(shape, seed, frame_rate_hz, renderer), mean_interval, metered)
+    scene, metered = SCENES[name](shape, seed, frame_rate_hz, renderer), None
+    if isinstance(scene, World) and shape[0] > METERED_ROWS:
+        metered = replace(scene, shape=(METERED_ROWS, max(1, round(METERED_ROWS * shape[1] / shape[0]))))
+    return expose(scene, mean_interval, metered)
 
 
 def random_world(

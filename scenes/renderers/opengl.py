@@ -171,6 +171,8 @@ class OpenGL:
         for ability in abilities:
             gl.glDisable(ability)
 
+        if supersample == 1:  # a ray is a pixel, and is read from where it was drawn
+            return
         gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, targets.pixels)
         gl.glViewport(0, 0, tile.columns, tile.rows)
         gl.glUseProgram(self._mean_program._program_id)
@@ -187,6 +189,7 @@ class OpenGL:
         inside = np.s_[top : top + tile.rows, left : left + tile.columns]
         for channel, picture in enumerate((sprite.radiance, sprite.coverage, sprite.depth)):
             picture[inside] = values[..., channel]
+        sprite.depth[inside][values[..., 1] == 0] = np.inf
 
     def _targets_for(self, tile: Window, supersample: int) -> _Targets:
         rows, columns = tile.rows * supersample, tile.columns * supersample

@@ -27,8 +27,8 @@ class Demo:
     mode: Literal["best", "paper"] = "best"
     """Which DnSS denoises the film."""
     camera: Camera = field(default_factory=Camera)
-    height: int = 250
-    width: int = 400
+    size: tuple[int, int] = (250, 400)
+    """Rows and columns."""
     seed: int = 0
     """Seed of the camera unit, its noise, and the scene."""
 
@@ -45,7 +45,7 @@ class Demo:
             frames=self.frames,
             mode=self.mode,
             model=self.camera.load(),
-            shape=(self.height, self.width),
+            shape=self.size,
             seed=self.seed,
         )
         frames, rows = film_frames(run), comparison(run)

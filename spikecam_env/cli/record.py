@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,8 +26,8 @@ class Record:
     camera: Camera = field(default_factory=Camera)
     rpm: float | None = None
     """Speed of the disk; default 2000."""
-    height: int = 250
-    width: int = 400
+    size: tuple[int, int] = (250, 400)
+    """Rows and columns."""
     seed: int = 0
     """Seed of the camera unit, its noise and the scene."""
 
@@ -47,8 +48,8 @@ class Record:
         if self.frames < 1:
             raise InputError(f"--frames {self.frames}; record at least 1")
         model = self.camera.load()
-        sensor = SpikeSensor(model, (self.height, self.width), self.seed, engine="auto")
-        scene = scene_named(self.scene, (self.height, self.width), self.seed, model.frame_rate_hz, self.rpm)
+        sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
+        scene = scene_named(self.scene, self.size, self.seed, model.frame_rate_hz, self.rpm)
 
         def stream():
             for start in trange(0, self.frames, 64, desc=f"record {self.scene}", unit="block", leave=False):
@@ -66,5 +67,5 @@ class Record:
             blocks = np.concatenate(list(stream()))
             spikes = int(blocks.sum())
             (save_vidar_dat if suffix == ".dat" else save_npz)(self.out, blocks)
-        rate = spikes / (self.frames * self.height * self.width)
+        rate = spikes / (self.frames * math.prod(self.size))
         print(table([{"file": str(self.out), "frames": self.frames, "engine": sensor.engine, "spikes/frame": rate}]))

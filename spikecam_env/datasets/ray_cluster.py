@@ -28,7 +28,7 @@ def on_ray(plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, addr
 
     address: LOCAL starts a cluster of `jobs` workers on this machine for the time of the run; else that of a cluster,
     where the package is installed and `folder` is storage that all machines share.  A cluster that asks for a token
-    wants it set up for this process too, as Ray's documentation says.
+    wants RAY_AUTH_MODE=token, and the token, set for this process too.
     Errors: what a worker raised; InputError without Ray, without that cluster, and if workers keep dying.
     """
     ray = _connected(address, jobs)
@@ -95,5 +95,8 @@ def _connected(address: str, jobs: int) -> ModuleType:
         else:
             ray.init(address=address, logging_level=logging.ERROR, log_to_driver=False)
     except (ConnectionError, RuntimeError, ValueError) as error:
-        raise InputError(f"no Ray cluster at {address!r}: {error}; give its address, or {LOCAL!r}") from error
+        raise InputError(
+            f"no Ray cluster at {address!r}: {error}; give its address, or {LOCAL!r}; "
+            "to one that asks for a token this command goes with RAY_AUTH_MODE=token too"
+        ) from error
     return ray

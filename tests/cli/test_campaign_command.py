@@ -52,7 +52,7 @@ def test_import_takes_labels_from_flags_and_a_table(tmp_path: Path, capsys) -> N
 
 
 def test_record_takes_effects(tmp_path: Path) -> None:
-    size = ("--height", 16, "--width", 16, "--frames", 60)
+    size = ("--size", 16, 16, "--frames", 60)
     for name, options in (("plain", ()), ("dead", ("--effect", "dead_pixels:fraction=1"))):
         assert spikecam("record", "--out", tmp_path / f"{name}.dat", *size, *options) == 0
     plain, dead = (load_vidar_dat(tmp_path / f"{name}.dat", height=16, width=16) for name in ("plain", "dead"))

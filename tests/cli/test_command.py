@@ -15,7 +15,7 @@ import pytest
 from spikecam_env.cli.main import COMMANDS, run
 from spikecam_env.streams import load_vidar_dat, read_recording
 
-SMALL = ("--height", "64", "--width", "96")
+SMALL = ("--size", "64", "96")
 
 
 def spikecam(*args: object) -> int:
@@ -41,10 +41,11 @@ def test_a_recording_reads_back_and_denoises(suffix: str, tmp_path: Path, capsys
     file = tmp_path / f"disk.{suffix}"
     assert spikecam("record", "--frames", 130, "--out", file, *SMALL) == 0
     shape = {"height": 64, "width": 96} if suffix == "dat" else {}
+    options = [f"--{name}={value}" for name, value in shape.items()]
     spikes = read_recording(file, **shape).spikes
     assert spikes.shape == (130, 64, 96)
     assert 0.05 < spikes.mean() < 0.6
-    assert spikecam("denoise", file, "--out", tmp_path / "out", *(SMALL if shape else ())) == 0
+    assert spikecam("denoise", file, "--out", tmp_path / "out", *options) == 0
     assert "denoised rate" in capsys.readouterr().out
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert names == {"denoised.h5", "pictures.png", "film.mp4", "summary.json"}
@@ -82,7 +83,7 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
         ),
         (("record", "--out", "x.h5", "--model", "no.toml"), "cannot read model file no.toml"),
         (("record", "--out", "x.h5", "--frames", "0"), "--frames 0"),
-        (("record", "--out", "x.h5", "--height", "0"), "shape = (0, 400)"),
+        (("record", "--out", "x.h5", "--size", "0", "400"), "shape = (0, 400)"),
         (("demo", "--frames", "10"), "10 frames are too few"),
         (("demo", "--model", "scs"), "unknown preset 'scs'"),
         (("demo", "--rpm", "nan"), "rpm"),

@@ -64,7 +64,7 @@ def test_what_is_wrong_is_said_in_a_line(args: tuple[str, ...], message: str, ca
 
 
 def test_record_takes_any_scene(tmp_path: Path, capsys) -> None:
-    small = ("--frames", 40, "--height", 24, "--width", 40)
+    small = ("--frames", 40, "--size", 24, 40)
     for scene in ("collage", "dice"):
         assert spikecam("record", "--scene", scene, "--out", tmp_path / f"{scene}.h5", *small) == 0
         assert 0.05 < read_recording(tmp_path / f"{scene}.h5").spikes.mean() < 0.2

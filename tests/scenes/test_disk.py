@@ -171,6 +171,13 @@ def test_same_seed_same_scene() -> None:
     assert not np.array_equal(first, other)
 
 
+def test_a_brighter_disk_is_the_same_in_more_light() -> None:
+    disk = RotatingDisk(shape=(40, 50))
+    for frame, gaze in ((0, None), (7, Gaze.fixed(3.5, -2.0))):
+        once, twice = (scene.truth(frame, gaze).radiance for scene in (disk, disk.lit(2.0)))
+        np.testing.assert_allclose(twice, 2 * once, rtol=1e-6)
+
+
 def test_disk_is_a_scene() -> None:
     assert isinstance(RotatingDisk(shape=(8, 8)), Scene)
 

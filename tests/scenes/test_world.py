@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 
 import cv2
@@ -10,11 +11,12 @@ import pytest
 
 from scenes.camera import Camera
 from scenes.exposure import METERED_FRAMES, expose
-from scenes.flow import flow_error
+from scenes.flow import check_flow
+from scenes.layers import carry, project, render_key
 from scenes.meshes import assemble, box, disc, rectangle, sphere, torus
 from scenes.protocol import Gaze, Scene
 from scenes.renderers.embree import Embree
-from scenes.renderers.protocol import Lighting
+from scenes.renderers.protocol import Lighting, Pinhole, Window
 from scenes.textures import blobs, dead_leaves
 from scenes.trajectories import Ballistic, Shake, Spinning, Still, Trajectory, Vibrating
 from scenes.world import AT_REST, BLOCK, Body, World
@@ -124,11 +126,9 @@ def test_a_ball_is_where_its_trajectory_says(renderer: Embree) -> None:
 
 
 def test_flow_carries_frame_t_onto_frame_t_plus_40(renderer: Embree) -> None:
-    error, share = flow_error(busy(renderer, shape=(100, 160)), 10.5)
-    still = busy(renderer, shape=(100, 160))
-    unmoved = rms(still.truth(50.5).radiance - still.truth(10.5).radiance)
-    print(f"{100 * error:.2f} % rms of {100 * share:.0f} % of the pixels; unwarped {100 * unmoved:.1f} %")
-    assert error < 0.02 < unmoved and share > 0.7
+    check = check_flow(busy(renderer, shape=(100, 160)), 10.5)
+    print(check)
+    assert check.error < 0.02 < check.unmoved and check.compared > 0.7
 
 
 def test_a_gaze_shifts_the_picture_the_other_way(renderer: Embree) -> None:
@@ -180,8 +180,64 @@ def test_light_is_scaled_to_the_wanted_mean_interval(renderer: Embree) -> None:
     scene = expose(busy(renderer), 12.5)
     mean = np.mean([scene.truth(frame).radiance.mean() for frame in METERED_FRAMES])
     assert 1 / mean == pytest.approx(12.5, rel=1e-4)
+    unlit = np.mean([busy(renderer).truth(frame).radiance.mean() for frame in METERED_FRAMES])
     ratio = scene.radiance(0, 2).radiance[0].mean() / busy(renderer).radiance(0, 2).radiance[0].mean()
-    assert ratio == pytest.approx(scene.gain, rel=1e-4)
+    assert ratio == pytest.approx(1 / (12.5 * unlit), rel=1e-4)
+
+
+def test_depth_carries_what_a_key_shows_to_its_place(renderer: Embree) -> None:
+    """In pixels and in depth, of points on the surface: to what 32-bit numbers hold."""
+    surface = assemble(*box((0.8, 0.8, 0.8), [0.5] * 6))
+    motion = Ballistic((0.1, 0.2, 0), (30, -20, 50)) @ Spinning((0.3, 1, 0.5), 1200)
+    camera = Camera((0, 0, 3))
+    focal, centre = camera.focal(SHAPE[0]), ((SHAPE[1] - 1) / 2, (SHAPE[0] - 1) / 2)
+    then, now = (np.linalg.inv(camera.pose(np.array(t))) @ motion.pose(np.array(t)) for t in (0.0, 32 / 40_000))
+    lens, window = Pinhole(focal, centre, camera.pose(np.array(0.0))), Window(0, 0, *SHAPE)
+    key = render_key(renderer, surface, motion.pose(np.array(0.0)), lens, Lighting(), window, 1.0)
+    rigid = carry(key, now[None], then, focal, np.array([centre])).rigid[0].astype(np.float64)
+    pixels, depth = project(now, key.points, focal, centre)
+    _, depth_then = project(then, key.points, focal, centre)
+    homogeneous = np.stack([depth * pixels[:, 0], depth * pixels[:, 1], depth, np.ones_like(depth)])
+    x, y, w = rigid[4:16].reshape(3, 4) @ homogeneous
+    carried = depth_then * (key.texels @ rigid[:2] + rigid[2]) + rigid[3]
+    moved = np.linalg.norm(pixels - project(then, key.points, focal, centre)[0], axis=-1).max()
+    off = np.abs(np.stack([x / w, y / w], -1) - key.texels).max()
+    print(f"moved up to {moved:.1f} pixels, {off:.1e} texels off; depth {np.abs(carried - depth).max():.1e} off")
+    assert moved > 1 and off < 1e-3 and np.abs(carried - depth).max() < 1e-5
+
+
+def test_depth_halves_what_a_polynomial_misplaces_on_a_box(renderer: Embree, monkeypatch) -> None:
+    """Half-way between two keys, where the box shows three sides."""
+    faces = [blobs(np.random.default_rng(n), 128) for n in range(6)]
+    turning = Spinning((0.3, 1, 0.5), 600, 30)
+
+    def off() -> float:
+        box_alone = Body("box", assemble(*box((1, 1, 1), faces)), turning)
+        world = World((100, 160), (box_alone,), Camera((0, 0, 3)), background=0.3, renderer=renderer)
+        step = world._plan(0).steps[0]
+        at, truth = step // 2, world.truth(step / 2)
+        return rms((world.radiance(at, at + 1).radiance[0] - truth.radiance)[truth.object_id > 0])
+
+    by_depth = off()
+    monkeypatch.setattr("scenes.world.FLAT", np.inf)
+    by_polynomial = off()
+    print(f"{100 * by_depth:.2f} % rms; by a polynomial alone {100 * by_polynomial:.2f} %")
+    assert by_depth < 0.5 * by_polynomial
+
+
+def test_what_comes_into_sight_between_two_keys_is_drawn(renderer: Embree) -> None:
+    ball = Body("ball", assemble(sphere(0.4, 0.9)), Ballistic((-5, 0, 0), (8000, 0, 0)))
+    world = World(SHAPE, (ball,), Camera((0, 0, 3)), background=0.0, renderer=renderer)
+    light = world.radiance(0, 48).radiance.max(axis=(1, 2))
+    assert light[0] == 0 and light.max() > 0.3
+
+
+def test_light_multiplies_all_that_shines(renderer: Embree) -> None:
+    glowing = dataclasses.replace(assemble(sphere(0.4, 0.5)), emission=0.3)
+    world = World(SHAPE, (Body("lamp", glowing, Spinning((0, 1, 0), 600)),), Camera((0, 0, 3)), renderer=renderer)
+    thrice = world.lit(3.0)
+    np.testing.assert_allclose(thrice.truth(5.5).radiance, 3 * world.truth(5.5).radiance, rtol=1e-5)
+    np.testing.assert_allclose(thrice.radiance(0, 8).radiance, 3 * world.radiance(0, 8).radiance, rtol=1e-5)
 
 
 def test_a_pickled_world_gives_the_same_light(renderer: Embree) -> None:
