@@ -19,6 +19,7 @@ class Candidate:
     family: effects of one family act on the same thing.  fitted: parameters, the strength first.
     shapes: values of other parameters to start from.  square: statistics go with the square of the strength.
     only_contrast: it changes nothing in light that is steady and uniform.
+    wanders: its course in time is drawn anew every time, so that statistics scatter, each way alike.
     needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
     """
 
@@ -28,6 +29,7 @@ class Candidate:
     square: bool = False
     needs: Needs = lambda shown: None
     only_contrast: bool = False
+    wanders: bool = False
     experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 
 
@@ -81,7 +83,7 @@ CANDIDATES: dict[str, Candidate] = {
     "light_flicker": Candidate(
         "light", ("modulation",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
     ),
-    "lamp_drift": Candidate("light", ("sigma_per_root_s",), square=True, needs=_steady),
+    "lamp_drift": Candidate("light", ("sigma_per_root_s",), square=True, needs=_steady, wanders=True),
     "supply_ripple": Candidate(
         "common", ("ripple",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
     ),
@@ -110,7 +112,7 @@ CANDIDATES: dict[str, Candidate] = {
     "vignetting": Candidate("optics", ("falloff",), needs=_even),
     "optical_blur": Candidate("optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
     "crosstalk": Candidate("coupling", ("kick",), needs=_steady),
-    "blooming": Candidate("coupling", ("share",), needs=_bright),
+    "blooming": Candidate("coupling", ("share", "full"), {"full": (0.75, 1.0)}, needs=_bright),
     "readout_skew": Candidate("readout", ("span",), needs=_moving, only_contrast=True),
     "missed_spikes": Candidate("readout", ("probability",), needs=_steady),
     "spurious_spikes": Candidate("readout", ("probability",), needs=_steady),

@@ -109,10 +109,20 @@ def paired(null: Null, made: Sequence[Draw]) -> Prediction:
 
 
 def scaled(null: Null, one: Prediction, factor: float) -> Prediction:
-    """A prediction whose change from the null is multiplied."""
+    """A prediction whose change from the null is multiplied, and with it what it scatters more."""
     learnt = null.sd**2 / null.twins
     error2 = np.maximum(one.error**2 - learnt, 0.0) * factor**2
-    return replace(one, mean=null.mean + factor * (one.mean - null.mean), error=np.sqrt(learnt + error2))
+    spread2 = null.sd**2 + np.maximum(one.spread**2 - null.sd**2, 0.0) * abs(factor)
+    mean = null.mean + factor * (one.mean - null.mean)
+    return replace(one, mean=mean, error=np.sqrt(learnt + error2), spread=np.sqrt(spread2))
+
+
+def likeliest(null: Null, measured: Array, one: Prediction) -> tuple[float, float]:
+    """(factor, sd of its logarithm) that suits a prediction best which mostly scatters: by the misfit and its price."""
+    factors = np.geomspace(0.01, 100.0, 200)
+    left = np.array([judged(null, measured, scaled(null, one, f))[1] for f in factors])
+    near = np.log(factors[left < left.min() + 1.0])
+    return float(factors[left.argmin()]), float(max(np.ptp(near), np.log(factors[1] / factors[0]))) / 2
 
 
 def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
@@ -164,6 +174,13 @@ def judged(null: Null, measured: Array, predicted: Prediction) -> tuple[Array, f
     return rho, misfit(rho, null.weight) + float(price.sum())
 
 
+def pooled(keys: Sequence[Key], values: Array) -> Array:
+    """(S,) each statistic's mean over all recordings."""
+    of = {kind: i for i, kind in enumerate(dict.fromkeys((k.group, k.name) for k in keys))}
+    kind = np.array([of[k.group, k.name] for k in keys])
+    return np.asarray((np.bincount(kind, values) / np.bincount(kind))[kind])
+
+
 def spread_of(null: Null, values: Array) -> Array:
     """(S,) standard deviation of statistics under a model with an effect, from its twins (n, S), at least the null's.
 
@@ -177,11 +194,8 @@ def spread_of(null: Null, values: Array) -> Array:
 def halved(null: Null, variances: Array) -> Array:
     """(S,) variances from few twins: what they say of one statistic counts half, the other half is what they say of the
     same one over all recordings."""
-    of = {kind: i for i, kind in enumerate(dict.fromkeys((k.group, k.name) for k in null.keys))}
-    kind = np.array([of[k.group, k.name] for k in null.keys])
     known = null.sd**2 + null.floor**2
-    pooled = known * (np.bincount(kind, variances) / np.bincount(kind, known))[kind]
-    return np.asarray(0.5 * variances + 0.5 * pooled)
+    return 0.5 * variances + 0.5 * known * pooled(null.keys, variances) / pooled(null.keys, known)
 
 
 def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array) -> tuple[Array, Array]:

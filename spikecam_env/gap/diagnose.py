@@ -68,8 +68,8 @@ SURE = 0.002
 LOUD = 6.0
 """Noises by which a statistic of the pattern has to stand out for its effects to be tried."""
 
-TRIED = 5
-"""Candidates fitted a round, the best by their templates."""
+FEWEST, TRIED = 3, 5
+"""Candidates fitted a round, the best by their templates: so many at least and at most."""
 
 MOST = 3
 """Effects that one diagnosis names together."""
@@ -331,7 +331,7 @@ def line_of(case: Case) -> float | None:
 
 
 def worth_fitting(screened: Sequence[Screened], before: float, pattern: bool = False) -> list[Screened]:
-    """The best by their templates, as long as they explain half of what the best explains.  before: misfit of none.
+    """The best by their templates, FEWEST and those that explain half of what the best does.  before: misfit of none.
 
     pattern: with the two best of those that only change the pattern; its statistics are not in proportion to their
     strength, so that templates say little of them.
@@ -339,7 +339,7 @@ def worth_fitting(screened: Sequence[Screened], before: float, pattern: bool = F
     if not screened:
         return []
     best = before - screened[0].misfit
-    tried = [s for s in screened if before - s.misfit > 0.5 * best][:TRIED]
+    tried = [s for i, s in enumerate(screened[:TRIED]) if i < FEWEST or before - s.misfit > 0.5 * best]
     also = [s for s in screened if is_pattern(s.name)][:2] if pattern else []
     return tried + [s for s in also if s not in tried]
 
@@ -384,7 +384,7 @@ def concluded(
     explained = not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet)
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     place, time_ = where(case), when(case)
-    share = lambda f: gap_of(case, null, values, given, f.prediction.mean).removed  # noqa: E731
+    share = lambda f: gap_of(case, null, values, given, f.prediction).removed  # noqa: E731
     others = lambda r: {o.name: share(o) for o in r.fits[1:] if len(o.prediction.draws) > 1}  # noqa: E731
     effects = tuple(
         replace(named(f, r, null, values), where=place, when=time_, instead=others(r))
@@ -415,7 +415,7 @@ def concluded(
         class_=class_,
         parameters=parameters,
         data=tuple(c.text for c in contradictions),
-        gap=gap_of(case, null, values, given, predicted),
+        gap=gap_of(case, null, values, given, last.prediction if last else null.prediction),
         statistics=table(case, null, values, given, z, p, predicted, rho),
         ranking=tuple(ranked(f, r, f in added) for r in rounds for f in r.fits),
         not_testable=tuple(untestable),
@@ -467,12 +467,12 @@ def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
     return Ranked(found.name, candidate(found.name).family, before, found.misfit, parameters, accepted, reason)
 
 
-def gap_of(case: Case, null: Null, values: Array, given: Array, after: Array) -> Gap:
-    """Mean square distance on held-out recordings, in noise."""
+def gap_of(case: Case, null: Null, values: Array, given: Array, after: Prediction) -> Gap:
+    """Mean square distance on held-out recordings, in the noise that each model predicts."""
     use = np.array([_use(case, k.recording) for k in null.keys])
     held = use == "holdout" if np.any(use == "holdout") else np.ones(len(use), bool)
-    square = lambda mean: np.nan_to_num((values - mean) / null.noise) ** 2  # noqa: E731
-    b, a = square(given), square(after)
+    wider = np.sqrt(np.maximum(after.spread**2 - null.sd**2, 0.0) + null.noise**2)
+    b, a = (np.nan_to_num((values - mean) / sd) ** 2 for mean, sd in ((given, null.noise), (after.mean, wider)))
     by = {}
     for c in case.conditions:
         of = np.array([k.recording == c.name for k in null.keys])

@@ -15,7 +15,18 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case, rests_on, settled, twins
-from spikecam_env.gap.compare import Draw, Null, Prediction, judged, paired, scale_of, scaled, step_of, values_of
+from spikecam_env.gap.compare import (
+    Draw,
+    Null,
+    Prediction,
+    judged,
+    likeliest,
+    paired,
+    scale_of,
+    scaled,
+    step_of,
+    values_of,
+)
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -34,6 +45,9 @@ VISIBLE = 4.0
 
 AGAIN, FINAL = 2, 4
 """Twins by which a candidate is confirmed, and what was chosen of them in the end."""
+
+WANDER = 6
+"""Twins of an effect that makes statistics scatter."""
 
 UNITS = 24
 """Units drawn for the pattern statistics of one model."""
@@ -99,6 +113,8 @@ def fit(
     """
     if is_pattern(name):
         return _fit_pattern(case, model, null, measured, name, start)
+    if candidate(name).wanders:
+        return _fit_wander(case, model, null, measured, name, dict(start))
     return _fit_twins(case, model, null, measured, name, dict(start), expected)
 
 
@@ -183,6 +199,27 @@ def _fit_twins(
     return Fit(name, final, sds, predicted, shifted(bare, base, moved), rho, left, there)
 
 
+def _fit_wander(
+    case: Case, model: SensorModel, null: Null, measured: Array, name: str, parameters: dict[str, float]
+) -> Fit:
+    """The strength under which what is seen is as likely as can be among twins that scatter."""
+    strength = candidate(name).fitted[0]
+    power = 2.0 if candidate(name).square else 1.0
+    only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
+    for _ in range(2):
+        there = with_effect(model, name, bounded(name, parameters))
+        base = within(there, case.base)
+        predicted = predict(case, there, base, null, WANDER, only)
+        factor, sd = likeliest(null, measured, predicted)
+        parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
+        if 0.5 < factor < 2.0:
+            break
+    predicted = scaled(null, predicted, factor)
+    rho, left = judged(null, measured, predicted)
+    sds = {strength: parameters[strength] * sd / power}
+    return Fit(name, parameters, sds, predicted, base, rho, left, with_effect(model, name, parameters))
+
+
 def shifted(bare: BaseFit, settled: BaseFit, factor: float) -> BaseFit:
     """The unit for an effect `factor` times as strong as the one under which `bare` became `settled`."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -250,6 +287,7 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
     predicted = null.prediction
     if not (added and all(is_pattern(name) for name in added)):
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
+        count = max(count, WANDER) if any(candidate(name).wanders for name in added) else count
         predicted = predict(case, found.model, within(found.model, found.base), null, count, with_held_out(case, only))
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)

@@ -43,12 +43,12 @@ def polished(
 ) -> tuple[Fit, Errors]:
     """`found.model` with the parameters of its effects `names` refined, simulated anew, and their errors.
 
-    model, null: as given, before any was added.
+    What wanders is left as it was fitted, since one twin has no direction of it.  model, null: before any was added.
     """
-    free = [(name, key) for name in names for key in candidate(name).fitted]
+    free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
     probe = _probe(case, null, measured, found, names)
     now, base, error = found.model, found.base, np.full(len(free), np.nan)
-    for _ in range(TURNS):
+    for _ in range(TURNS if free else 0):
         at = probe(now)
         columns = np.stack([_column(probe, now, at, null, name, key) for name, key in free], axis=1)
         step, error = step_of(null, measured, at, columns)
@@ -61,7 +61,7 @@ def polished(
     if best.misfit > found.misfit + WORSE:
         best = found
     values = {e.name: e.parameters() for e in best.model.effects}
-    errors: Errors = {name: {} for name in names}
+    errors: Errors = {name: dict(found.sd) if name == found.name else {} for name in names}
     for (name, key), e in zip(free, error, strict=True):
         errors[name][key] = float(abs(values[name][key]) * e)
     own: Mapping[str, float] = values[found.name]

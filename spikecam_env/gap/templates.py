@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.case import Case, case_of, settled, twins
-from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, scale_of
+from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, pooled, scale_of
 from spikecam_env.gap.fit import UNITS, bounded, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.result import Bound
@@ -107,22 +107,44 @@ def screen(
         if entry.name not in names:
             continue
         shift = np.where((at >= 0) & np.isfinite(measured), entry.shift[at], 0.0)
-        scale, _ = scale_of(d, shift, np.ones_like(d), np.ones_like(d), 2 * TOLERANCE)
-        strength = CATALOGUE[entry.name].strength
-        power = 2.0 if candidate(entry.name).square else 1.0
-        if scale <= 0 and not _signed(entry.name):
+        now = (
+            _scattered(entry, null, d, shift)
+            if candidate(entry.name).wanders
+            else _in_proportion(entry, null, d, shift)
+        )
+        if now is None:
             continue
-        rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 + (2 * TOLERANCE * scale * shift) ** 2)
-        measured_line = {"frequency_hz": line_hz} if line_hz and "frequency_hz" in entry.parameters else {}
-        start = {
-            **entry.parameters,
-            **measured_line,
-            strength: entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power),
-        }
-        now = Screened(entry.name, bounded(entry.name, start), misfit(rho, null.weight), scale * shift * null.noise)
+        if line_hz and "frequency_hz" in entry.parameters:
+            now = replace(now, start=bounded(entry.name, {**now.start, "frequency_hz": line_hz}))
         if entry.name not in best or now.misfit < best[entry.name].misfit:
             best[entry.name] = now
     return sorted(best.values(), key=lambda s: s.misfit)
+
+
+def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Screened | None:
+    """A template scaled to the measured distances `d`, in noise; None where only a wrong sign would do."""
+    scale, _ = scale_of(d, shift, np.ones_like(d), np.ones_like(d), 2 * TOLERANCE)
+    if scale <= 0 and not _signed(entry.name):
+        return None
+    strength, power = CATALOGUE[entry.name].strength, 2.0 if candidate(entry.name).square else 1.0
+    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 + (2 * TOLERANCE * scale * shift) ** 2)
+    there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
+    start = bounded(entry.name, {**entry.parameters, strength: there})
+    return Screened(entry.name, start, misfit(rho, null.weight), scale * shift * null.noise)
+
+
+def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
+    """A template of what wanders: its size alone, over all recordings, is by how much statistics scatter."""
+    strength, power = CATALOGUE[entry.name].strength, 2.0 if candidate(entry.name).square else 1.0
+    size2 = pooled(null.keys, shift**2)
+    tried = []
+    for factor in np.geomspace(1e-3, 1e3, 100):
+        wider = 1.0 + factor * size2
+        price = float(np.sum(null.weight * np.log(wider) * (d != 0)))
+        tried.append((misfit(d / np.sqrt(wider), null.weight) + price, factor))
+    left, factor = min(tried)
+    start = bounded(entry.name, {**entry.parameters, strength: entry.parameters[strength] * factor ** (1 / power)})
+    return Screened(entry.name, start, left, np.sqrt(factor * size2) * null.noise)
 
 
 def bounds(
