@@ -103,9 +103,13 @@ def paired(null: Null, made: Sequence[Draw]) -> Prediction:
     if len(made) > 1:
         error2, spread = halved(null, change.var(axis=0, ddof=1)) / len(made), spread_of(null, null.mean + change)
     else:
-        share = np.array([PAIRED.get(k.group, 1.0) for k in null.keys])
-        error2, spread = (share * null.sd) ** 2 * (change[0] != 0), null.sd
+        error2, spread = (of_a_pair(null.keys) * null.sd) ** 2 * (change[0] != 0), null.sd
     return Prediction(null.mean + change.mean(axis=0), np.sqrt(null.sd**2 / null.twins + error2), spread, tuple(made))
+
+
+def of_a_pair(keys: Sequence[Key]) -> Array:
+    """(S,) PAIRED of each statistic."""
+    return np.array([PAIRED.get(k.group, 1.0) for k in keys])
 
 
 def scaled(null: Null, one: Prediction, factor: float) -> Prediction:

@@ -372,10 +372,9 @@ def concluded(
     before = residual(null, values, null.prediction)
     last = rounds[-1] if rounds else None
     kept = {e.name: e for e in last.model.effects} if last else {}
-    added = [r.fits[0] for r, after in itertools.pairwise(rounds) if after.model is not r.model]
-    found = [
-        replace(f, parameters={k: kept[f.name].parameters()[k] for k in f.parameters}) for f in added if f.name in kept
-    ]
+    turns = [r for r, after in itertools.pairwise(rounds) if after.model is not r.model and r.fits[0].name in kept]
+    found = [replace(r.fits[0], parameters={k: kept[r.fits[0].name].parameters()[k] for k in r.fits[0].parameters})
+             for r in turns]  # fmt: skip
     rho = residual(null, values, last.prediction) if last else before
     predicted = last.prediction.mean if last else null.mean
     by_chance = float(np.sum(null.weight * np.ones(len(values))))
@@ -388,9 +387,9 @@ def concluded(
     others = lambda r: {o.name: share(o) for o in r.fits[1:] if len(o.prediction.draws) > 1}  # noqa: E731
     effects = tuple(
         replace(named(f, r, null, values), where=place, when=time_, instead=others(r))
-        for f, r in zip(found, rounds, strict=False)
+        for f, r in zip(found, turns, strict=True)
     )
-    rivals = rounds[0].rivals if rounds else ()
+    rivals = turns[0].rivals if turns else ()
     if explained or chance:
         effects = (*(named_missing(m) for m in lacking), *effects)
     parameters = {} if lacking else off_nominal(case, model)
@@ -417,7 +416,7 @@ def concluded(
         data=tuple(c.text for c in contradictions),
         gap=gap_of(case, null, values, given, last.prediction if last else null.prediction),
         statistics=table(case, null, values, given, z, p, predicted, rho),
-        ranking=tuple(ranked(f, r, f in added) for r in rounds for f in r.fits),
+        ranking=tuple(ranked(f, r, f is r.fits[0] and any(r is t for t in turns)) for r in rounds for f in r.fits),
         not_testable=tuple(untestable),
         bounds=(),
         patched=last.model if last else model,

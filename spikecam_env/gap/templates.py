@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.case import Case, case_of, settled, twins
-from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, pooled, scale_of
+from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, of_a_pair, pooled, scale_of
 from spikecam_env.gap.fit import UNITS, bounded, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.result import Bound
@@ -123,11 +123,12 @@ def screen(
 
 def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Screened | None:
     """A template scaled to the measured distances `d`, in noise; None where only a wrong sign would do."""
-    scale, _ = scale_of(d, shift, np.ones_like(d), np.ones_like(d), 2 * TOLERANCE)
+    own2 = of_a_pair(null.keys) ** 2 * (shift != 0)
+    scale, _ = scale_of(d, shift, np.ones_like(d), own2, 2 * TOLERANCE)
     if scale <= 0 and not _signed(entry.name):
         return None
     strength, power = CATALOGUE[entry.name].strength, 2.0 if candidate(entry.name).square else 1.0
-    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 + (2 * TOLERANCE * scale * shift) ** 2)
+    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
     there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
     start = bounded(entry.name, {**entry.parameters, strength: there})
     return Screened(entry.name, start, misfit(rho, null.weight), scale * shift * null.noise)
