@@ -20,6 +20,7 @@ class Candidate:
     shapes: values of other parameters to start from.  square: statistics go with the square of the strength.
     only_contrast: it changes nothing in light that is steady and uniform.
     wanders: its course in time is drawn anew every time, so that statistics scatter, each way alike.
+    events: it is single events, few enough for one twin to have many more or less of them than another.
     needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
     """
 
@@ -30,6 +31,7 @@ class Candidate:
     needs: Needs = lambda shown: None
     only_contrast: bool = False
     wanders: bool = False
+    events: bool = False
     experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 
 
@@ -114,9 +116,11 @@ CANDIDATES: dict[str, Candidate] = {
     "crosstalk": Candidate("coupling", ("kick",), needs=_steady),
     "blooming": Candidate("coupling", ("share", "full"), {"full": (0.75, 1.0)}, needs=_bright),
     "readout_skew": Candidate("readout", ("span",), needs=_moving, only_contrast=True),
-    "missed_spikes": Candidate("readout", ("probability",), needs=_steady),
-    "spurious_spikes": Candidate("readout", ("probability",), needs=_steady),
-    "afterpulsing": Candidate("readout", ("probability",), {"delay_frames": (1, 2, 3, 4, 6)}, needs=_steady),
+    "missed_spikes": Candidate("readout", ("probability",), needs=_steady, events=True),
+    "spurious_spikes": Candidate("readout", ("probability",), needs=_steady, events=True),
+    "afterpulsing": Candidate(
+        "readout", ("probability",), {"delay_frames": (1, 2, 3, 4, 6)}, needs=_steady, events=True
+    ),
 }
 
 NOISE_OF_A_RESET = ("reset_noise", "excess_threshold_noise", "shot_noise")

@@ -103,7 +103,9 @@ def paired(null: Null, made: Sequence[Draw]) -> Prediction:
     if len(made) > 1:
         error2, spread = halved(null, change.var(axis=0, ddof=1)) / len(made), spread_of(null, null.mean + change)
     else:
-        error2, spread = (of_a_pair(null.keys) * null.sd) ** 2 * (change[0] != 0), null.sd
+        counted = np.array([k.group == "intervals" for k in null.keys])  # roots of counts scatter by 1 of themselves
+        own = np.where(counted, 1.0, of_a_pair(null.keys) * null.sd)
+        error2, spread = own**2 * (change[0] != 0), null.sd
     return Prediction(null.mean + change.mean(axis=0), np.sqrt(null.sd**2 / null.twins + error2), spread, tuple(made))
 
 

@@ -46,8 +46,8 @@ VISIBLE = 4.0
 AGAIN, FINAL = 2, 4
 """Twins by which a candidate is confirmed, and what was chosen of them in the end."""
 
-WANDER = 6
-"""Twins of an effect that makes statistics scatter."""
+WANDER, EVENTS = 6, 3
+"""Twins of an effect that makes statistics scatter, and of one that is few events."""
 
 UNITS = 24
 """Units drawn for the pattern statistics of one model."""
@@ -79,6 +79,11 @@ def predict(
     made = twins(case, model, base, numbers, only)
     draws = [Draw(n, values_of(t.bank, null.keys), t.base) for n, t in zip(numbers, made, strict=True)]
     return paired(null, draws)
+
+
+def twins_of(name: str) -> int:
+    """How many twins say what an effect does."""
+    return EVENTS if candidate(name).events else 1
 
 
 def as_seen(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> BaseFit:
@@ -162,7 +167,7 @@ def _fit_twins(
     only = concerned(case, [name], null, measured, everywhere if expected is None else expected)
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
-        predicted = predict(case, tried, base, null, 1, only)
+        predicted = predict(case, tried, base, null, twins_of(name), only)
         seen = float(np.max(np.isfinite(measured) * np.abs(predicted.mean - null.mean) / null.noise))
         if seen < VISIBLE and turn < TURNS - 1:
             louder = (2 * VISIBLE / max(seen, 0.2)) ** (1 / power)
@@ -181,7 +186,7 @@ def _fit_twins(
             parameters = bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
             if max(abs(np.log(f)) for f in step.values()) > 0.1:
                 continue
-            predicted = predict(case, with_effect(model, name, parameters), base, null, 1, only)
+            predicted = predict(case, with_effect(model, name, parameters), base, null, twins_of(name), only)
             scale, sd = _scale(null, measured, predicted)
             factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
         near |= abs(scale) * seen < VISIBLE
@@ -275,7 +280,7 @@ def _gauss_newton(
     columns, fitted = [], candidate(name).fitted
     for key in fitted:
         nudged = with_effect(model, name, bounded(name, {**parameters, key: parameters[key] * 1.3}))
-        there = predict(case, nudged, within(nudged, base), null, 1, only)
+        there = predict(case, nudged, within(nudged, base), null, twins_of(name), only)
         columns.append((there.mean - predicted.mean) / np.log(1.3))
     step, _ = step_of(null, measured, predicted, np.stack(columns, axis=1))
     return {key: float(np.exp(s)) for key, s in zip(fitted, np.clip(step, -1.0, 1.0), strict=True)}
@@ -287,7 +292,7 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
     predicted = null.prediction
     if not (added and all(is_pattern(name) for name in added)):
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
-        count = max(count, WANDER) if any(candidate(name).wanders for name in added) else count
+        count = max(count, *(WANDER if candidate(name).wanders else twins_of(name) for name in added), 1)
         predicted = predict(case, found.model, within(found.model, found.base), null, count, with_held_out(case, only))
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)

@@ -14,7 +14,18 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, step_of
-from spikecam_env.gap.fit import FINAL, Fit, as_seen, bounded, concerned, confirmed, predict, with_effect, with_pattern
+from spikecam_env.gap.fit import (
+    FINAL,
+    Fit,
+    as_seen,
+    bounded,
+    concerned,
+    confirmed,
+    predict,
+    twins_of,
+    with_effect,
+    with_pattern,
+)
 from spikecam_env.gap.refit import within
 from spikecam_env.sensor import SensorModel
 
@@ -84,13 +95,14 @@ def _column(probe: Probe, model: SensorModel, at: Prediction, null: Null, name: 
 
 
 def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:
-    """One twin, and drawn units where an effect changes the pattern."""
+    """Twins, and drawn units where an effect changes the pattern."""
     only = concerned(case, names, null, measured, found.prediction.mean - null.mean)
+    count = max(twins_of(name) for name in names)
 
     def statistics(model: SensorModel) -> Prediction:
         made = null.prediction
         if not all(is_pattern(name) for name in names):
-            made = predict(case, model, within(model, found.base), null, 1, only)
+            made = predict(case, model, within(model, found.base), null, count, only)
         return with_pattern(case, model, null, made) if any(is_pattern(name) for name in names) else made
 
     return statistics
