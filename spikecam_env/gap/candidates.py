@@ -138,6 +138,11 @@ def is_pattern(name: str) -> bool:
     return effect.is_fixed() and not effect.overrides("image") and name not in NOISE_OF_A_RESET
 
 
+def of_motion(name: str) -> bool:
+    """Whether an effect shows by contrast or change alone, so that how depends on the very picture."""
+    return candidate(name).needs in (_moving, _edges, _bright)
+
+
 def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str]) -> list[str]:
     """Names to try: the catalogue less what the model has, less `exclude`; raises InputError for unknown names."""
     for name in (*(only or ()), *exclude):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ from tqdm import tqdm
 from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.audit import Contradiction, audit
-from spikecam_env.gap.candidates import candidate, chosen, is_pattern, testable
+from spikecam_env.gap.candidates import candidate, chosen, is_pattern, of_motion, testable
 from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import (
     TOLERANCE,
@@ -66,7 +66,7 @@ SURE = 0.002
 """Adjusted p-value below which a discrepancy is unknown where no candidate takes it up; above, it may be chance."""
 
 LOUD = 6.0
-"""Noises by which a statistic of the pattern has to stand out for its effects to be tried."""
+"""Noises by which a statistic of the pattern, or of motion, has to stand out for its effects to be tried."""
 
 FEWEST, TRIED = 3, 5
 """Candidates fitted a round, the best by their templates: so many at least and at most."""
@@ -252,7 +252,7 @@ def search(
         left = [n for n in names if n not in {e.name for e in now.effects}]
         screened = screen(templates, case.conditions, here, seen, left, line_of(case))
         distance = np.nan_to_num((seen - here.mean) / here.noise)
-        tried = worth_fitting(screened, misfit(distance, here.weight), loud_pattern(here, distance))
+        tried = worth_fitting(screened, misfit(distance, here.weight), loud(here, distance))
         with ThreadPoolExecutor(case.jobs) as pool:
             fits = list(pool.map(partial(_fitted, case, now, here, seen), tried))
         sure, rest = settle(fits, partial(confirmed, case, now, here, seen))
@@ -330,24 +330,25 @@ def line_of(case: Case) -> float | None:
     return frequency(frame, at) * case.frame_rate_hz if ratio > 30 else None
 
 
-def worth_fitting(screened: Sequence[Screened], before: float, pattern: bool = False) -> list[Screened]:
+def worth_fitting(screened: Sequence[Screened], before: float, loud: Collection[str] = ()) -> list[Screened]:
     """The best by their templates, FEWEST and those that explain half of what the best does.  before: misfit of none.
 
-    pattern: with the two best of those that only change the pattern; its statistics are not in proportion to their
-    strength, so that templates say little of them.
+    loud: groups of statistics that stand out.  Where the pattern does, with the two best of those that only change it,
+    whose statistics are not in proportion to their strength; where motion does, with all that show by it alone, whose
+    templates are of other pictures.
     """
     if not screened:
         return []
     best = before - screened[0].misfit
     tried = [s for i, s in enumerate(screened[:TRIED]) if i < FEWEST or before - s.misfit > 0.5 * best]
-    also = [s for s in screened if is_pattern(s.name)][:2] if pattern else []
+    also = [s for s in screened if is_pattern(s.name)][:2] if "pattern" in loud else []
+    also += [s for s in screened if of_motion(s.name)] if {"moving", "step"} & set(loud) else []
     return tried + [s for s in also if s not in tried]
 
 
-def loud_pattern(null: Null, distance: Array) -> bool:
-    """Whether a statistic of the pattern stands out by itself."""
-    of_pattern = np.array([k.group == "pattern" for k in null.keys])
-    return bool(np.any(np.abs(distance[of_pattern]) > LOUD))
+def loud(null: Null, distance: Array) -> set[str]:
+    """Groups of which a statistic stands out by itself."""
+    return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) > LOUD}
 
 
 def alarmed(null: Null, rho: Array) -> bool:

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
+from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern, of_motion
 from spikecam_env.gap.case import Case, case_of, settled, twins
 from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, of_a_pair, pooled, scale_of
 from spikecam_env.gap.fit import UNITS, bounded, predict, with_effect, with_pattern
@@ -112,6 +112,8 @@ def screen(
             if candidate(entry.name).wanders
             else _in_proportion(entry, null, d, shift)
         )
+        if now is None and of_motion(entry.name):
+            now = Screened(entry.name, dict(entry.parameters), misfit(d, null.weight), shift * null.noise)
         if now is None:
             continue
         if line_hz and "frequency_hz" in entry.parameters:
