@@ -43,6 +43,10 @@ Rows = list[dict[str, Any]]
 Array = NDArray[np.floating]
 
 
+WARM = 4
+"""Blocks that are not timed: kernels are compiled in them."""
+
+
 def bench_scenes(names: Iterable[str] = (), seconds: float = 2.0) -> dict[str, Rows]:
     """Tables by title, at 250 x 400, on NUMBA_NUM_THREADS threads.
 
@@ -177,7 +181,9 @@ def _speed(name: str, scene: Scene, pixels_a_frame: float | None, seconds: float
     """Blocks of light one after the other, each of frames that were never asked for before."""
     times: list[float] = []
     keys = start = 0
-    scene.radiance(start, start + BLOCK)
+    for _ in range(WARM):
+        scene.radiance(start, start + BLOCK)
+        start += BLOCK
     processor = time.process_time()
     until = time.perf_counter() + seconds
     while time.perf_counter() < until or len(times) < 4:
