@@ -75,9 +75,11 @@ COUNTS = {"full": Counts(60, 3, 2, 2, 3, 1, 30, 2), "quick": Counts(6, 1, 1, 1, 
 QUICK_SHARE = 4
 """Of the groups that go through mechanisms, `quick` takes every fourth."""
 
+BENDS = ("dead_time", "photo_response_nonlinearity", "synchronous_reset", "ir_drop")
+"""At the strengths drawn all take x^2 off the rate, see `score.INSEPARABLE`."""
+
 WITHHELD_TOO = {
-    "photo_response_nonlinearity": ("ir_drop",),
-    "ir_drop": ("photo_response_nonlinearity",),
+    **{name: tuple(other for other in BENDS if other != name) for name in BENDS},
     "hot_pixels": ("dark_current_tail",),
 }
 """Names that describe the same data as well, within what these recordings show; withheld with their twin."""
