@@ -80,6 +80,9 @@ GATE = 0.005
 GAIN = 20.0
 """Misfit that an effect has to remove to be added."""
 
+LITTLE = 0.2
+"""Share of what is beyond chance that an effect has to remove for another to be looked for beside it."""
+
 UNEXPLAINED = 0.02
 """Share of the evidence that may stay unexplained when something is named."""
 
@@ -242,6 +245,7 @@ def search(
     """
     rounds: list[Round] = []
     seen = of_fit(case, null, values)
+    chance = float(np.sum(null.weight * np.isfinite(seen)))
     now, base, prediction = model, within(model, case.base), null.prediction
     while len(rounds) < MOST:
         rho = residual(null, seen, prediction)
@@ -269,6 +273,8 @@ def search(
         rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
         rounds = [with_errors(r, errors) for r in rounds]
         now, base, prediction = best.model, best.base, best.prediction
+        if left_over - sure[0].misfit < LITTLE * (left_over - chance):
+            break
     rho, left_over = judged(null, seen, prediction)
     rounds.append(Round(now, base, prediction, rho, left_over, ()))
     return rounds
