@@ -205,10 +205,10 @@ def halved(null: Null, variances: Array) -> Array:
 
 
 def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array) -> tuple[Array, Array]:
-    """(step, error), (n,) each: robust, slightly damped least squares for a jacobian (S, n), and standard deviations.
+    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n).
 
-    Statistics are not independent: the errors are how far the null's own draws would have led the step astray, with
-    the floors and TOLERANCE of the effect, all of one sign, on top.
+    Statistics are not independent: the covariance is of how far the null's own draws would have led the step astray,
+    with the floors and TOLERANCE of the effect, all of one sign, on top.
     """
     noise2 = variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
@@ -217,11 +217,12 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
     damped = normal + np.diag(0.02 * np.diag(normal) + 1e-12)
     solve = np.linalg.solve(damped, jacobian.T * w)
     own = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
-    alone = solve**2 @ (null.floor**2 + own)
+    alone = (solve * (null.floor**2 + own)) @ solve.T
     astray = np.array([solve @ np.nan_to_num(d.values - null.mean) for d in null.draws])
-    drawn = astray.var(axis=0, ddof=1) * (1 + 1 / null.twins) if len(astray) > 1 else solve**2 @ null.sd**2
+    known = len(astray) > 1
+    drawn = np.cov(astray.T) * (1 + 1 / null.twins) if known else (solve * null.sd**2) @ solve.T
     law = solve @ (TOLERANCE * (predicted.mean - null.mean))
-    return solve @ gap, np.sqrt(drawn + alone + law**2)
+    return solve @ gap, np.atleast_2d(drawn) + alone + np.outer(law, law)
 
 
 def scale_of(

@@ -24,6 +24,7 @@ from spikecam_env.gap.fit import (
     predict,
     twins_of,
     with_effect,
+    with_held_out,
     with_pattern,
 )
 from spikecam_env.gap.refit import within
@@ -58,11 +59,12 @@ def polished(
     """
     free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
     probe = _probe(case, null, measured, found, names)
-    now, base, error = found.model, found.base, np.full(len(free), np.nan)
+    now, base = found.model, found.base
+    columns, covariance = np.zeros((len(measured), len(free))), np.zeros((len(free), len(free)))
     for _ in range(TURNS if free else 0):
         at = probe(now)
         columns = np.stack([_column(probe, now, at, null, name, key) for name, key in free], axis=1)
-        step, error = step_of(null, measured, at, columns)
+        step, covariance = step_of(null, measured, at, columns)
         step = np.clip(step, -FURTHEST, FURTHEST)
         base = as_seen(now, within(now, found.base), null, at)
         now = moved(now, free, step)
@@ -71,12 +73,19 @@ def polished(
     best = confirmed(case, model, null, measured, replace(found, model=now, base=base), FINAL)
     if best.misfit > found.misfit + WORSE:
         best = found
+    best = replace(best, prediction=as_sure_as(best.prediction, measured, columns, covariance))
     values = {e.name: e.parameters() for e in best.model.effects}
     errors: Errors = {name: dict(found.sd) if name == found.name else {} for name in names}
-    for (name, key), e in zip(free, error, strict=True):
+    for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
         errors[name][key] = float(abs(values[name][key]) * e)
     own: Mapping[str, float] = values[found.name]
     return replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name]), errors
+
+
+def as_sure_as(predicted: Prediction, measured: Array, columns: Array, covariance: Array) -> Prediction:
+    """A prediction, of recordings held out (NaN in `measured`), no surer than the parameters it rests on."""
+    own2 = np.einsum("sn,nm,sm->s", columns, covariance, columns) * np.isnan(measured)
+    return replace(predicted, error=np.sqrt(predicted.error**2 + own2))
 
 
 def moved(model: SensorModel, free: Sequence[tuple[str, str]], step: Array) -> SensorModel:
@@ -96,7 +105,7 @@ def _column(probe: Probe, model: SensorModel, at: Prediction, null: Null, name: 
 
 def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:
     """Twins, and drawn units where an effect changes the pattern."""
-    only = concerned(case, names, null, measured, found.prediction.mean - null.mean)
+    only = with_held_out(case, concerned(case, names, null, measured, found.prediction.mean - null.mean))
     count = max(twins_of(name) for name in names)
 
     def statistics(model: SensorModel) -> Prediction:

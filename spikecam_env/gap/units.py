@@ -89,7 +89,7 @@ def _bank(
             continue
         rate = gain * c.picture + dark
         spikes = np.maximum(rate * c.frames, 1.0)
-        noise = np.sqrt(base.white / spikes + 1.0 / (3.0 * spikes**2) * np.minimum(rate * 2, 1.0))
+        noise = np.sqrt(base.white / spikes + 1.0 / (6.0 * c.frames**2))  # first and last spike, each read to a frame
         rate = np.clip(rate * (1.0 + noise * rng.standard_normal(rate.size)), 0.0, 1.0)
         for name, value in pattern.statistics(rate.reshape(shape)).items():
             found[Key("pattern", c.name, name)] = value

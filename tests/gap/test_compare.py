@@ -201,7 +201,7 @@ def test_step_finds_a_parameter_within_its_error_though_statistics_go_together()
         made = np.repeat(rng.standard_normal((25, 20)), 2, axis=1)
         null = replace(drawn(seed=seed, twins=24), mean=made[:24].mean(axis=0), sd=made[:24].std(axis=0, ddof=1))
         null = replace(null, draws=tuple(Draw(n, v, None) for n, v in enumerate(made[:24])))
-        step, error = step_of(null, made[24] + 0.4 * jacobian[:, 0], null.prediction, jacobian)
-        inside += abs(step[0] - 0.4) < 1.645 * error[0]
+        step, covariance = step_of(null, made[24] + 0.4 * jacobian[:, 0], null.prediction, jacobian)
+        inside += abs(step[0] - 0.4) < 1.645 * np.sqrt(covariance[0, 0])
     print(f"{inside} of 200")
     assert 0.8 < inside / 200 < 0.97
