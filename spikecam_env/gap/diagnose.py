@@ -397,7 +397,7 @@ def concluded(
         for f, r in zip(found, turns, strict=True)
     )
     rivals = turns[0].rivals if turns else ()
-    if explained or chance:
+    if explained or chance or not rounds:
         effects = (*(named_missing(m) for m in lacking), *effects)
     parameters = {} if lacking else off_nominal(case, model)
     unknown, class_ = None, None

@@ -68,3 +68,10 @@ def test_a_gaussian_map_has_gaussian_tails():
 
 def test_a_dark_map_without_spikes_has_no_pattern():
     assert pattern.statistics(np.zeros(SHAPE)) == {}
+
+
+def test_a_map_without_a_pattern_has_a_width_and_no_shape():
+    """Rates of an ideal pixel, read between two whole frames: spread by 1e-5, in a few steps."""
+    steps = np.random.default_rng(0).integers(0, 3, (32, 32))
+    found = pattern.statistics(0.2 + 2e-6 * steps)
+    assert set(found) == {"width", "silent"} and found == pattern.statistics(np.full((32, 32), 0.2))

@@ -13,6 +13,9 @@ from spikecam_env.gap.statistics.reading import log, root, slope
 
 Array = NDArray[np.float64]
 
+NARROW = 5e-4
+"""Relative spread below which there is no pattern, but the noise of rates read between whole frames."""
+
 
 def statistics(rate: Array) -> dict[str, float]:
     """Of a rate map (H, W).
@@ -20,7 +23,7 @@ def statistics(rate: Array) -> dict[str, float]:
     width: log of the robust relative spread.  low / high tail: how much further the 0.5 % and 99.5 % quantiles lie
     than those of a Gaussian, in spreads; top: the largest.  silent: pixels below a tenth of the median, counted.
     rows, columns: log variance of their means over a pixel's.  bowl, across, down: radial slope and gradients.
-    near: correlation of neighbours.
+    near: correlation of neighbours.  Of a map that is NARROW: its width, as if it were that, and silent.
     """
     flat = rate.reshape(-1)
     middle = float(np.median(flat))
@@ -29,6 +32,9 @@ def statistics(rate: Array) -> dict[str, float]:
     relative = rate / middle - 1.0
     low, lower, upper, high = np.quantile(relative, [0.005, 0.1587, 0.8413, 0.995])
     width = max((upper - lower) / 2, 1e-9)
+    silent = root(float((flat < 0.1 * middle).sum()))
+    if width < NARROW:
+        return {"width": log(NARROW), "silent": silent}
     inside = np.clip(relative, -4 * width, 4 * width)
     rows, columns = rate.shape
     y, x = np.mgrid[:rows, :columns] - np.array([(rows - 1) / 2, (columns - 1) / 2])[:, None, None]
@@ -43,7 +49,7 @@ def statistics(rate: Array) -> dict[str, float]:
         "low tail": float(-low / width),
         "high tail": log(max(high / width, 0.1)),
         "top": log(max(float(relative.max()) / width, 0.1)),
-        "silent": root(float((flat < 0.1 * middle).sum())),
+        "silent": silent,
         "rows": log(float(inside.mean(axis=1).var()) / variance * columns),
         "columns": log(float(inside.mean(axis=0).var()) / variance * rows),
         "bowl": slope(inside.reshape(-1), radius.reshape(-1)) / width,
