@@ -30,6 +30,10 @@ UNEVEN = 0.5
 """Spread over pixels of what a recording is off by, as a share of it, from which no label is to blame: a label is one
 number, and an effect that sets in there depends on the pixel."""
 
+ODD = 0.1
+"""Share of a recording's intervals that are much too short or too long, over what its rate is off by, from which spikes
+are missing or too many: light of another level makes none."""
+
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
 
@@ -172,7 +176,7 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
     off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0) if light[i] > 0 else np.inf
     if left > MENDED * before or abs(off) < max(LEAST_LABEL, 4 * left):
         return []
-    if light[i] > 0 and uneven(case, names[i], names) > UNEVEN * abs(off):
+    if light[i] > 0 and (uneven(case, names[i], names) > UNEVEN * abs(off) or odd(case, names[i]) > ODD * abs(off)):
         return []
     if light[i] == 0:
         off = float(rate[i] / max(dark, 1e-9) - 1)
@@ -185,6 +189,12 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
         )
         text += f"{100 * left:.1g} %"
     return [Contradiction("label", (names[i],), text)]
+
+
+def odd(case: Case, name: str) -> float:
+    """Share of short and long intervals in recording `name`."""
+    [o] = [o for c, o in zip(case.conditions, case.observations, strict=True) if c.name == name]
+    return float((o.short + o.long).sum()) / max(float(o.times.count.sum()), 1.0)
 
 
 def uneven(case: Case, name: str, names: Sequence[str]) -> float:

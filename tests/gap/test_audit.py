@@ -63,6 +63,14 @@ def test_a_label_2_percent_wrong_is_named_with_its_error(name, factor):
     assert said == pytest.approx(100 * (1 / factor - 1), abs=0.1)
 
 
+@pytest.mark.parametrize("name", ["flat-0.2", "flat-0.65"])
+def test_spikes_that_are_missing_at_one_level_are_not_called_a_wrong_label(name):
+    """3 % of them: the rate is that of 3 % less light, but intervals are doubled."""
+    spikes = spikes_of()
+    spikes[name] = spikes[name] * (np.random.default_rng(0).random(spikes[name].shape) > 0.03)
+    assert found(case_from(spikes)) == []
+
+
 def test_a_wrong_label_is_named_beside_an_effect_that_bends_less():
     case = case_from(spikes_of(effect("dead_time", tau_us=0.05)), shown=relabelled("flat-0.2", 1.02))
     assert found(case) == [("label", ("flat-0.2",))]
