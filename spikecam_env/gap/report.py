@@ -172,7 +172,7 @@ def _effect_card(effect: NamedEffect) -> Iterator[str]:
     rows = [_parameter_row(effect.name, name, e) for name, e in effect.parameters.items()]
     if rows:
         yield table(("parameter", "value ± sd", "90 % interval", "meaning"), rows, numbers=(1, 2), stack=True)
-    others = "; ".join(f"{human(n)} {_percent(c)}" for n, c in effect.alternatives)
+    others = "; ".join(f"{human(n)} {_percent(c) if c > 1e-3 else 'below 0.1 %'}" for n, c in effect.alternatives)
     told = f"Family: {human(effect.family)}. Confidence in the name: {_percent(effect.confidence)}."
     yield element("p", told + (f" Instead of it: {others}." if others else ""))
     yield "</div>"
