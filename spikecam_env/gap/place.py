@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 SIGMAS = 8.0
 """Noises by which a field or a half has to stand out."""
 
+TOGETHER = 5.0
+"""Noises by which the halves of all recordings together have to differ: one comparison, not one for each."""
+
 LEAST_FRAMES = 1000
 """Shortest recording whose halves are compared by their lines: pixels of one rate make a line of their own at first."""
 
@@ -82,13 +85,14 @@ def _name(field: int, shape: tuple[int, int]) -> str:
 def when(case: Case) -> str:
     """From (or until) which part of steady recordings it acts; empty where always."""
     votes = []
+    odd = np.zeros(2)
     for c, o in zip(case.conditions, case.observations, strict=True):
         if c.moves or o.frame.sum() < 1000:
             continue
         half = o.frames // 2
-        first, second = int(o.odd[:half].sum()), int(o.odd[half:].sum())
-        if abs(first - second) > max(SIGMAS * np.sqrt(first + second), 0.3 * (first + second)):
-            votes.append(second > first)
+        own = np.array([o.odd[:half].sum(), o.odd[half:].sum()], np.float64)
+        odd += own
+        votes += _more(own)
         halves = [strongest_line(spectrum(part)) for part in (o.frame[:half], o.frame[half:])]
         (_a, first_line), (_b, second_line) = halves
         louder, quieter = max(first_line, second_line), min(first_line, second_line)
@@ -97,8 +101,17 @@ def when(case: Case) -> str:
         blocks = o.blocks[:-1] if o.frames % BLOCKS else o.blocks
         votes += _jump(blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))
     if len(votes) < 2:
+        votes = _more(odd, TOGETHER)  # few events a recording, but of all together
+    if not votes:
         return ""
     return "from about half of each recording on" if np.mean(votes) > 0.5 else "until about half of each recording"
+
+
+def _more(halves: Array, sigmas: float = SIGMAS) -> list[bool]:
+    """Whether there are more counts in the second half; nothing where that may be chance."""
+    first, second = halves
+    clear = abs(first - second) > max(sigmas * np.sqrt(first + second), 0.3 * (first + second))
+    return [bool(second > first)] if clear else []
 
 
 def _jump(blocks: Array, spikes: float) -> list[bool]:
