@@ -283,7 +283,7 @@ def search(
 def with_errors(turn: Round, errors: Errors) -> Round:
     """The round with its effect's errors as they were found last, together with all others."""
     best = turn.fits[0]
-    return replace(turn, fits=(replace(best, sd=errors.get(best.name, best.sd)), *turn.fits[1:]))
+    return replace(turn, fits=(replace(best, sd=errors.get(best.name) or best.sd), *turn.fits[1:]))
 
 
 def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:

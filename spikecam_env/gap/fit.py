@@ -98,8 +98,11 @@ def with_pattern(case: Case, model: SensorModel, null: Null, predicted: Predicti
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
     values = np.array([values_of(b, null.keys) for b in drawn])
     known = np.isfinite(values).all(axis=0)
-    mean = np.where(known, np.where(known, values, 0.0).mean(axis=0), predicted.mean)
-    return replace(predicted, mean=mean, error=np.where(known, null.sd / np.sqrt(UNITS), predicted.error))
+    values = np.where(known, values, 0.0)
+    mean = np.where(known, values.mean(axis=0), predicted.mean)
+    spread = np.where(known, np.maximum(values.std(axis=0, ddof=1), null.sd), predicted.spread)
+    error = np.where(known, spread / np.sqrt(UNITS), predicted.error)
+    return replace(predicted, mean=mean, error=error, spread=spread)
 
 
 def fit(
@@ -207,7 +210,10 @@ def _fit_twins(
 def _fit_wander(
     case: Case, model: SensorModel, null: Null, measured: Array, name: str, parameters: dict[str, float]
 ) -> Fit:
-    """The strength under which what is seen is as likely as can be among twins that scatter."""
+    """The strength under which what is seen is as likely as can be among twins that scatter.
+
+    Statistics of one recording are of one course in time: its strength is known no better than from one number each.
+    """
     strength = candidate(name).fitted[0]
     power = 2.0 if candidate(name).square else 1.0
     only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
@@ -221,7 +227,7 @@ def _fit_wander(
             break
     predicted = scaled(null, predicted, factor)
     rho, left = judged(null, measured, predicted)
-    sds = {strength: parameters[strength] * sd / power}
+    sds = {strength: parameters[strength] * max(sd, np.sqrt(2.0 / len(only))) / power}
     return Fit(name, parameters, sds, predicted, base, rho, left, with_effect(model, name, parameters))
 
 
