@@ -68,7 +68,7 @@ def test_strengths_are_within_their_group():
 
 def test_what_a_case_hides_is_not_in_its_id_or_withheld_names_of_others():
     case = case_of("left_out", "photo_response_nonlinearity")
-    assert set(case.exclude) == {"photo_response_nonlinearity", "ir_drop"}
+    assert set(case.exclude) == {"photo_response_nonlinearity", "ir_drop", "dead_time", "synchronous_reset"}
     assert all(not c.exclude for c in FULL["tune"] if c.group != "left_out")
     assert all(set(c.id) <= set("0123456789abcdef") for c in FULL["tune"])
 
