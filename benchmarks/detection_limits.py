@@ -36,7 +36,7 @@ def measured() -> dict[str, float]:
     templates = load()
     to_fit = of_fit(templates.keys)
     for entry in templates.entries:
-        power = 0.5 if candidate(entry.name).square else 1.0
+        power = 1.0 / candidate(entry.name).power
         peak = float(np.abs(entry.shift[to_fit]).max())
         strength = abs(entry.parameters[CATALOGUE[entry.name].strength])
         by_name.setdefault(entry.name, []).append(strength * (CLEAR / peak) ** power)

@@ -31,7 +31,7 @@ if __name__ == "__main__":
     print(" ".join(f"{g:>10s}" for g in ("", *groups)))
     for name in EFFECTS:
         entry = next(e for e in load().entries if e.name == name)
-        key, power = CATALOGUE[name].strength, 0.5 if candidate(name).square else 1.0
+        key, power = CATALOGUE[name].strength, 1.0 / candidate(name).power
         strength = entry.parameters[key] * (PEAK / np.abs(entry.shift).max()) ** power
         there = with_effect(model, name, bounded(name, {**entry.parameters, key: strength}))
         made = twins(case, there, within(there, base), range(PAIRS))

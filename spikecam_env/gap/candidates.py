@@ -34,6 +34,11 @@ class Candidate:
     events: bool = False
     experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 
+    @property
+    def power(self) -> float:
+        """Of the strength, that statistics are in proportion to."""
+        return 2.0 if self.square else 1.0
+
 
 def _moving(shown: Sequence[Shown]) -> str | None:
     return None if any(s.moves for s in shown) else "a recording with moving or flickering light"

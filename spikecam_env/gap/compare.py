@@ -114,13 +114,17 @@ def of_a_pair(keys: Sequence[Key]) -> Array:
     return np.array([PAIRED.get(k.group, 1.0) for k in keys])
 
 
+def own_variance(null: Null, predicted: Prediction) -> Array:
+    """(S,) of a prediction's mean, beyond what the null's own mean has."""
+    return np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0)
+
+
 def scaled(null: Null, one: Prediction, factor: float) -> Prediction:
     """A prediction whose change from the null is multiplied, and with it what it scatters more."""
-    learnt = null.sd**2 / null.twins
-    error2 = np.maximum(one.error**2 - learnt, 0.0) * factor**2
+    error2 = null.sd**2 / null.twins + own_variance(null, one) * factor**2
     spread2 = null.sd**2 + np.maximum(one.spread**2 - null.sd**2, 0.0) * abs(factor)
     mean = null.mean + factor * (one.mean - null.mean)
-    return replace(one, mean=mean, error=np.sqrt(learnt + error2), spread=np.sqrt(spread2))
+    return replace(one, mean=mean, error=np.sqrt(error2), spread=np.sqrt(spread2))
 
 
 def likeliest(null: Null, measured: Array, one: Prediction) -> tuple[float, float]:
@@ -252,6 +256,13 @@ def scale_of(
         left = misfit((gap - scale * effect) / np.sqrt(noise2))
         best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))
     return best[1], best[2]
+
+
+def scale_to(null: Null, measured: Array, predicted: Prediction) -> tuple[float, float]:
+    """(scale, sd) of a prediction's change from the null that comes nearest to the measured one."""
+    known = np.isfinite(measured)
+    gap, effect = (np.where(known, v - null.mean, 0.0) for v in (measured, predicted.mean))
+    return scale_of(gap, effect, null.noise**2, own_variance(null, predicted))
 
 
 def is_clear(effect: Array, variance: Array) -> NDArray[np.bool_]:

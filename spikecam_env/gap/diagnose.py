@@ -35,6 +35,7 @@ from spikecam_env.gap.compare import (
     judged,
     misfit,
     normal,
+    own_variance,
     residual,
     values_of,
 )
@@ -322,8 +323,8 @@ def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screen
 
 def standing_on(null: Null, predicted: Prediction) -> Null:
     """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
-    off = np.sqrt(np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0))
-    floor = np.sqrt(null.floor**2 + (TOLERANCE * (predicted.mean - null.mean)) ** 2 + off**2)
+    law = TOLERANCE * (predicted.mean - null.mean)
+    floor = np.sqrt(null.floor**2 + law**2 + own_variance(null, predicted))
     return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, draws=predicted.draws)
 
 

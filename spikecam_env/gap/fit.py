@@ -22,7 +22,7 @@ from spikecam_env.gap.compare import (
     judged,
     likeliest,
     paired,
-    scale_of,
+    scale_to,
     scaled,
     step_of,
     values_of,
@@ -143,13 +143,6 @@ def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
     return out
 
 
-def _scale(null: Null, measured: Array, predicted: Prediction) -> tuple[float, float]:
-    """Scale of a simulated effect that comes nearest to the measured statistics, and its standard error."""
-    known = np.isfinite(measured)
-    gap, effect = np.where(known, measured - null.mean, 0.0), np.where(known, predicted.mean - null.mean, 0.0)
-    return scale_of(gap, effect, null.noise**2, predicted.error**2 - null.sd**2 / null.twins)
-
-
 def _fit_twins(
     case: Case,
     model: SensorModel,
@@ -163,7 +156,7 @@ def _fit_twins(
     settled; then, with shapes, Gauss-Newton; the last step is a scaling of what was simulated, without another twin."""
     what = candidate(name)
     strength = what.fitted[0]
-    power = 2.0 if what.square else 1.0
+    power = what.power
     parameters = bounded(name, parameters)
     base = bare = within(with_effect(model, name, parameters), within(model, case.base))
     everywhere = np.full(len(null.keys), np.inf)
@@ -179,7 +172,7 @@ def _fit_twins(
                 parameters, only = stronger, concerned(case, [name], null, measured, everywhere)
                 continue
         base = as_seen(tried, base, null, predicted)
-        scale, sd = _scale(null, measured, predicted)
+        scale, sd = scale_to(null, measured, predicted)
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
         if factor < 0 and not _may_be_negative(name):
             factor = 0.1
@@ -190,7 +183,7 @@ def _fit_twins(
             if max(abs(np.log(f)) for f in step.values()) > 0.1:
                 continue
             predicted = predict(case, with_effect(model, name, parameters), base, null, twins_of(name), only)
-            scale, sd = _scale(null, measured, predicted)
+            scale, sd = scale_to(null, measured, predicted)
             factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
         near |= abs(scale) * seen < VISIBLE
         if (near and turn) or turn == TURNS - 1:
@@ -215,7 +208,7 @@ def _fit_wander(
     Statistics of one recording are of one course in time: its strength is known no better than from one number each.
     """
     strength = candidate(name).fitted[0]
-    power = 2.0 if candidate(name).square else 1.0
+    power = candidate(name).power
     only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
     for _ in range(2):
         there = with_effect(model, name, bounded(name, parameters))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from spikecam_env.gap.compare import Draw, Null, Prediction, judged, scale_of, scaled
+from spikecam_env.gap.compare import Draw, Null, Prediction, judged, own_variance, scale_to, scaled
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
     if observed < LEAST:
         return True
     noise = np.array([d.values for d in draws])
-    own = np.sqrt(np.maximum(other.error**2 - null.sd**2 / null.twins, 0.0))
+    own = np.sqrt(own_variance(null, other))
     noise = noise - noise.mean(axis=0) + own * np.random.default_rng(len(noise)).standard_normal(noise.shape)
     known = np.isfinite(measured)
     middle = rescaled(null, measured, other).mean
@@ -48,7 +48,4 @@ def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
 
 def rescaled(null: Null, seen: Array, predicted: Prediction) -> Prediction:
     """A prediction with its change from the null scaled to come nearest to what is seen."""
-    known = np.isfinite(seen)
-    gap, effect = (np.where(known, v - null.mean, 0.0) for v in (seen, predicted.mean))
-    scale, _ = scale_of(gap, effect, null.noise**2, np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0))
-    return scaled(null, predicted, scale)
+    return scaled(null, predicted, scale_to(null, seen, predicted)[0])

@@ -129,7 +129,7 @@ def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Scree
     scale, _ = scale_of(d, shift, np.ones_like(d), own2, 2 * TOLERANCE)
     if scale <= 0 and not _signed(entry.name):
         return None
-    strength, power = CATALOGUE[entry.name].strength, 2.0 if candidate(entry.name).square else 1.0
+    strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
     rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
     there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
     start = bounded(entry.name, {**entry.parameters, strength: there})
@@ -138,7 +138,7 @@ def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Scree
 
 def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
     """A template of what wanders: its size alone, over all recordings, is by how much statistics scatter."""
-    strength, power = CATALOGUE[entry.name].strength, 2.0 if candidate(entry.name).square else 1.0
+    strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
     size2 = pooled(null.keys, shift**2)
     tried = []
     for factor in np.geomspace(1e-3, 1e3, 100):
@@ -170,7 +170,7 @@ def bounds(
         scale, sd = scale_of(d, shift, one, 0.0 * one, 2 * TOLERANCE)
         sd *= np.sqrt(len(conditions)) if is_pattern(entry.name) else 1.0
         key = CATALOGUE[entry.name].strength
-        power = 2.0 if candidate(entry.name).square else 1.0
+        power = candidate(entry.name).power
         below = abs(entry.parameters[key]) * (abs(scale) + 1.645 * sd) ** (1 / power)
         if entry.name not in found or below > found[entry.name].below:
             unit = CATALOGUE[entry.name].__dataclass_fields__[key].metadata["unit"]
@@ -294,7 +294,7 @@ def starts(name: str) -> list[dict[str, float]]:
 def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Template:
     """A candidate's template on a campaign, at a strength where it shows clearly."""
     strength = CATALOGUE[name].strength
-    power = 2.0 if candidate(name).square else 1.0
+    power = candidate(name).power
     now = bounded(name, parameters)
     shift = _shift(case, model, null, name, now)
     for _ in range(4):
