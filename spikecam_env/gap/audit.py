@@ -34,6 +34,9 @@ ODD = 0.1
 """Share of a recording's intervals that are much too short or too long, over what its rate is off by, from which spikes
 are missing or too many: light of another level makes none."""
 
+FEW = 0.3
+"""Share of the intervals that end after a gap, of which it makes more odd."""
+
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
 
@@ -229,15 +232,20 @@ def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
 
 
 def _jump_steady(o) -> tuple[int, float] | None:  # type: ignore[no-untyped-def]
-    """(frame, missing): intervals that span a gap are short by it; they end within an interval after it."""
+    """(frame, missing): intervals that span a gap are short by it; they end within an interval after it.
+
+    Most pixels' do: what a FEW odd intervals can do alone is none.
+    """
     spikes = max(float(o.frame.mean()), 1e-9)
     interval = o.shape[0] * o.shape[1] / spikes
     window = int(np.clip(round(interval), 4, o.frames // 8))
     total = np.convolve(o.late, np.ones(window), "valid")
     spread = 1.4826 * float(np.median(np.abs(total - np.median(total)))) + 1e-9
     at = int(np.argmax(np.abs(total)))
-    mean = float(total[at] / max(o.frame[at : at + window].sum(), 1))
-    if abs(total[at]) < 12 * spread or abs(mean) < 0.3:
+    ended, odd = (max(float(a[at : at + window].sum()), 1.0) for a in (o.frame, o.odd))
+    mean = float(total[at]) / ended
+    by_few = odd * interval if odd < FEW * ended else 0.0
+    if abs(total[at]) - by_few < 12 * spread or abs(mean) < 0.3:
         return None
     return at, -mean
 

@@ -120,6 +120,15 @@ def test_dropped_frames_are_found_where_they_are_missing(name, count):
         assert abs(frames - count) <= max(16, 2 * count)
 
 
+@pytest.mark.parametrize("name", ["dark", "flat-0.03"])
+def test_a_burst_of_a_few_pixels_is_no_gap_in_time(name):
+    """Three spikes too many, one frame after another, in one pixel of fifty."""
+    spikes = spikes_of()
+    few = np.random.default_rng(0).random(SHAPE) < 0.02
+    spikes[name][700:703, few] = 1
+    assert found(case_from(spikes)) == []
+
+
 def test_a_lit_recording_without_spikes_is_named():
     spikes = spikes_of()
     spikes["flat-0.2"][:] = 0

@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 NARROW = 5e-4
 """Relative spread below which there is no pattern, but the noise of rates read between whole frames."""
 
+BLOCKS = 8
+"""Blocks along each side of the array."""
+
 
 def statistics(rate: Array) -> dict[str, float]:
     """Of a rate map (H, W).
@@ -23,7 +26,8 @@ def statistics(rate: Array) -> dict[str, float]:
     width: log of the robust relative spread.  low / high tail: how much further the 0.5 % and 99.5 % quantiles lie
     than those of a Gaussian, in spreads; top: the largest.  silent: pixels below a tenth of the median, counted.
     rows, columns: log variance of their means over a pixel's.  bowl, across, down: radial slope and gradients.
-    near: correlation of neighbours.  Of a map that is NARROW: its width, as if it were that, and silent.
+    near: correlation of neighbours.  patch: the mean of a block of pixels that is furthest off, in its standard errors.
+    Of a map that is NARROW: its width, as if it were that, and silent.
     """
     flat = rate.reshape(-1)
     middle = float(np.median(flat))
@@ -56,4 +60,13 @@ def statistics(rate: Array) -> dict[str, float]:
         "across": slope(inside.reshape(-1), x.reshape(-1)) * columns / width,
         "down": slope(inside.reshape(-1), y.reshape(-1)) * rows / width,
         "near": float((across + down) / 2),
+        "patch": log(max(_furthest_block(inside) / width, 0.1)),
     }
+
+
+def _furthest_block(values: Array) -> float:
+    """The block mean that is furthest from the median of block means, times the root of a block's pixels."""
+    high, wide = (max(n // BLOCKS, 1) for n in values.shape)
+    rows, columns = values.shape[0] // high, values.shape[1] // wide
+    means = values[: rows * high, : columns * wide].reshape(rows, high, columns, wide).mean(axis=(1, 3))
+    return float(np.abs(means - np.median(means)).max() * np.sqrt(high * wide))
