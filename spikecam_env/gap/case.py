@@ -99,9 +99,11 @@ def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Seque
     """Indirect inference: shift the unit `used` so that its twins, refitted as `simulated`, are refitted as `wanted`.
 
     The shift of a pixel is a straight line in its own response and dark level: pixel by pixel it would be tuned to the
-    noise of these very twins.
+    noise of these very twins.  Where an effect is so strong that most pixels of the twins fall silent, it stays.
     """
     live = wanted.live & (wanted.gain > 0) & np.all([s.gain > 0 for s in simulated], axis=0)
+    if live.mean() < 0.5:
+        return used
     ratio = np.log(wanted.gain[live] / np.mean([s.gain[live] for s in simulated], axis=0))
     gain = used.gain * np.exp(_line(used.gain, live, ratio))
     dark = used.dark + _line(used.dark, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))

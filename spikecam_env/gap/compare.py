@@ -149,7 +149,7 @@ def normal(null: Null, t: Array) -> Array:
     """(S,) normal deviates of distances in noise: the noise was learnt from few twins, and is the surer the more of it
     is floor."""
     known = null.sd**2 * (1.0 + 1.0 / null.twins)
-    freedom = (null.twins - 1) * np.minimum((1.0 + null.floor**2 / np.maximum(known, 1e-300)) ** 2, 1e4)
+    freedom = (null.twins - 1) * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
     log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)
     return np.sign(t) * -special.ndtri_exp(log_p)
 

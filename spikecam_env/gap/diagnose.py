@@ -81,8 +81,9 @@ GATE = 0.005
 GAIN = 20.0
 """Misfit that an effect has to remove to be added."""
 
-LITTLE = 0.2
-"""Share of what is beyond chance that an effect has to remove for another to be looked for beside it."""
+LITTLE = (0.2, 0.5)
+"""Share of what is beyond chance that the first effect, and each later one of what the others left, has to remove for
+another to be looked for beside them: less is a stand-in's."""
 
 UNEXPLAINED = 0.02
 """Share of the evidence that may stay unexplained when something is named."""
@@ -274,7 +275,7 @@ def search(
         rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
         rounds = [with_errors(r, errors) for r in rounds]
         now, base, prediction = best.model, best.base, best.prediction
-        if left_over - sure[0].misfit < LITTLE * (left_over - chance):
+        if left_over - sure[0].misfit < LITTLE[len(rounds) > 1] * (left_over - chance):
             break
     rho, left_over = judged(null, seen, prediction)
     rounds.append(Round(now, base, prediction, rho, left_over, ()))
@@ -388,7 +389,8 @@ def concluded(
     by_chance = float(np.sum(null.weight * np.ones(len(values))))
     left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
     quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
-    explained = not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet)
+    contradicted = alarmed(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0))
+    explained = not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet and not contradicted)
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     place, time_ = where(case), when(case)
     share = lambda f: gap_of(case, null, values, given, f.prediction).removed  # noqa: E731

@@ -37,8 +37,14 @@ Array = NDArray[np.float64]
 NEEDED = 15.0
 """Misfit by which an effect found earlier has to be missed, once another has been added, to be kept."""
 
+HOPE = 5.0
+"""Misfit that a twin, scaled at best, has to remove for its fit to go on."""
+
 TURNS = 5
 """Most twins, Gauss-Newton steps apart, that the fit of one candidate takes."""
+
+FURTHEST = 4.0
+"""Times as far that a unit is shifted at once for a stronger effect: a straight line leads nowhere."""
 
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
@@ -159,7 +165,7 @@ def _fit_twins(
     power = what.power
     parameters = bounded(name, parameters)
     base = bare = within(with_effect(model, name, parameters), within(model, case.base))
-    everywhere = np.full(len(null.keys), np.inf)
+    everywhere, before = np.full(len(null.keys), np.inf), judged(null, measured, null.prediction)[1]
     only = concerned(case, [name], null, measured, everywhere if expected is None else expected)
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
@@ -173,11 +179,12 @@ def _fit_twins(
                 continue
         base = as_seen(tried, base, null, predicted)
         scale, sd = scale_to(null, measured, predicted)
+        hopeless = judged(null, measured, scaled(null, predicted, scale))[1] > before - HOPE
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
         if factor < 0 and not _may_be_negative(name):
             factor = 0.1
         near = 0.7 < factor < 1.4
-        if near and len(what.fitted) > 1 and turn < TURNS - 1:
+        if near and not hopeless and len(what.fitted) > 1 and turn < TURNS - 1:
             step = _gauss_newton(case, model, null, measured, name, parameters, predicted, base, only)
             parameters = bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
             if max(abs(np.log(f)) for f in step.values()) > 0.1:
@@ -185,8 +192,8 @@ def _fit_twins(
             predicted = predict(case, with_effect(model, name, parameters), base, null, twins_of(name), only)
             scale, sd = scale_to(null, measured, predicted)
             factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
-        near |= abs(scale) * seen < VISIBLE
-        if (near and turn) or turn == TURNS - 1:
+        near |= abs(scale) * seen < VISIBLE or hopeless
+        if hopeless or (near and turn) or turn == TURNS - 1:
             break
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
         base = shifted(bare, base, factor**power)
@@ -225,7 +232,9 @@ def _fit_wander(
 
 
 def shifted(bare: BaseFit, settled: BaseFit, factor: float) -> BaseFit:
-    """The unit for an effect `factor` times as strong as the one under which `bare` became `settled`."""
+    """The unit for an effect `factor` times as strong as the one under which `bare` became `settled`; no further than
+    FURTHEST times as far, for it will settle anew."""
+    factor = min(factor, FURTHEST)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(bare.gain > 0, settled.gain / bare.gain, 1.0)
     dark = np.maximum(bare.dark + factor * (settled.dark - bare.dark), 0.0)
@@ -236,16 +245,17 @@ def shifted(bare: BaseFit, settled: BaseFit, factor: float) -> BaseFit:
 def concerned(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int]:
     """Recordings of use fit on which effects show, or something has to be explained, by index; all where none does.
 
-    With those that the refit rests on, unless the effects leave steady uniform light alone: the refit takes up their
-    mean, and the others are judged by that refit.
+    With those that the refit rests on: the refit takes up the effects' mean, and the others are judged by that refit.
+    Of effects that leave steady uniform light alone, only the others, where the refit does not rest on them.
     """
     seen = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean))) > 5 * null.noise
     shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
     fitted = {i for i, c in enumerate(case.conditions) if c.use == "fit"}
     which = {i for i in fitted if case.conditions[i].name in shows} or fitted
-    if which & rests_on(case) or not all(candidate(name).only_contrast for name in names):
-        which |= rests_on(case)
-    return sorted(which)
+    uneven = {i for i in which if case.conditions[i].kind not in ("dark", "flat")}
+    if uneven and not uneven & rests_on(case) and all(candidate(name).only_contrast for name in names):
+        return sorted(uneven)
+    return sorted(which | rests_on(case))
 
 
 def with_held_out(case: Case, only: Sequence[int]) -> list[int]:
