@@ -36,8 +36,8 @@ class Candidate:
 
     @property
     def power(self) -> float:
-        """Of the strength, that statistics are in proportion to."""
-        return 2.0 if self.square else 1.0
+        """Of the strength, that statistics are in proportion to: events are counted, on a scale of roots."""
+        return 2.0 if self.square else 0.5 if self.events else 1.0
 
 
 def _moving(shown: Sequence[Shown]) -> str | None:

@@ -78,7 +78,7 @@ MOST = 3
 GATE = 0.005
 """Adjusted p-value of what a named effect leaves, below which something is left."""
 
-GAIN = 20.0
+GAIN = 12.0
 """Misfit that an effect has to remove to be added."""
 
 LITTLE = (0.2, 0.5)

@@ -30,6 +30,9 @@ BIN = 16
 LENGTHS = 64
 """Intervals are counted by length up to this many frames."""
 
+FEW = 0.3
+"""Share of pixels below which those with odd intervals are left out where noise of all pixels is asked for."""
+
 LAGS = 3
 """Lags 0 .. LAGS - 1 [frames] of neighbours' coincidences."""
 
@@ -72,6 +75,12 @@ class Observation:
     def rate(self) -> Array:
         """(P,) spikes a frame between first and last spike; count over frames below two spikes."""
         return np.where(self.times.count > 1, self.times.rate, self.times.count / self.frames)
+
+    @property
+    def struck(self) -> NDArray[np.bool_]:
+        """(P,) pixels with a short or long interval, where they are FEW; none where odd intervals are the rule."""
+        odd: NDArray[np.bool_] = self.short + self.long > 0
+        return odd & (odd.mean() < FEW)
 
 
 def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = False) -> Observation:

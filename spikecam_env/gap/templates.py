@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
@@ -325,10 +326,12 @@ def _shift(
     return np.nan_to_num((made.mean - null.mean) / null.noise)
 
 
-if __name__ == "__main__":
-    import sys
-
-    out = Path(sys.argv[1] if len(sys.argv) > 1 else "out/templates")
+def rebuild(out: tyro.conf.Positional[Path] = Path("out/templates")) -> None:
+    """Simulate every candidate's template; those in the folder `out` are kept."""
     made = build(out)
     save(made, Path(__file__).with_name(FILE))
     print(f"{len(made.entries)} templates of {len(CANDIDATES)} candidates, {len(made.keys)} statistics")
+
+
+if __name__ == "__main__":
+    tyro.cli(rebuild)

@@ -17,13 +17,14 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     """variance: mean over pixels of interval variance less f(1-f), over T.  lag-1: pooled serial correlation.
 
     A_k: measured over expected from the refitted jitter, less one.  tail: pixels with much larger A_16 than most.
+    Of pixels whose intervals are in order: single events are counted as such (`intervals`), and are no noise.
     """
     if reading.conditions[i].kind not in STILL:
         return {}
     o = reading.observations[i]
     rate = o.times.rate
     interval = 1.0 / np.where(rate > 0, rate, np.nan)
-    good = (o.times.count > 8) & reading.base.live & np.isfinite(o.variance) & (rate < 0.95)
+    good = (o.times.count > 8) & reading.base.live & np.isfinite(o.variance) & (rate < 0.95) & ~o.struck
     if good.sum() < 100:
         return {}
     fraction = interval % 1.0
