@@ -34,8 +34,11 @@ ODD = 0.1
 """Share of a recording's intervals that are much too short or too long, over what its rate is off by, from which spikes
 are missing or too many: light of another level makes none."""
 
-FEW = 0.3
-"""Share of the intervals that end after a gap, of which it makes more odd."""
+MOST = 0.5
+"""Share of the intervals that end after a gap that may be odd for it."""
+
+LEAST_ENDED = 100
+"""Intervals that such a share is taken of."""
 
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
@@ -231,23 +234,24 @@ def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
     return found
 
 
-def _jump_steady(o) -> tuple[int, float] | None:  # type: ignore[no-untyped-def]
+def _jump_steady(o: Observation) -> tuple[int, float] | None:
     """(frame, missing): intervals that span a gap are short by it; they end within an interval after it.
 
-    Most pixels' do: what a FEW odd intervals can do alone is none.
+    A gap of half an interval makes MOST of them odd; single events do that to a few.
     """
-    spikes = max(float(o.frame.mean()), 1e-9)
-    interval = o.shape[0] * o.shape[1] / spikes
+    interval = o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9)
     window = int(np.clip(round(interval), 4, o.frames // 8))
-    total = np.convolve(o.late, np.ones(window), "valid")
+    total, timed, odd, ended = (np.convolve(a, np.ones(window), "valid") for a in (o.late, o.timed, o.odd, o.frame))
     spread = 1.4826 * float(np.median(np.abs(total - np.median(total)))) + 1e-9
     at = int(np.argmax(np.abs(total)))
-    ended, odd = (max(float(a[at : at + window].sum()), 1.0) for a in (o.frame, o.odd))
-    mean = float(total[at]) / ended
-    by_few = odd * interval if odd < FEW * ended else 0.0
-    if abs(total[at]) - by_few < 12 * spread or abs(mean) < 0.3:
-        return None
-    return at, -mean
+    mean = float(total[at] / max(timed[at], 1))
+    if abs(total[at]) > 12 * spread and abs(mean) > 0.3:
+        return at, -mean
+    share = odd / np.maximum(ended, 1)
+    at = int(np.argmax(share))
+    if ended[at] > LEAST_ENDED and share[at] > MOST and np.median(share) < MOST / 5:
+        return at, 1.0
+    return None
 
 
 def _jump_moving(case: Case, condition, o) -> tuple[int, float] | None:  # type: ignore[no-untyped-def]

@@ -47,8 +47,8 @@ class Observation:
     blocks: (BLOCKS, P) counts.
     frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (LAGS, 2) spikes of one pixel with its neighbour's,
     lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
-    late: (F,) sum over spikes of a frame of their interval less the pixel's mean [frames].  odd: (F,) short and long
-    intervals that end in a frame.
+    late: (F,) sum over the `timed` (F,) intervals that end in a frame of what they are longer than the pixel's mean
+    [frames], of pixels without short or long ones.  odd: (F,) short and long intervals that end in a frame.
     """
 
     shape: tuple[int, int]
@@ -65,6 +65,7 @@ class Observation:
     coincidences: Array
     film: NDArray[np.uint8] | None
     late: Array
+    timed: NDArray[np.int32]
     odd: NDArray[np.int32]
 
     @property
@@ -91,8 +92,9 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
     moments = np.full((pixels, 4), np.nan)
     blocks = np.zeros((BLOCKS, pixels), np.int32)
     lengths = np.zeros(LENGTHS + 1, np.int64)
-    late, odd = np.zeros(len(packed)), np.zeros(len(packed), np.int32)
-    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths, late, odd)
+    late = np.zeros(len(packed))
+    timed, odd = np.zeros((2, len(packed)), np.int32)
+    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths, late, timed, odd)
     by_row = _rows_in_words(packed, shape)
     row = np.zeros((len(packed), shape[0]), np.int32)
     coincidences = np.zeros((LAGS, 2))
@@ -113,6 +115,7 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
         coincidences,
         _film(unpack_frames(packed, shape)) if film else None,
         late,
+        timed,
         odd,
     )
 
@@ -144,7 +147,7 @@ def _film(spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _pixels(words, ends, square, terms, moments, blocks, lengths, late, odd):  # type: ignore[no-untyped-def]
+def _pixels(words, ends, square, terms, moments, blocks, lengths, late, timed, odd):  # type: ignore[no-untyped-def]
     frames = words.shape[0]
     bits = np.empty((64, (frames + 63) // 64), np.uint64)
     t = np.empty(frames + 1, np.int32)
@@ -189,8 +192,10 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late, odd):  #
             if short + long:
                 for i in range(n - 1):
                     odd[t[i + 1]] += d[i] < least or d[i] > most
-            for i in range(n - 1):
-                late[t[i + 1]] += d[i] - mean
+            else:
+                for i in range(n - 1):
+                    late[t[i + 1]] += d[i] - mean
+                    timed[t[i + 1]] += 1
             for i in range(n - 2):
                 products += np.int64(d[i]) * d[i + 1]
             # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2

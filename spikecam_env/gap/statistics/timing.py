@@ -14,17 +14,17 @@ from spikecam_env.gap.statistics.reading import STILL, Reading, log
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """late: log variance over frames of the mean lateness of their spikes, over that of spikes on their own.
 
-    next: correlation of one frame's lateness with the next one's.
+    next: correlation of one frame's lateness with the next one's.  Of pixels without odd intervals, where most are.
     """
     if reading.conditions[i].kind not in STILL:
         return {}
     o = reading.observations[i]
-    enough = o.frame >= 10
-    if enough.sum() < 500:
+    enough = o.timed >= 10
+    if enough.sum() < 500 or o.timed.sum() < 0.5 * o.frame.sum():
         return {}
-    alone = float(np.nanmean(o.variance[reading.base.live]))
-    late = np.where(enough, o.late / np.maximum(o.frame, 1), 0.0)
-    own = alone / np.maximum(o.frame, 1)
+    alone = float(np.nanmean(o.variance[reading.base.live & (o.short + o.long == 0)]))
+    late = np.where(enough, o.late / np.maximum(o.timed, 1), 0.0)
+    own = alone / np.maximum(o.timed, 1)
     ratio = float((late[enough] ** 2).sum() / max(own[enough].sum(), 1e-12))
     both = enough[1:] & enough[:-1]
     product = float((late[1:] * late[:-1])[both].mean()) if both.any() else 0.0
