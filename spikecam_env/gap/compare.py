@@ -17,9 +17,15 @@ Array = NDArray[np.float64]
 TOLERANCE = 0.05
 """Share of an effect's own size by which its simulation may be off: laws are first order, and simulated with noise."""
 
+OPEN = 5e-4
+"""Damping of what errors are told from: a step may be held back, an error must not be."""
+
 HEAVY = 8.0
 """Degrees of freedom of the loss: statistics far off count by their logarithm."""
 
+
+GATE = 0.005
+"""Adjusted p-value of what a named effect leaves, below which something is left."""
 
 PAIRED = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6, "spectrum": 0.7,
           "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
@@ -54,7 +60,8 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Null:
-    """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns, kept in `draws`.
+    """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns, kept in `draws`, or of the
+    pattern over as many drawn units.
 
     floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  weight: (S,) how much each says
     of its own: what several recordings tell of one fixed pattern is told once.
@@ -64,7 +71,7 @@ class Null:
     mean: Array
     sd: Array
     floor: Array
-    twins: int
+    twins: Array | int
     weight: Array | float = 1.0
     draws: tuple[Draw, ...] = ()
 
@@ -164,6 +171,11 @@ def adjusted(z: Array) -> Array:
     return out
 
 
+def alarmed(null: Null, rho: Array) -> bool:
+    """Whether residuals say that something is left."""
+    return bool(adjusted(normal(null, rho)).min() < GATE)
+
+
 def variance(null: Null, predicted: Prediction) -> Array:
     """(S,) of measured less predicted; a prediction is good to TOLERANCE of its effect."""
     return predicted.spread**2 + predicted.error**2 + null.floor**2 + (TOLERANCE * (predicted.mean - null.mean)) ** 2
@@ -218,15 +230,16 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
     gap = np.nan_to_num(measured - predicted.mean)
     w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
     normal = jacobian.T @ (w[:, None] * jacobian)
-    damped = normal + np.diag(0.02 * np.diag(normal) + 1e-12)
-    solve = np.linalg.solve(damped, jacobian.T * w)
+    scale = np.diag(normal) + 1e-12
+    step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
+    solve = np.linalg.solve(normal + OPEN * np.diag(scale), jacobian.T * w)
     own = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
     alone = (solve * (null.floor**2 + own)) @ solve.T
     astray = np.array([solve @ np.nan_to_num(d.values - null.mean) for d in null.draws])
     known = len(astray) > 1
-    drawn = np.cov(astray.T) * (1 + 1 / null.twins) if known else (solve * null.sd**2) @ solve.T
+    drawn = np.cov(astray.T) * (1 + 1 / len(astray)) if known else (solve * null.sd**2) @ solve.T
     law = solve @ (TOLERANCE * (predicted.mean - null.mean))
-    return solve @ gap, np.atleast_2d(drawn) + alone + np.outer(law, law)
+    return np.asarray(step, np.float64), np.atleast_2d(drawn) + alone + np.outer(law, law)
 
 
 def scale_of(

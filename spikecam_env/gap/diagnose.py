@@ -31,10 +31,10 @@ from spikecam_env.gap.compare import (
     Null,
     Prediction,
     adjusted,
+    alarmed,
     deviates,
     judged,
     misfit,
-    normal,
     own_variance,
     residual,
     values_of,
@@ -75,9 +75,6 @@ FEWEST, TRIED = 3, 5
 MOST = 3
 """Effects that one diagnosis names together."""
 
-GATE = 0.005
-"""Adjusted p-value of what a named effect leaves, below which something is left."""
-
 GAIN = 12.0
 """Misfit that an effect has to remove to be added."""
 
@@ -91,6 +88,11 @@ UNEXPLAINED = 0.02
 QUIET = 0.1
 """The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
 
+LENT = (
+    "Within the errors of their fit, parameters were told by the recordings held out as well: the gap on them is a fit, "
+    "and no check."
+)
+
 PROMISE = 15.0
 """Misfit by which a fit that is not confirmed may be worse than the best that is, to be confirmed as well."""
 
@@ -99,7 +101,7 @@ PROMISE = 15.0
 class Round:
     """One turn of the search: the model it started from, what that left, and the candidates that were fitted.
 
-    rivals: names that may as well be true as the best of them.
+    rivals: names that may as well be true as the best of them.  lent: whether held-out recordings were fitted too.
     """
 
     model: SensorModel
@@ -109,6 +111,7 @@ class Round:
     misfit: float
     fits: tuple[Fit, ...]
     rivals: tuple[str, ...] = ()
+    lent: bool = False
 
 
 def diagnose(
@@ -243,7 +246,7 @@ def search(
 ) -> list[Round]:
     """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps.
 
-    values: (S,) of all recordings; those held out decide between rivals and nothing else.
+    values: (S,) of all recordings; those held out decide between rivals, and tell parameters that others leave open.
     """
     rounds: list[Round] = []
     seen = of_fit(case, null, values)
@@ -271,8 +274,8 @@ def search(
         if earlier:
             best = rejoined(case, model, null, seen, best, earlier)
         names_now = [n for n in (*earlier, best.name) if n in {e.name for e in best.model.effects}]
-        best, errors = polished(case, model, null, seen, best, names_now)
-        rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]))
+        best, errors, lent = polished(case, model, null, seen, values, best, names_now)
+        rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]), lent=lent)
         rounds = [with_errors(r, errors) for r in rounds]
         now, base, prediction = best.model, best.base, best.prediction
         if left_over - sure[0].misfit < LITTLE[len(rounds) > 1] * (left_over - chance):
@@ -359,11 +362,6 @@ def loud(null: Null, distance: Array) -> set[str]:
     return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) > LOUD}
 
 
-def alarmed(null: Null, rho: Array) -> bool:
-    """Whether residuals say that something is left."""
-    return bool(adjusted(normal(null, rho)).min() < GATE)
-
-
 def concluded(
     case: Case,
     model: SensorModel,
@@ -423,7 +421,7 @@ def concluded(
         unknown=unknown,
         class_=class_,
         parameters=parameters,
-        data=tuple(c.text for c in contradictions),
+        data=(*(c.text for c in contradictions), *([LENT] if any(r.lent for r in turns) else [])),
         gap=gap_of(case, null, values, given, last.prediction if last else null.prediction),
         statistics=table(case, null, values, given, z, p, predicted, rho),
         ranking=tuple(ranked(f, r, f is r.fits[0] and any(r is t for t in turns)) for r in rounds for f in r.fits),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.compare import Null, Prediction, step_of
+from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, step_of
 from spikecam_env.gap.fit import (
     FINAL,
     Fit,
@@ -46,16 +46,37 @@ WORSE = 3.0
 Probe = Callable[[SensorModel], Prediction]
 """What a model gives."""
 
+AGREE = 3.0
+"""Errors by which a parameter may move when held-out recordings are fitted as well, for them to agree."""
+
 Errors = dict[str, dict[str, float]]
 """Standard deviation of each parameter, by effect and name."""
 
 
 def polished(
-    case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, names: Sequence[str]
-) -> tuple[Fit, Errors]:
-    """`found.model` with the parameters of its effects `names` refined, simulated anew, and their errors.
+    case: Case, model: SensorModel, null: Null, seen: Array, values: Array, found: Fit, names: Sequence[str]
+) -> tuple[Fit, Errors, bool]:
+    """`found.model` with the parameters of its effects `names` refined, simulated anew; their errors; whether all
+    recordings were needed.
 
-    What wanders is left as it was fitted, since one twin has no direction of it.  model, null: before any was added.
+    seen, values: (S,) of the recordings to fit (NaN elsewhere), and of all.  Where the parameters that the former tell
+    suit the held-out ones within their errors only, those tell them too.  model, null: before any was added.
+    """
+    sharp, errors, own2 = _refined(case, model, null, seen, found, names)
+    error = np.sqrt(sharp.prediction.error**2 + own2 * np.isnan(seen))
+    sure = replace(sharp, prediction=replace(sharp.prediction, error=error))
+    if leaves_nothing(null, values, sharp.prediction) or not leaves_nothing(null, values, sure.prediction):
+        return sure, errors, False
+    whole, known, _ = _refined(case, model, null, values, sharp, names)
+    return (whole, known, True) if agree(sharp, whole, errors) else (sure, errors, False)
+
+
+def _refined(
+    case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, names: Sequence[str]
+) -> tuple[Fit, Errors, Array]:
+    """The fit, its errors, and (S,) by what variance statistics are unknown for them.
+
+    What wanders is left as it was fitted, since one twin has no direction of it.
     """
     free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
     probe = _probe(case, null, measured, found, names)
@@ -71,21 +92,28 @@ def polished(
         if np.abs(step).max() < SETTLED:
             break
     best = confirmed(case, model, null, measured, replace(found, model=now, base=base), FINAL)
-    if best.misfit > found.misfit + WORSE:
+    if best.misfit > judged(null, measured, found.prediction)[1] + WORSE:
         best = found
-    best = replace(best, prediction=as_sure_as(best.prediction, measured, columns, covariance))
     values = {e.name: e.parameters() for e in best.model.effects}
     errors: Errors = {name: dict(found.sd) if name == found.name else {} for name in names}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
         errors[name][key] = float(abs(values[name][key]) * e)
     own: Mapping[str, float] = values[found.name]
-    return replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name]), errors
+    best = replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name])
+    return best, errors, np.einsum("sn,nm,sm->s", columns, covariance, columns)
 
 
-def as_sure_as(predicted: Prediction, measured: Array, columns: Array, covariance: Array) -> Prediction:
-    """A prediction, of recordings held out (NaN in `measured`), no surer than the parameters it rests on."""
-    own2 = np.einsum("sn,nm,sm->s", columns, covariance, columns) * np.isnan(measured)
-    return replace(predicted, error=np.sqrt(predicted.error**2 + own2))
+def leaves_nothing(null: Null, values: Array, predicted: Prediction) -> bool:
+    """Whether a prediction explains what was measured, but for chance."""
+    return not alarmed(null, residual(null, values, predicted))
+
+
+def agree(before: Fit, after: Fit, errors: Errors) -> bool:
+    """Whether parameters moved by no more than their errors allow."""
+    then = {e.name: e.parameters() for e in after.model.effects}
+    here = {e.name: e.parameters() for e in before.model.effects}
+    moves = [abs(then[n][k] - here[n][k]) / sd for n, by in errors.items() for k, sd in by.items() if sd > 0]
+    return all(m < AGREE for m in moves)
 
 
 def moved(model: SensorModel, free: Sequence[tuple[str, str]], step: Array) -> SensorModel:
@@ -99,7 +127,7 @@ def moved(model: SensorModel, free: Sequence[tuple[str, str]], step: Array) -> S
 def _column(probe: Probe, model: SensorModel, at: Prediction, null: Null, name: str, key: str) -> Array:
     """(S,) change of the statistics for one more of a parameter's logarithm."""
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
-    nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if key == candidate(name).fitted[0] else 0.3
+    nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if key == candidate(name).fitted[0] else -0.2
     return (probe(moved(model, [(name, key)], np.array([nudge]))).mean - at.mean) / nudge
 
 
