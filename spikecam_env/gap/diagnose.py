@@ -89,8 +89,8 @@ QUIET = 0.1
 """The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
 
 LENT = (
-    "Within the errors of their fit, parameters were told by the recordings held out as well: the gap on them is a fit, "
-    "and no check."
+    "Within the errors of their fit, parameters were told by the recordings held out as well: "
+    "the gap on them is a fit, and no check."
 )
 
 PROMISE = 15.0
@@ -362,6 +362,16 @@ def loud(null: Null, distance: Array) -> set[str]:
     return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) > LOUD}
 
 
+def explains(null: Null, before: Array, rho: Array) -> bool:
+    """Whether residuals `rho` are chance; or, beside those of the model as given, little and quiet, and none that was
+    not there, which would contradict what was added."""
+    by_chance = float(np.sum(null.weight * np.ones(len(rho))))
+    left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
+    quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
+    contradicted = alarmed(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0))
+    return not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet and not contradicted)
+
+
 def concluded(
     case: Case,
     model: SensorModel,
@@ -384,11 +394,7 @@ def concluded(
              for r in turns]  # fmt: skip
     rho = residual(null, values, last.prediction) if last else before
     predicted = last.prediction.mean if last else null.mean
-    by_chance = float(np.sum(null.weight * np.ones(len(values))))
-    left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
-    quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
-    contradicted = alarmed(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0))
-    explained = not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet and not contradicted)
+    explained = explains(null, before, rho)
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     place, time_ = where(case), when(case)
     share = lambda f: gap_of(case, null, values, given, f.prediction).removed  # noqa: E731

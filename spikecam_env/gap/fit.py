@@ -179,12 +179,14 @@ def _fit_twins(
                 continue
         base = as_seen(tried, base, null, predicted)
         scale, sd = scale_to(null, measured, predicted)
-        hopeless = judged(null, measured, scaled(null, predicted, scale))[1] > before - HOPE
+        if judged(null, measured, scaled(null, predicted, scale))[1] > before - HOPE:
+            factor, near = 1e-3, True
+            break
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
         if factor < 0 and not _may_be_negative(name):
             factor = 0.1
         near = 0.7 < factor < 1.4
-        if near and not hopeless and len(what.fitted) > 1 and turn < TURNS - 1:
+        if near and len(what.fitted) > 1 and turn < TURNS - 1:
             step = _gauss_newton(case, model, null, measured, name, parameters, predicted, base, only)
             parameters = bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
             if max(abs(np.log(f)) for f in step.values()) > 0.1:
@@ -192,8 +194,8 @@ def _fit_twins(
             predicted = predict(case, with_effect(model, name, parameters), base, null, twins_of(name), only)
             scale, sd = scale_to(null, measured, predicted)
             factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
-        near |= abs(scale) * seen < VISIBLE or hopeless
-        if hopeless or (near and turn) or turn == TURNS - 1:
+        near |= abs(scale) * seen < VISIBLE
+        if (near and turn) or turn == TURNS - 1:
             break
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
         base = shifted(bare, base, factor**power)

@@ -8,7 +8,7 @@ import numpy as np
 from small import MODEL, unit
 
 from spikecam_env.gap.compare import Draw, Null, Prediction, judged
-from spikecam_env.gap.diagnose import PROMISE, chosen_of, settle
+from spikecam_env.gap.diagnose import PROMISE, chosen_of, explains, settle
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.statistics import Key
 
@@ -77,3 +77,19 @@ def test_fits_are_confirmed_until_one_stands_clear_above_the_best():
     fits = [replace(base, name=name, misfit=m) for name, m in (("a", 100.0), ("b", near), ("c", near), ("d", far))]
     sure, rest = settle(fits, confirm)
     assert asked == ["a", "b", "c"] and [f.name for f in sure] == ["a", "b", "c"] and [f.name for f in rest] == ["d"]
+
+
+def test_what_is_left_may_be_little_beside_what_was_there():
+    n = null()
+    loud, calm = np.where(np.arange(COUNT) < 50, 100.0, 0.5), np.full(COUNT, 0.5)
+    assert explains(n, loud, calm)
+    assert explains(n, loud, np.where(np.arange(COUNT) < 1, 9.0, 0.5)), "9 noises of 100"
+    assert not explains(n, loud, np.where(np.arange(COUNT) < 1, 11.0, 0.5)), "11 of 100 are not quiet"
+    assert not explains(n, calm, np.where(np.arange(COUNT) < 1, 9.0, 0.5)), "nothing was as loud before"
+
+
+def test_an_effect_that_moves_what_agreed_is_contradicted():
+    """9 noises where there was nothing, however much goes elsewhere."""
+    n = null()
+    loud = np.where(np.arange(COUNT) < 50, 100.0, 0.5)
+    assert not explains(n, loud, np.where(np.arange(COUNT) == 100, 9.0, 0.5))

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded, unit
 
+from spikecam_env.gap import fit as fit_module
 from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_pattern
 from spikecam_env.gap.candidates import testable as split_testable
 from spikecam_env.gap.case import settled
-from spikecam_env.gap.compare import misfit, scale_of, values_of
-from spikecam_env.gap.fit import bounded, concerned, fit, with_effect, with_held_out
+from spikecam_env.gap.compare import judged, misfit, scale_of, values_of
+from spikecam_env.gap.fit import FURTHEST, bounded, concerned, fit, predict, shifted, with_effect, with_held_out
 from spikecam_env.sensor import CATALOGUE
 
 ONE, NONE = np.ones(200), np.zeros(200)
@@ -157,6 +158,34 @@ def test_a_unit_is_settled_along_a_line_and_not_to_the_noise_of_each_pixel():
     off = ratio - (0.01 + 0.02 * x)
     print(f"off by {np.abs(off).max():.2g} at most, noise {noise.std():.2g}")
     assert np.abs(off).max() < 4.5 * 4 * 0.005 / np.sqrt(x.size)
+
+
+def test_a_unit_stays_where_an_effect_silences_its_twins():
+    base = unit()
+    silent = replace(base, gain=np.zeros_like(base.gain))
+    assert settled(MODEL, base, base, [silent]) is base
+
+
+@pytest.mark.parametrize("factor", [0.5, 3.0, 1e3, 1e6])
+def test_a_unit_is_shifted_in_proportion_but_never_out_of_the_world(factor):
+    base = unit()
+    there = replace(base, gain=1.01 * base.gain, dark=0.9 * base.dark, white=3.0 * base.white)
+    found = shifted(base, there, factor)
+    reach = min(factor, FURTHEST)
+    assert np.allclose(found.gain, base.gain * 1.01**reach) and found.white == pytest.approx(base.white * 3.0**reach)
+    assert np.allclose(found.dark, np.maximum(base.dark * (1 - 0.1 * reach), 0.0))
+
+
+def test_a_fit_without_hope_ends_with_its_first_twin(monkeypatch):
+    """Skew where only the dark drifts: nothing to scale, so nothing to try again."""
+    case, asked = recorded(effect("dark_current_drift", rise=0.3, tau_ms=50.0)), []
+    monkeypatch.setattr(fit_module, "predict", lambda *a, **k: asked.append(1) or predict(*a, **k))
+    measured = values_of(case.bank, null().keys)
+    found = fit(case, MODEL, null(), measured, "readout_skew", {"span": 1.0})
+    print(
+        f"{len(asked)} predictions, misfit {judged(null(), measured, null().prediction)[1]:.0f} to {found.misfit:.0f}"
+    )
+    assert len(asked) == 1 and found.parameters["span"] < 0.1
 
 
 def test_held_out_flats_are_simulated_only_where_a_refit_can_judge_them():
