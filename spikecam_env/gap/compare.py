@@ -242,6 +242,14 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
     return np.asarray(step, np.float64), np.atleast_2d(drawn) + alone + np.outer(law, law)
 
 
+def slope_of(null: Null, there: Prediction, here: Prediction, step: float) -> Array:
+    """(S,) change of predictions over `step`, 0 where it is not clear of the twins' own noise: hundreds of statistics that
+    do not move would drown those that do (regression dilution)."""
+    change = there.mean - here.mean
+    own2 = np.maximum(own_variance(null, there), own_variance(null, here))
+    return np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0) / step
+
+
 def scale_of(
     gap: Array, effect: Array, of_gap: Array, of_effect: Array, tolerance: float = TOLERANCE
 ) -> tuple[float, float]:

@@ -24,6 +24,7 @@ from spikecam_env.gap.compare import (
     paired,
     scale_to,
     scaled,
+    slope_of,
     step_of,
     values_of,
 )
@@ -292,7 +293,7 @@ def _gauss_newton(
     for key in fitted:
         nudged = with_effect(model, name, bounded(name, {**parameters, key: parameters[key] * 1.3}))
         there = predict(case, nudged, within(nudged, base), null, twins_of(name), only)
-        columns.append((there.mean - predicted.mean) / np.log(1.3))
+        columns.append(slope_of(null, there, predicted, np.log(1.3)))
     step, _ = step_of(null, measured, predicted, np.stack(columns, axis=1))
     return {key: float(np.exp(s)) for key, s in zip(fitted, np.clip(step, -1.0, 1.0), strict=True)}
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, step_of
+from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, slope_of, step_of
 from spikecam_env.gap.fit import (
     FINAL,
     Fit,
@@ -32,10 +32,10 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-TURNS = 2
+TURNS = 4
 
 SETTLED = 0.05
-"""Largest step of a logarithm that needs no other."""
+"""Largest step of a logarithm that needs no other; nor does half of its error."""
 
 FURTHEST = 0.7
 """Largest step of a logarithm at once."""
@@ -89,7 +89,7 @@ def _refined(
         step = np.clip(step, -FURTHEST, FURTHEST)
         base = as_seen(now, within(now, found.base), null, at)
         now = moved(now, free, step)
-        if np.abs(step).max() < SETTLED:
+        if np.all(np.abs(step) < np.maximum(SETTLED, 0.5 * np.sqrt(np.diag(covariance)))):
             break
     best = confirmed(case, model, null, measured, replace(found, model=now, base=base), FINAL)
     if best.misfit > judged(null, measured, found.prediction)[1] + WORSE:
@@ -128,7 +128,7 @@ def _column(probe: Probe, model: SensorModel, at: Prediction, null: Null, name: 
     """(S,) change of the statistics for one more of a parameter's logarithm."""
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
     nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if key == candidate(name).fitted[0] else -0.2
-    return (probe(moved(model, [(name, key)], np.array([nudge]))).mean - at.mean) / nudge
+    return slope_of(null, probe(moved(model, [(name, key)], np.array([nudge]))), at, nudge)
 
 
 def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:
