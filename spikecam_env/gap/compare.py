@@ -161,6 +161,14 @@ def normal(null: Null, t: Array) -> Array:
     return np.sign(t) * -special.ndtri_exp(log_p)
 
 
+def of_all_recordings(keys: Sequence[Key], z: Array, group: str) -> Array:
+    """(n,) normal deviates of each statistic of a group over all recordings together, where z is not 0 (Stouffer): two
+    events in every recording are chance in none, and none in all."""
+    names = list(dict.fromkeys(k.name for k in keys if k.group == group))
+    of = [z[[(k.group, k.name) == (group, name) for k in keys]] for name in names]
+    return np.array([v.sum() / np.sqrt(max(int(np.count_nonzero(v)), 1)) for v in of])
+
+
 def adjusted(z: Array) -> Array:
     """(S,) two-sided p-values, by Holm's step-down for as many statistics as there are."""
     p = 2.0 * special.ndtr(-np.abs(z))
@@ -243,8 +251,8 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
 
 
 def slope_of(null: Null, there: Prediction, here: Prediction, step: float) -> Array:
-    """(S,) change of predictions over `step`, 0 where it is not clear of the twins' own noise: hundreds of statistics that
-    do not move would drown those that do (regression dilution)."""
+    """(S,) change of predictions over `step`, 0 where it is not clear of the twins' own noise: hundreds of statistics
+    that do not move would drown those that do (regression dilution)."""
     change = there.mean - here.mean
     own2 = np.maximum(own_variance(null, there), own_variance(null, here))
     return np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0) / step

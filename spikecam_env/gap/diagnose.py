@@ -35,6 +35,7 @@ from spikecam_env.gap.compare import (
     deviates,
     judged,
     misfit,
+    of_all_recordings,
     own_variance,
     residual,
     values_of,
@@ -165,7 +166,8 @@ def diagnose(
         before = model_null(case, assumed, 2) if lacking else null
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
-    if adjusted(deviates(null, of_fit(case, null, values))).min() < ALARM:
+    z = deviates(null, of_fit(case, null, values))
+    if adjusted(np.append(z, of_all_recordings(null.keys, z, "intervals"))).min() < ALARM:
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)

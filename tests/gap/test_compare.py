@@ -20,9 +20,11 @@ from spikecam_env.gap.compare import (
     misfit,
     normal,
     null_of,
+    of_all_recordings,
     paired,
     residual,
     scaled,
+    slope_of,
     spread_of,
     step_of,
     values_of,
@@ -205,3 +207,22 @@ def test_step_finds_a_parameter_within_its_error_though_statistics_go_together()
         inside += abs(step[0] - 0.4) < 1.645 * np.sqrt(covariance[0, 0])
     print(f"{inside} of 200")
     assert 0.8 < inside / 200 < 0.97
+
+
+def test_what_is_chance_in_each_recording_may_be_none_in_all():
+    keys = [Key("intervals", f"r{i}", name) for i in range(9) for name in ("short", "long")]
+    z = np.array([2.0 if k.name == "short" else 0.0 for k in keys])
+    assert of_all_recordings(keys, z, "intervals") == pytest.approx([6.0, 0.0])
+    assert of_all_recordings(keys, z, "noise").size == 0
+
+
+def test_a_slope_is_told_by_what_clearly_moves():
+    """5 of 500 statistics move by 20 noises of their own: the others say nothing, instead of noise over the step."""
+    rng = np.random.default_rng(0)
+    null = made_up(count=500)
+    moves = np.where(np.arange(500) < 5, 20.0, 0.0)
+    sharp = np.sqrt(null.sd**2 / null.twins + 1.0)
+    here, there = (Prediction(m + 0.5 * rng.standard_normal(500), sharp, null.sd) for m in (0 * moves, moves))
+    slope = slope_of(null, there, here, 0.1)
+    print(np.flatnonzero(slope), slope[:5])
+    assert list(np.flatnonzero(slope)) == [0, 1, 2, 3, 4] and slope[:5] == pytest.approx(np.full(5, 200.0), rel=0.2)

@@ -58,7 +58,8 @@ def averaged(counts: NDArray[np.int32], frame_rate_hz: float) -> tuple[Array, Ar
     first = np.arange(0, len(counts) - length + 1, length // 2)
     window = np.hanning(length)
     parts = np.stack([counts[i : i + length] for i in first]).astype(np.float64)
-    power = np.abs(np.fft.rfft((parts - parts.mean()) * window, axis=1)) ** 2 / (window**2).sum() / parts.mean()
+    scale = (window**2).sum() * max(float(parts.mean()), 1e-12)
+    power = np.abs(np.fft.rfft((parts - parts.mean()) * window, axis=1)) ** 2 / scale
     frequency = np.fft.rfftfreq(length, 1 / frame_rate_hz)
     band = np.round(24 * np.log2(np.maximum(np.arange(frequency.size), 1))).astype(int)
     _, inverse = np.unique(band[1:], return_inverse=True)
