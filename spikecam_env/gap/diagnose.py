@@ -55,7 +55,7 @@ from spikecam_env.gap.rivals import is_rival
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.structure import structure
 from spikecam_env.gap.templates import Screened, Templates, bounds, load, model_null, screen
-from spikecam_env.gap.words import sentence
+from spikecam_env.gap.words import LENT, sentence
 from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
 
@@ -88,11 +88,6 @@ UNEXPLAINED = 0.02
 
 QUIET = 0.1
 """The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
-
-LENT = (
-    "Within the errors of their fit, parameters were told by the recordings held out as well: "
-    "the gap on them is a fit, and no check."
-)
 
 PROMISE = 15.0
 """Misfit by which a fit that is not confirmed may be worse than the best that is, to be confirmed as well."""

@@ -87,6 +87,13 @@ def law(effect: str) -> str:
     return inspect.cleandoc(found.law) if found else ""
 
 
+LENT = (
+    "Within the errors of their fit, parameters were told by the recordings held out as well: "
+    "the gap on them is a fit, and no check."
+)
+"""A note on the data of a diagnosis: where the recordings to fit left something open."""
+
+
 def gap_line(gap: Gap) -> str:
     """What a model's patch did to the gap."""
     off = f"statistics are {gap.before:.3g} off the model (mean square, in noise)"
@@ -121,16 +128,16 @@ def _none(d: Diagnosis) -> str:
 
 def _named(d: Diagnosis) -> str:
     named = [f"{human(e.name)} ({_plain_sizes(e)})" if e.parameters else human(e.name) for e in d.effects]
-    return f"Your camera has {_joined(named, 'and')}{_removed(d.gap, 'it' if len(named) == 1 else 'them')}."
+    return f"Your camera has {_joined(named, 'and')}{_removed(d, 'it' if len(named) == 1 else 'them')}."
 
 
 def _class(d: Diagnosis) -> str:
     members = [human(str(name)) for name in (d.class_ or {}).get("members", ())]
-    return f"Your camera has {_joined(members, 'or')}: these recordings cannot tell which{_removed(d.gap, 'either')}."
+    return f"Your camera has {_joined(members, 'or')}: these recordings cannot tell which{_removed(d, 'either')}."
 
 
 def _unknown(d: Diagnosis) -> str:
-    least = _removed(d.gap, "an empirical patch")
+    least = _removed(d, "an empirical patch")
     return f"Your camera does something that no candidate explains{least}."
 
 
@@ -153,10 +160,12 @@ _SENTENCES = {
 }
 
 
-def _removed(gap: Gap | None, what: str) -> str:
+def _removed(d: Diagnosis, what: str) -> str:
+    gap = d.gap
     if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
         return ""
-    return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on recordings that were not used"
+    which = "the recordings held out, which told parameters too" if LENT in d.data else "recordings that were not used"
+    return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on {which}"
 
 
 def _joined(names: list[str], last: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import made_up
 import pytest
 
-from spikecam_env.gap.words import bare, quantity, sentence, unit_of
+from spikecam_env.gap.words import LENT, bare, quantity, sentence, unit_of
 from spikecam_env.sensor import CATALOGUE
 
 
@@ -52,6 +52,11 @@ def test_every_parameter_of_the_catalogue_has_a_plain_name_and_a_unit_in_words()
 )  # fmt: skip
 def test_a_sentence_says_the_verdict(verdict: str, said: str) -> None:
     assert sentence(made_up.EVERY[verdict]()) == said
+
+
+def test_a_gap_on_recordings_that_told_parameters_is_not_called_a_check() -> None:
+    lent = replace(made_up.named(), data=(LENT,))
+    assert sentence(lent).endswith("removes 97 % of the gap on the recordings held out, which told parameters too.")
 
 
 def test_two_effects_are_named_together() -> None:
