@@ -68,7 +68,9 @@ def polished(
     if leaves_nothing(null, values, sharp.prediction) or not leaves_nothing(null, values, sure.prediction):
         return sure, errors, False
     whole, known, _ = _refined(case, model, null, values, sharp, names)
-    return (whole, known, True) if agree(sharp, whole, errors) else (sure, errors, False)
+    if not agree(sharp, whole, errors):
+        return sure, errors, False
+    return replace(whole, misfit=judged(null, seen, whole.prediction)[1]), known, True
 
 
 def _refined(
