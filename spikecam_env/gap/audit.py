@@ -34,12 +34,6 @@ ODD = 0.1
 """Share of a recording's intervals that are much too short or too long, over what its rate is off by, from which spikes
 are missing or too many: light of another level makes none."""
 
-MOST = 0.5
-"""Share of the intervals that end after a gap that may be odd for it."""
-
-LEAST_ENDED = 100
-"""Intervals that such a share is taken of."""
-
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
 
@@ -237,20 +231,16 @@ def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
 def _jump_steady(o: Observation) -> tuple[int, float] | None:
     """(frame, missing): intervals that span a gap are short by it; they end within an interval after it.
 
-    A gap of half an interval makes MOST of them odd; single events do that to a few.
+    A gap of half an interval makes some of them odd, which are not timed, and lengthens the others.
     """
     interval = o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9)
     window = int(np.clip(round(interval), 4, o.frames // 8))
-    total, timed, odd, ended = (np.convolve(a, np.ones(window), "valid") for a in (o.late, o.timed, o.odd, o.frame))
+    total, timed = (np.convolve(a, np.ones(window), "valid") for a in (o.late, o.timed))
     spread = 1.4826 * float(np.median(np.abs(total - np.median(total)))) + 1e-9
     at = int(np.argmax(np.abs(total)))
     mean = float(total[at] / max(timed[at], 1))
     if abs(total[at]) > 12 * spread and abs(mean) > 0.3:
         return at, -mean
-    share = odd / np.maximum(ended, 1)
-    at = int(np.argmax(share))
-    if ended[at] > LEAST_ENDED and share[at] > MOST and np.median(share) < MOST / 5:
-        return at, 1.0
     return None
 
 

@@ -2,8 +2,9 @@
 
     read -> audit -> refit -> twins -> alarm -> [screen -> fit -> confirm -> add]* -> gate -> verdict
 
-Each step is a function of its own, usable by itself.  Held-out recordings take no part in alarm and fits; in the
-choice they decide what others cannot tell apart; the gate is on all, and the gap on them alone.
+Each step is a function of its own, usable by itself.  Held-out recordings take no part in alarm and search; in the
+choice they decide what others cannot tell apart, and within errors they tell parameters that others leave open, which
+is then said; the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations

@@ -26,9 +26,9 @@ from spikecam_env.gap.compare import (
     Null,
     Prediction,
     adjusted,
+    alarmed,
     deviates,
     misfit,
-    normal,
     null_of,
     residual,
     values_of,
@@ -50,7 +50,7 @@ UNITS = 8
 STEPS = 6
 """Gauss-Newton steps of a fit."""
 
-ALARM, GATE, GAIN, UNEXPLAINED = 0.02, 0.005, 25.0, 0.08
+ALARM, GAIN, UNEXPLAINED = 0.02, 25.0, 0.08
 """As in `diagnose`; what stays unexplained is a share of mean squares here, since many statistics are very far off."""
 
 MOST = 5
@@ -255,7 +255,7 @@ def search(
     left = list(names)
     while left and len(rounds) <= MOST:
         now = rounds[-1][0]
-        if adjusted(normal(null, now.rho)).min() >= GATE:
+        if not alarmed(null, now.rho):
             break
         with ThreadPoolExecutor(case.jobs) as pool:
             tried = list(pool.map(lambda n, start=now.state: fitted(case, start, null, values, n), left))
@@ -350,7 +350,7 @@ def concluded(
     predicted = last.predicted if last else null.mean
     square = [float(np.mean(((values - mean) / null.noise) ** 2)) for mean in (null.mean, predicted)]
     left = (square[1] - 1.0) / max(square[0] - 1.0, 1e-9)
-    significant = adjusted(normal(null, rho)).min() < GATE
+    significant = alarmed(null, rho)
     explained = not rounds or not significant or left < UNEXPLAINED
     parameters = off_usual(case, last.state) if last else {}
     effects = tuple(

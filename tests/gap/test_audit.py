@@ -129,6 +129,14 @@ def test_a_burst_of_a_few_pixels_is_no_gap_in_time(name):
     assert found(case_from(spikes)) == []
 
 
+@pytest.mark.parametrize("name, count", [("flat-0.03", 10), ("flat-0.03", 17)])
+def test_a_gap_that_makes_intervals_odd_is_found(name, count):
+    """Some half an interval: those that it shortens are odd and not timed, those that lose a spike are late."""
+    spikes = spikes_of()
+    spikes[name] = np.delete(spikes[name], slice(1000, 1000 + count), axis=0)
+    assert found(case_from(spikes)) == [("dropped", (name,))]
+
+
 def test_a_lit_recording_without_spikes_is_named():
     spikes = spikes_of()
     spikes["flat-0.2"][:] = 0
