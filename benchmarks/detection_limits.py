@@ -35,7 +35,7 @@ def measured() -> dict[str, float]:
     by_name: dict[str, list[float]] = {}
     templates = load()
     to_fit = of_fit(templates.keys)
-    for entry in templates.entries:
+    for entry in templates.weakest:
         power = 1.0 / candidate(entry.name).power
         peak = float(np.abs(entry.shift[to_fit]).max())
         strength = abs(entry.parameters[CATALOGUE[entry.name].strength])

@@ -40,6 +40,10 @@ class Case:
         """Whether no light is known: response and dark level cannot be told from the scene."""
         return not any(c.kind in KNOWN for c in self.conditions)
 
+    def use(self, recording: str) -> str:
+        """fit or holdout."""
+        return next((c.use for c in self.conditions if c.name == recording), "fit")
+
 
 @dataclass(frozen=True)
 class Twin:
@@ -98,23 +102,24 @@ def rests_on(case: Case) -> set[int]:
 def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
     """Indirect inference: shift the unit `used` so that its twins, refitted as `simulated`, are refitted as `wanted`.
 
-    The shift of a pixel is a straight line in its own response and dark level: pixel by pixel it would be tuned to the
-    noise of these very twins.  Where an effect is so strong that most pixels of the twins fall silent, it stays.
+    The shift of a pixel is a smooth function of its own response and dark level: pixel by pixel it would be tuned to
+    the noise of these very twins.  Where an effect is so strong that most pixels of the twins fall silent, it stays.
     """
     live = wanted.live & (wanted.gain > 0) & np.all([s.gain > 0 for s in simulated], axis=0)
     if live.mean() < 0.5:
         return used
     ratio = np.log(wanted.gain[live] / np.mean([s.gain[live] for s in simulated], axis=0))
-    gain = used.gain * np.exp(_line(used.gain, live, ratio))
-    dark = used.dark + _line(used.dark, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))
-    white = used.white * float(np.clip(wanted.white / np.mean([s.white for s in simulated]), 0.3, 3.0))
+    gain = used.gain * np.exp(_surface(used, live, ratio))
+    dark = used.dark + _surface(used, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))
+    white = used.white + wanted.white - float(np.mean([s.white for s in simulated]))
+    white = float(np.clip(white, 0.1 * used.white, 10.0 * used.white))
     return within(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
 
 
-def _line(x: Array, known: NDArray[np.bool_], y: Array) -> Array:
-    """(P,) least-squares line through y, of the pixels `known`, over x, outliers cut; its mean where x is one."""
+def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Array) -> Array:
+    """(P,) least-squares polynomial of second order through y, of the pixels `known`, over their gain and dark level;
+    outliers of y are cut."""
     y = np.clip(y, *np.quantile(y, [0.02, 0.98]))
-    off = x - x[known].mean()
-    square = float(np.mean(off[known] ** 2))
-    slope = float(np.mean(off[known] * y)) / square if square > 0 else 0.0
-    return np.asarray(y.mean() + slope * off, np.float64)
+    g, d = ((v - v[known].mean()) / max(float(v[known].std()), 1e-12) for v in (unit.gain, unit.dark))
+    over = np.stack([np.ones_like(g), g, d, g * g, g * d, d * d], axis=1)
+    return np.asarray(over @ np.linalg.lstsq(over[known], y)[0], np.float64)

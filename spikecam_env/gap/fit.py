@@ -120,17 +120,18 @@ def fit(
     name: str,
     start: Mapping[str, float],
     expected: Array | None = None,
+    white: float = 1.0,
 ) -> Fit:
     """Best fit of one candidate added to `model`, whose own predictions are `null`.
 
     start: parameters near the best.  expected: (S,) change of the statistics to expect there, to leave out recordings
-    that it does not concern.
+    that it does not concern.  white: s^2 of the unit there, over the refit's.
     """
     if is_pattern(name):
         return _fit_pattern(case, model, null, measured, name, start)
     if candidate(name).wanders:
         return _fit_wander(case, model, null, measured, name, dict(start))
-    return _fit_twins(case, model, null, measured, name, dict(start), expected)
+    return _fit_twins(case, model, null, measured, name, dict(start), expected, white)
 
 
 def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
@@ -158,6 +159,7 @@ def _fit_twins(
     name: str,
     parameters: dict[str, float],
     expected: Array | None,
+    white: float,
 ) -> Fit:
     """Twins at the start, made stronger until they show, scaled until the strength is right to a third and the unit has
     settled; then, with shapes, Gauss-Newton; the last step is a scaling of what was simulated, without another twin."""
@@ -165,7 +167,8 @@ def _fit_twins(
     strength = what.fitted[0]
     power = what.power
     parameters = bounded(name, parameters)
-    base = bare = within(with_effect(model, name, parameters), within(model, case.base))
+    bare = within(with_effect(model, name, parameters), within(model, case.base))
+    base = replace(bare, white=white * bare.white)
     everywhere, before = np.full(len(null.keys), np.inf), judged(null, measured, null.prediction)[1]
     only = concerned(case, [name], null, measured, everywhere if expected is None else expected)
     for turn in range(TURNS):

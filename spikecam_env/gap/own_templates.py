@@ -30,5 +30,9 @@ def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[st
     with ThreadPoolExecutor(case.jobs) as pool:
         entries = tuple(pool.map(lambda what: simulated(unit, model, null, *what), todo))
     return Templates(
-        null.keys, {c.name: c.level for c in case.conditions}, {c.name: "flat" for c in case.conditions}, entries
+        null.keys,
+        null.noise,
+        {c.name: c.level for c in case.conditions},
+        {c.name: "flat" for c in case.conditions},
+        entries,
     )

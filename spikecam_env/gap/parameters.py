@@ -2,37 +2,84 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.refit import NOISE
-from spikecam_env.gap.units import width
-from spikecam_env.sensor import SensorModel
+from spikecam_env.gap.fit import bounded, with_effect
+from spikecam_env.gap.refit import NOISE, BaseFit
+from spikecam_env.gap.units import SPREADS, spread_factor, width
+from spikecam_env.sensor import CATALOGUE, SensorModel
+
+Array = NDArray[np.float64]
 
 USUAL = 1.8
 """Units differ from nominal by up to this factor; beyond, a parameter is wrong."""
 
 
-def off_nominal(case: Case, model: SensorModel) -> dict[str, dict[str, float]]:
-    """Parameters of the model that this unit has in another amount: {effect: {measured, nominal, ratio}}."""
-    unit = model.draw_unit((128, 128), 0)
-    names = {e.name for e in model.effects}
-    live = case.base.live
-    pairs: dict[str, tuple[float, float]] = {}
-    white = float(np.mean((1 / unit.electrons if unit.shot else 0.0) + unit.kappa**2))
-    if names & set(NOISE):
-        pairs["reset_noise" if "reset_noise" in names else "shot_noise"] = (case.base.white, white)
-    if case.scenes_only:
-        names = set()
-    if "dark_current" in names:
-        pairs["dark_current"] = (float(np.median(case.base.dark[live])), float(np.median(unit.dark)))
-    if "dark_current_spread" in names:
-        pairs["dark_current_spread"] = (width(case.base.dark[live]), width(unit.dark))
-    if "conversion_gain_spread" in names:
-        pairs["conversion_gain_spread"] = (width(case.base.gain[live]), width(unit.gain))
-    found = {}
-    for name, (measured, nominal) in pairs.items():
-        ratio = measured / max(nominal, 1e-12)
-        if not 1 / USUAL < ratio < USUAL:
-            found[name] = {"measured": measured, "nominal": nominal, "ratio": ratio}
-    return found
+@dataclass(frozen=True)
+class Off:
+    """What is off.  parameters: {effect: {measured, nominal, ratio}}, each effect's strength in its own unit.
+
+    nominal: the measured unit as it would be, were those as the model has them.
+    """
+
+    parameters: dict[str, dict[str, float]]
+    nominal: BaseFit
+
+
+def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> Off:
+    """Strengths of effects in the model that the unit `base` has in another amount than units differ by."""
+    shape = (128, 128)
+    unit = model.draw_unit(shape, 0)
+    has = {e.name: e.parameters()[CATALOGUE[e.name].strength] for e in model.effects}
+    live = base.live
+    ratios: dict[str, float] = {}
+    shot = float(np.mean(1 / unit.electrons)) if unit.shot else 0.0
+    reset = float(np.mean(unit.kappa**2))
+    if has.keys() & set(NOISE) and unusual(base.white / max(shot + reset, 1e-12)):
+        if "reset_noise" in has and base.white > shot:
+            ratios["reset_noise"] = float(np.sqrt((base.white - shot) / max(reset, 1e-12)))
+        else:
+            ratios["shot_noise"] = (shot + reset) / max(base.white, 1e-12)
+        base = replace(base, white=shot + reset)
+    if not case.scenes_only:
+        level = float(np.median(base.dark[live])) / max(float(np.median(unit.dark)), 1e-12)
+        if "dark_current" in has and unusual(level):
+            ratios["dark_current"] = level
+        for what, usual in (("gain", 1.0), ("dark", level)):
+            spreads = has.keys() & SPREADS[what].keys()
+            values = getattr(base, what)
+            if spreads and unusual(width(values[live]) / max(width(getattr(unit, what)), 1e-12)):
+                factor = spread_factor(model, what, width(values[live]), shape, 0)
+                ratios |= {name: factor * usual for name in has if name in spreads}
+                base = replace(base, **{what: nearer(values, live, factor)})  # type: ignore[arg-type]
+        if "dark_current" in ratios:
+            base = replace(base, dark=base.dark / level)
+    rows = {n: {"measured": has[n] * r, "nominal": has[n], "ratio": r} for n, r in ratios.items() if n in has}
+    return Off(rows, base)
+
+
+def unusual(ratio: float) -> bool:
+    """Whether units do not differ by so much."""
+    return not 1 / USUAL < ratio < USUAL
+
+
+def nearer(values: Array, live: NDArray[np.bool_], factor: float) -> Array:
+    """Values with their distance from the median of those alive divided."""
+    middle = float(np.median(values[live]))
+    return np.maximum(middle + (values - middle) / max(factor, 1e-3), 0.0)
+
+
+def with_strengths(model: SensorModel, off: Mapping[str, Mapping[str, float]]) -> SensorModel:
+    """The model with its parameters as they were measured."""
+    for effect in model.effects:
+        if effect.name in off:
+            key = CATALOGUE[effect.name].strength
+            model = with_effect(
+                model, effect.name, bounded(effect.name, {**effect.parameters(), key: off[effect.name]["measured"]})
+            )
+    return model

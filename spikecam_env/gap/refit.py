@@ -30,13 +30,18 @@ NOISE = ("shot_noise", "reset_noise", "excess_threshold_noise")
 RESTLESS = 3.0
 """Times the median A_16 from which a pixel is left out of the jitter."""
 
+RARE = 0.1
+"""Share of pixels too silent or too bright in a recording, below which they are judged by no line: theirs rests on the
+other recordings alone, and where the response bends it is another line."""
+
 
 @dataclass(frozen=True)
 class BaseFit:
     """A unit as its recordings show it.  gain, dark: (P,) thresholds a frame at radiance 1 and in the dark.
 
     white: s^2 = 1/N + kappa^2 a spike.  gain_sd, dark_sd: (P,) standard errors.  residual: (R, P) relative distance of
-    the static recordings' rates from the line gain L + dark, in the order given; NaN where unknown.
+    the static recordings' rates from the line gain L + dark, in the order given; NaN where unknown, and for pixels
+    whose line rests on other recordings than most.
     live: (P,) pixels that respond; all where most get darker in more light, which labels are to blame for.
     """
 
@@ -64,7 +69,9 @@ def measured_base(observations: list[Observation], conditions: list[Shown]) -> B
     lines = fit_lines(light, rates, white, use)
     gain, dark = np.nan_to_num(lines.gain), np.nan_to_num(lines.dark)
     expected = gain * light + dark
-    known = ~rates.saturated & (expected > 0) & (expected < 0.95) & np.isnan(rates.limit)
+    unused = rates.saturated | np.isfinite(rates.limit)
+    alike = ~unused[use & (unused.mean(axis=1) < RARE)].any(axis=0)
+    known = ~unused & alike & (expected > 0) & (expected < 0.95)
     residual = np.where(known, rates.rate / np.where(known, expected, 1.0) - 1.0, np.nan)
     live = gain > 0.1 * np.median(gain) if np.median(gain) > 0 else np.ones(gain.shape, bool)
     return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, live)

@@ -32,6 +32,7 @@ from spikecam_env.gap.words import (
     unit_of,
 )
 from spikecam_env.page import captioned, element, page, picture, table
+from spikecam_env.sensor import CATALOGUE
 from spikecam_env.version import __version__
 from spikecam_env.whole import write_text_whole
 
@@ -203,10 +204,14 @@ def _percent(share: float) -> str:
 
 
 def _parameters_off(d: Diagnosis) -> str:
-    """One row a parameter; its columns are what the diagnosis says of it."""
-    keys = list(dict.fromkeys(key for row in d.parameters.values() for key in row))
-    rows = [(name, *(_number(row.get(key)) for key in keys)) for name, row in d.parameters.items()]
-    return table(("parameter", *map(human, keys)), rows, numbers=range(1, len(keys) + 1), stack=True)
+    """One row an effect: its strength as measured, and as the model has it."""
+    rows = []
+    for name, row in d.parameters.items():
+        key = CATALOGUE[name].strength
+        what, unit = f"{human(name)}: {bare(name, key)}", unit_of(name, key)
+        values = (quantity(row["measured"], unit), quantity(row["nominal"], unit))
+        rows.append((what, *values, _number(row["ratio"]), meaning_of(name, key)))
+    return table(("parameter", "measured", "in the model", "ratio", "meaning"), rows, numbers=(1, 2, 3), stack=True)
 
 
 def _structure_table(unknown: dict[str, Any]) -> str:

@@ -2,16 +2,18 @@
 
     python -m spikecam_env.gap.templates          rebuilds them (resumable)
 
-A template is a direction, in noise, at a strength that shows clearly.  Screening scales it to what was measured; the
-fit that follows simulates the campaign at hand and rests on no template.
+A template is a direction, in noise, at a strength that shows clearly; as statistics bend where an effect is severe,
+there are others of TIMES as much.  Screening scales the one that suits best to what was measured; the fit that follows
+simulates the campaign at hand and rests on no template.
 """
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import resources
 from itertools import product
 from pathlib import Path
@@ -24,7 +26,7 @@ from tqdm import tqdm
 
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern, of_motion
 from spikecam_env.gap.case import Case, case_of, settled, twins
-from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, of_a_pair, pooled, scale_of
+from spikecam_env.gap.compare import TOLERANCE, Null, misfit, null_of, of_a_pair, pooled, scale_of, values_of
 from spikecam_env.gap.fit import UNITS, bounded, predict, with_effect, with_pattern
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.result import Bound
@@ -45,48 +47,69 @@ SHOWS = 8.0
 PEAK = 40.0
 """Templates are taken where the statistic that shows the effect best is this many noises off."""
 
+TIMES = (8.0, 50.0)
+"""Times as strong that severe effects are simulated."""
+
+REFITTED = 3
+"""Twins that say what a model without the effect gives, refitted to a severe one."""
+
 FILE = "templates.npz"
 
 
 @dataclass(frozen=True)
 class Template:
-    """parameters: at which `shift` (S,), in noise, was simulated."""
+    """parameters: at which `shift` (S,), in noise, was simulated.  times: the strength, over the weakest of its shape.
+
+    white: s^2 of the unit, over what it is refitted as: a severe noise is first taken for the unit's own.
+    """
 
     name: str
     parameters: dict[str, float]
     shift: Array
+    times: float = 1.0
+    white: float = 1.0
 
 
 @dataclass(frozen=True)
 class Templates:
-    """keys: (S,) of the standard design's statistics.  levels: radiance of its recordings by name; kinds: of them."""
+    """keys: (S,) of the standard design's statistics; noise: (S,) theirs, of which `shift` is so many.
+
+    levels: radiance of its recordings by name; kinds: of them.
+    """
 
     keys: tuple[Key, ...]
+    noise: Array
     levels: dict[str, float]
     kinds: dict[str, str]
     entries: tuple[Template, ...]
+
+    @property
+    def weakest(self) -> tuple[Template, ...]:
+        """Those whose statistics are in proportion to the strength, and to less."""
+        return tuple(e for e in self.entries if e.times == 1.0)
 
 
 @dataclass(frozen=True)
 class Screened:
     """A candidate as its template sees it.  start: parameters to fit from.  misfit: what it would leave.
 
-    expected: (S,) change of the statistics there.
+    expected: (S,) change of the statistics there.  white: s^2 of the unit there, over the refit's.
     """
 
     name: str
     start: dict[str, float]
     misfit: float
     expected: Array
+    white: float = 1.0
 
 
 def load() -> Templates:
     """The shipped templates."""
     with resources.as_file(resources.files("spikecam_env.gap") / FILE) as path, np.load(path) as file:
         about = json.loads(str(file["about"]))
-        shifts = file["shift"].astype(np.float64)
-    entries = tuple(Template(e["name"], e["parameters"], s) for e, s in zip(about["entries"], shifts, strict=True))
-    return Templates(tuple(Key(*k) for k in about["keys"]), about["levels"], about["kinds"], entries)
+        shifts, noise = file["shift"].astype(np.float64), file["noise"].astype(np.float64)
+    entries = tuple(Template(**e, shift=s) for e, s in zip(about["entries"], shifts, strict=True))
+    return Templates(tuple(Key(*k) for k in about["keys"]), noise, about["levels"], about["kinds"], entries)
 
 
 def screen(
@@ -107,7 +130,7 @@ def screen(
     for entry in templates.entries:
         if entry.name not in names:
             continue
-        shift = np.where((at >= 0) & np.isfinite(measured), entry.shift[at], 0.0)
+        shift = np.where((at >= 0) & np.isfinite(measured), (entry.shift * templates.noise)[at] / null.noise, 0.0)
         now = (
             _scattered(entry, null, d, shift)
             if candidate(entry.name).wanders
@@ -134,7 +157,8 @@ def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Scree
     rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
     there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
     start = bounded(entry.name, {**entry.parameters, strength: there})
-    return Screened(entry.name, start, misfit(rho, null.weight), scale * shift * null.noise)
+    white = 1.0 / (1.0 + abs(scale) * (1.0 / entry.white - 1.0))
+    return Screened(entry.name, start, misfit(rho, null.weight), scale * shift * null.noise, white)
 
 
 def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
@@ -162,10 +186,10 @@ def bounds(
     d = np.nan_to_num((measured - null.mean) / null.noise)
     one = np.ones_like(d)
     found: dict[str, Bound] = {}
-    for entry in templates.entries:
+    for entry in templates.weakest:
         if entry.name not in names:
             continue
-        shift = np.where(at >= 0, entry.shift[at], 0.0)
+        shift = np.where(at >= 0, (entry.shift * templates.noise)[at] / null.noise, 0.0)
         if float(np.abs(shift).max()) < SHOWS:
             continue
         scale, sd = scale_of(d, shift, one, 0.0 * one, 2 * TOLERANCE)
@@ -207,16 +231,31 @@ def build(folder: Path, *, jobs: int = 1, only: Sequence[str] | None = None) -> 
     todo = [(n, p) for n in CATALOGUE if n in (only or CATALOGUE) for p in starts(n)]
     for name, parameters in tqdm(todo, "templates", unit="template"):
         label = "-".join([name, *(f"{k}={v:g}" for k, v in parameters.items() if k != CATALOGUE[name].strength)])
-        path = folder / f"{label}.npz"
-        if not path.exists():
-            entry = simulated(case, model, null, name, parameters)
-            with whole_file(path) as beside, beside.open("wb") as file:
-                np.savez(file, parameters=json.dumps(entry.parameters), shift=entry.shift)
-        with np.load(path) as made:
-            entries.append(Template(name, json.loads(str(made["parameters"])), made["shift"]))
+        weak = _kept(folder / f"{label}.npz", partial(simulated, case, model, null, name, parameters))
+        entries.append(weak)
+        strength = CATALOGUE[name].strength
+        for times in TIMES:
+            stronger = bounded(name, {**weak.parameters, strength: times * weak.parameters[strength]})
+            if stronger != entries[-1].parameters:
+                path = folder / f"{label}-x{times:g}.npz"
+                entries.append(_kept(path, partial(severe, case, model, null, name, stronger, times)))
     levels = {c.name: c.level for c in case.conditions}
     kinds = {c.name: c.kind for c in case.conditions}
-    return Templates(null.keys, levels, kinds, tuple(entries))
+    return Templates(null.keys, null.noise, levels, kinds, tuple(entries))
+
+
+def _kept(path: Path, make: Callable[[], Template]) -> Template:
+    """The template in a file, made and written if there is none."""
+    if not path.exists():
+        entry = make()
+        with whole_file(path) as beside, beside.open("wb") as file:
+            np.savez(file, about=json.dumps(_about(entry)), shift=entry.shift)
+    with np.load(path) as made:
+        return Template(**json.loads(str(made["about"])), shift=made["shift"])
+
+
+def _about(entry: Template) -> dict[str, Any]:
+    return {"name": entry.name, "parameters": entry.parameters, "times": entry.times, "white": entry.white}
 
 
 def save(templates: Templates, path: Path) -> None:
@@ -225,11 +264,11 @@ def save(templates: Templates, path: Path) -> None:
         "keys": templates.keys,
         "levels": templates.levels,
         "kinds": templates.kinds,
-        "entries": [{"name": e.name, "parameters": e.parameters} for e in templates.entries],
+        "entries": [_about(e) for e in templates.entries],
     }
     shift = np.clip([e.shift for e in templates.entries], -6e4, 6e4).astype(np.float16)
     with whole_file(path) as beside, beside.open("wb") as file:
-        np.savez_compressed(file, about=json.dumps(about), shift=shift)
+        np.savez_compressed(file, about=json.dumps(about), shift=shift, noise=templates.noise.astype(np.float32))
 
 
 def standard_case(jobs: int = 1, seed: int = SEED, count: int = 12) -> tuple[Case, SensorModel, Null]:
@@ -310,6 +349,24 @@ def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters:
         now = then
         shift = _shift(case, model, null, name, now)
     return Template(name, now, shift)
+
+
+def severe(
+    case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float], times: float
+) -> Template:
+    """A candidate's template where the unit's own refit is led astray: its campaign as if it were a measurement."""
+    there = with_effect(model, name, parameters)
+    if is_pattern(name):
+        return Template(name, dict(parameters), _shift(case, model, null, name, parameters), times)
+    seed = case.seed * 1000 + 7
+    made = simulate(there, within(there, case.base), case.conditions, case.shape, seed)
+    seen = case_of(case.shape, case.conditions, made, case.seed, case.jobs, case.frame_rate_hz)
+    without = twins(seen, model, within(model, seen.base), range(REFITTED))
+    mean = np.mean([values_of(t.bank, null.keys) for t in without], axis=0)
+    shift = np.nan_to_num((values_of(seen.bank, null.keys) - mean) / null.noise)
+    of_pattern = np.array([k.group == "pattern" for k in null.keys])
+    white = float(min(case.base.white / seen.base.white, 1.0))
+    return Template(name, dict(parameters), np.where(of_pattern, 0.0, shift), times, white)
 
 
 def _shift(

@@ -15,11 +15,12 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-
-_SPREADS = {
+SPREADS = {
     "gain": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
     "dark": {"dark_current_spread": "sigma_pA"},
 }
+"""Parameters that make pixels differ, by effect and by what of a unit differs."""
+
 WITHIN = (0.6, 1.67)
 """Units' spreads lie within this of the model's; beyond, it is a gap."""
 
@@ -40,25 +41,26 @@ def drawn_banks(
 def _rescaled(
     model: SensorModel, nominal: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int
 ) -> SensorModel:
-    unit = model.draw_unit(shape, seed)
     out = model
-    for what, spreads in _SPREADS.items():
-        here = {e.name: e for e in model.effects if e.name in spreads}
-        if not here:
-            continue
-        wanted, whole = width(getattr(base, what)[base.live]), width(getattr(unit, what))
-        rest = model
-        for name in here:
-            rest = rest.without(name)
-        others = width(getattr(rest.draw_unit(shape, seed), what))
-        own = whole**2 - others**2
-        factor = np.sqrt(max(wanted**2 - others**2, 0.0) / own) if own > 1e-10 else 1.0
-        for name, effect in here.items():
-            key = spreads[name]
-            first = next(e for e in nominal.effects if e.name == name).parameters()[key]
-            value = float(np.clip(effect.parameters()[key] * factor, WITHIN[0] * first, WITHIN[1] * first))
-            out = out.with_effect(replace(effect, **{key: value}))
+    for what, spreads in SPREADS.items():
+        factor = spread_factor(model, what, width(getattr(base, what)[base.live]), shape, seed)
+        for effect in model.effects:
+            if effect.name in spreads:
+                key = spreads[effect.name]
+                first = next(e for e in nominal.effects if e.name == effect.name).parameters()[key]
+                value = float(np.clip(effect.parameters()[key] * factor, WITHIN[0] * first, WITHIN[1] * first))
+                out = out.with_effect(replace(effect, **{key: value}))
     return out
+
+
+def spread_factor(model: SensorModel, what: str, wanted: float, shape: tuple[int, int], seed: int) -> float:
+    """By how much to multiply all spreads of `what` (gain or dark) that a model has, for a relative width `wanted`."""
+    rest = model
+    for name in {e.name for e in model.effects} & SPREADS[what].keys():
+        rest = rest.without(name)
+    whole, others = (width(getattr(m.draw_unit(shape, seed), what)) for m in (model, rest))
+    own = whole**2 - others**2
+    return float(np.sqrt(max(wanted**2 - others**2, 0.0) / own)) if own > 1e-10 else 1.0
 
 
 def width(values: Array) -> float:

@@ -133,7 +133,9 @@ def _named(d: Diagnosis) -> str:
 
 def _class(d: Diagnosis) -> str:
     members = [human(str(name)) for name in (d.class_ or {}).get("members", ())]
-    return f"Your camera has {_joined(members, 'or')}: these recordings cannot tell which{_removed(d, 'either')}."
+    beside = [human(e.name) for e in d.effects if human(e.name) not in members]
+    said = _joined([*beside, _joined(members, "or")], "and")
+    return f"Your camera has {said}: these recordings cannot tell which{_removed(d, 'them' if beside else 'either')}."
 
 
 def _unknown(d: Diagnosis) -> str:
@@ -142,7 +144,13 @@ def _unknown(d: Diagnosis) -> str:
 
 
 def _parameter(d: Diagnosis) -> str:
-    return f"No effect is missing, but {_joined(list(d.parameters), 'and')} of the model {d.model_name} is off."
+    off = [_off(effect, row) for effect, row in d.parameters.items()]
+    return f"No effect is missing, but parameters of the model {d.model_name} are off: {_joined(off, 'and')}."
+
+
+def _off(effect: str, row: dict[str, float]) -> str:
+    unit = unit_of(effect, CATALOGUE[effect].strength)
+    return f"{human(effect)} is {quantity(row['measured'], unit)}, not {quantity(row['nominal'], unit)}"
 
 
 def _data(d: Diagnosis) -> str:

@@ -196,8 +196,8 @@ def unknown() -> Diagnosis:
 def parameter() -> Diagnosis:
     """An effect that is present is off."""
     return _plain(
-        "parameter", "No effect is missing, but shot noise is off: 31000 quanta fit, the model has 50000.",
-        parameters={"shot_noise.quanta": {"model": 50000.0, "value": 31000.0, "sd": 800.0}},
+        "parameter", "No effect is missing, but shot noise is off: 31000 electrons fit, the model has 50000.",
+        parameters={"shot_noise": {"measured": 31000.0, "nominal": 50000.0, "ratio": 0.62}},
         gap=gap(9.0, 1.2), statistics=statistics({"noise": 17.0}), evidence=evidence("dead_time"),
     )  # fmt: skip
 

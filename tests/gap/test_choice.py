@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from small import MODEL, unit
+from small import MODEL, effect, recorded, unit
 
+from spikecam_env.gap import search
 from spikecam_env.gap.compare import Draw, Null, Prediction, judged
-from spikecam_env.gap.diagnose import PROMISE, chosen_of, explains, settle
 from spikecam_env.gap.fit import Fit
+from spikecam_env.gap.search import PROMISE, Round, chosen_of, revisited, settle
 from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.verdict import explains
 
 COUNT, TWINS = 200, 12
 FIT = np.arange(COUNT) < 150
@@ -93,3 +95,38 @@ def test_an_effect_that_moves_what_agreed_is_contradicted():
     n = null()
     loud = np.where(np.arange(COUNT) < 50, 100.0, 0.5)
     assert not explains(n, loud, np.where(np.arange(COUNT) == 100, 9.0, 0.5))
+
+
+def test_beside_a_later_effect_a_runner_up_may_take_the_earlier_ones_place(monkeypatch):
+    """A wrong first effect stood for part of the second; with the second there, the right one explains more."""
+    n, change, values, seen = campaign()
+    late = np.where((np.arange(COUNT) >= 100) & FIT, 4.0, 0.0)
+    half = np.where(np.arange(COUNT) < 25, 4.0, 0.0)
+    values, seen = values + late, seen + late
+    two = MODEL.with_effect(effect("dead_time", tau_us=0.5)).with_effect(effect("crosstalk", kick=1e-3))
+    right = MODEL.with_effect(effect("comparator_delay", delay_us=0.5)).with_effect(effect("crosstalk", kick=1e-3))
+    made = {
+        two: a_fit(n, "crosstalk", half + late, seen).prediction,
+        right: a_fit(n, "comparator_delay", change + late, seen).prediction,
+        two.without("dead_time"): a_fit(n, "crosstalk", late, seen).prediction,
+    }
+
+    def confirm(case, model, here, measured, found):
+        rho, left = judged(here, measured, made[found.model])
+        return replace(found, prediction=made[found.model], rho=rho, misfit=left)
+
+    monkeypatch.setattr(search, "confirmed", confirm)
+    monkeypatch.setattr(search, "resettled", lambda case, null, found, model: replace(found, model=model))
+    monkeypatch.setattr(
+        search, "fit", lambda case, model, here, measured, name, start: replace(best, name=name, model=right)
+    )
+    best = replace(a_fit(n, "crosstalk", half + late, seen), model=two)
+    first, other = (replace(best, name=name) for name in ("dead_time", "comparator_delay"))
+    turn = Round(
+        MODEL, unit(), n.prediction, values, 500.0, (replace(first, misfit=300.0), replace(other, misfit=340.0))
+    )
+    now, then = revisited(recorded(), MODEL, n, seen, values, best, turn)
+    assert now.name == "crosstalk" and now.model == right
+    assert [f.name for f in then.fits] == ["comparator_delay", "dead_time"] and then.rivals == ()
+    far = replace(turn, fits=(replace(first, misfit=300.0), replace(other, misfit=480.0)))
+    assert revisited(recorded(), MODEL, n, seen, values, best, far) == (best, far), "it explained too little"

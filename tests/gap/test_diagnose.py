@@ -114,6 +114,16 @@ def test_a_wrong_label_is_the_datas_fault(clean, tmp_path):
     assert found.to_json()["data"] == list(found.data)
 
 
+def test_a_parameter_that_is_off_is_set_and_shrinks_the_gap(tmp_path):
+    found = asked(written(tmp_path / "noisy", MODEL.with_effect(effect("reset_noise", sigma_mV=19.1))))
+    assert found.verdict == "parameter" and list(found.parameters) == ["reset_noise"]
+    row = found.parameters["reset_noise"]
+    assert row["measured"] == pytest.approx(19.1, rel=0.1) and row["nominal"] == 6.36
+    assert row["ratio"] == pytest.approx(row["measured"] / row["nominal"])
+    assert next(e for e in found.patched.effects if e.name == "reset_noise").sigma_mV == row["measured"]
+    assert found.gap is not None and found.gap.removed > 0.9
+
+
 @pytest.mark.parametrize("which", ["named", "nothing"])
 def test_json_has_the_documented_entries(which, request, tmp_path):
     diagnosis = request.getfixturevalue(which)

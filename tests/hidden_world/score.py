@@ -115,7 +115,8 @@ def score_case(key: Json, result: Json) -> Scored:
     named = names if verdict in ("named", "class", "parameter") else ()
     hidden = {h["name"]: h for h in key["recipe"]["hidden"]}
     found = tuple(t for t in truth if any(stands_for(name, t) for name in named))
-    spurious = tuple(name for name in named if not any(stands_for(name, t) for t in truth))
+    excused = _class_of_truth(diagnosis, truth)
+    spurious = tuple(name for name in named if not any(stands_for(name, t) for t in truth) and name not in excused)
     right = _accepted(key["accept"], diagnosis) if key["accept"] else _named_right(verdict, named, truth)
     removed = (diagnosis.get("gap") or {}).get("removed")
     return Scored(
@@ -141,6 +142,12 @@ def _named_right(verdict: str, named: Sequence[str], truth: Sequence[str]) -> bo
     if verdict == "class":
         return any(t in named for t in truth) and any(set(named) <= same for same in INSEPARABLE)
     return bool(named) and all(any(stands_for(n, t) for t in truth) for n in named) and _all_found(named, truth)
+
+
+def _class_of_truth(diagnosis: Json, truth: Sequence[str]) -> set[str]:
+    """Members of a class that holds a true name, and none that can be told from it."""
+    members = set((diagnosis.get("class") or {}).get("members") or [])
+    return members if members & set(truth) and any(members <= same for same in INSEPARABLE) else set()
 
 
 def _all_found(named: Sequence[str], truth: Sequence[str]) -> bool:

@@ -1,0 +1,234 @@
+"""Forward selection: the effect that explains most is fitted, confirmed and added, while something is left.
+
+    [screen -> fit -> confirm -> add -> revisit the earlier ones -> polish all]*
+
+Held-out recordings take no part but in the choice between what others cannot tell apart, and, within errors, in
+parameters that others leave open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates import is_pattern, of_motion
+from spikecam_env.gap.case import Case
+from spikecam_env.gap.compare import (
+    TOLERANCE,
+    Null,
+    Prediction,
+    alarmed,
+    judged,
+    misfit,
+    own_variance,
+    residual,
+)
+from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined, resettled
+from spikecam_env.gap.polish import Errors, polished
+from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.gap.rivals import is_rival
+from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
+from spikecam_env.gap.templates import Screened, Templates, screen
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+LOUD = 6.0
+"""Noises by which a statistic of the pattern, or of motion, has to stand out for its effects to be tried."""
+
+FEWEST, TRIED = 3, 5
+"""Candidates fitted a round, the best by their templates: so many at least and at most."""
+
+MOST = 3
+"""Effects that one diagnosis names together."""
+
+GAIN = 12.0
+"""Misfit that an effect has to remove to be added."""
+
+LITTLE = (0.2, 0.5)
+"""Share of what is beyond chance that the first effect, and each later one of what the others left, has to remove for
+another to be looked for beside them: less is a stand-in's."""
+
+PROMISE = 15.0
+"""Misfit by which a fit that is not confirmed may be worse than the best that is, to be confirmed as well."""
+
+RETRIED, NEAR = 4, 0.25
+"""Runners-up of an effect that are tried anew beside a later one: so many at most, and of what it removed the share
+that they have to have removed."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One turn of the search: the model it started from, what that left, and the candidates that were fitted.
+
+    rivals: names that may as well be true as the best of them.  lent: whether held-out recordings were fitted too.
+    """
+
+    model: SensorModel
+    base: BaseFit
+    prediction: Prediction
+    rho: Array
+    misfit: float
+    fits: tuple[Fit, ...]
+    rivals: tuple[str, ...] = ()
+    lent: bool = False
+
+
+def of_fit(case: Case, null: Null, values: Array) -> Array:
+    """(S,) values of recordings of use fit; NaN for the held-out ones, which take no part in the search."""
+    return np.where([case.use(k.recording) == "fit" for k in null.keys], values, np.nan)
+
+
+def search(
+    case: Case, model: SensorModel, null: Null, values: Array, names: Sequence[str], templates: Templates
+) -> list[Round]:
+    """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps.
+
+    values: (S,) of all recordings; those held out decide between rivals, and tell parameters that others leave open.
+    """
+    rounds: list[Round] = []
+    seen = of_fit(case, null, values)
+    chance = float(np.sum(null.weight * np.isfinite(seen)))
+    now, base, prediction = model, within(model, case.base), null.prediction
+    while len(rounds) < MOST:
+        rho = residual(null, seen, prediction)
+        if rounds and not alarmed(null, rho):
+            break
+        here = standing_on(null, prediction)
+        left_over = judged(here, seen, here.prediction)[1]
+        left = [n for n in names if n not in {e.name for e in now.effects}]
+        screened = screen(templates, case.conditions, here, seen, left, line_of(case))
+        distance = np.nan_to_num((seen - here.mean) / here.noise)
+        tried = worth_fitting(screened, misfit(distance, here.weight), loud(here, distance))
+        with ThreadPoolExecutor(case.jobs) as pool:
+            fits = list(pool.map(partial(_fitted, case, now, here, seen), tried))
+        sure, rest = settle(fits, partial(confirmed, case, now, here, seen))
+        sure, rivals = chosen_of(null, here, seen, values, sure)
+        rounds.append(Round(now, base, prediction, rho, left_over, (*sure, *rest), rivals))
+        if not sure or left_over - sure[0].misfit < GAIN:
+            break
+        best = sure[0]
+        earlier = [r.fits[0].name for r in rounds[:-1]]
+        if earlier:
+            best = rejoined(case, model, null, seen, best, earlier)
+            for i, turn in enumerate(rounds[:-1]):
+                if turn.fits[0].name in {e.name for e in best.model.effects}:
+                    best, rounds[i] = revisited(case, model, null, seen, values, best, turn)
+            earlier = [r.fits[0].name for r in rounds[:-1]]
+        names_now = [n for n in (*earlier, best.name) if n in {e.name for e in best.model.effects}]
+        best, errors, lent = polished(case, model, null, seen, values, best, names_now)
+        rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]), lent=lent)
+        rounds = [with_errors(r, errors) for r in rounds]
+        now, base, prediction = best.model, best.base, best.prediction
+        if left_over - sure[0].misfit < LITTLE[len(rounds) > 1] * (left_over - chance):
+            break
+    rho, left_over = judged(null, seen, prediction)
+    rounds.append(Round(now, base, prediction, rho, left_over, ()))
+    return rounds
+
+
+def with_errors(turn: Round, errors: Errors) -> Round:
+    """The round with its effect's errors as they were found last, together with all others."""
+    best = turn.fits[0]
+    return replace(turn, fits=(replace(best, sd=errors.get(best.name) or best.sd), *turn.fits[1:]))
+
+
+def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:
+    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, two
+    at least, until one, as much better as that made the others, still stands PROMISE above the best."""
+    waiting, sure, better = sorted(fits, key=lambda f: f.misfit), list[Fit](), 0.0
+    while waiting and (len(sure) < 2 or waiting[0].misfit - better < min(f.misfit for f in sure) + PROMISE):
+        sure.append(confirm(waiting[0]))
+        better = max(better, waiting.pop(0).misfit - sure[-1].misfit)
+    return sorted(sure, key=lambda f: f.misfit), waiting
+
+
+def chosen_of(
+    null: Null, here: Null, seen: Array, values: Array, sure: Sequence[Fit]
+) -> tuple[list[Fit], tuple[str, ...]]:
+    """(fits, the chosen one first; names of its rivals).  What may as well be true as the first, by the recordings to
+    fit (`seen`), is put in order by all recordings (`values`), and has to remain a rival by them."""
+    if not sure:
+        return [], ()
+    close = [f for f in sure if f is sure[0] or is_rival(here, null.draws, seen, sure[0].prediction, f.prediction)]
+    close.sort(key=lambda f: judged(here, values, f.prediction)[1])
+    best = close[0]
+    left = residual(here, values, best.prediction)
+    rivals = [
+        f.name
+        for f in close[1:]
+        if is_rival(here, null.draws, values, best.prediction, f.prediction)
+        and (alarmed(here, left) or not alarmed(here, residual(here, values, f.prediction)))
+    ]
+    return [*close, *(f for f in sure if f not in close)], tuple(rivals)
+
+
+def revisited(
+    case: Case, model: SensorModel, null: Null, seen: Array, values: Array, best: Fit, turn: Round
+) -> tuple[Fit, Round]:
+    """(fit, round) with the effect of an earlier round put against its runners-up again, now that `best` has another
+    beside it: alone, a wrong one may have stood for both."""
+    first = turn.fits[0]
+    least = turn.misfit - NEAR * (turn.misfit - first.misfit)
+    has = {e.name for e in best.model.effects}
+    others = sorted((f for f in turn.fits if f.name not in has and f.misfit < least), key=lambda f: f.misfit)[:RETRIED]
+    if not others:
+        return best, turn
+    rest = best.model.without(first.name)
+    here = standing_on(null, confirmed(case, model, null, seen, resettled(case, null, best, rest)).prediction)
+    with ThreadPoolExecutor(case.jobs) as pool:
+        fits = list(pool.map(lambda f: fit(case, rest, here, seen, f.name, f.parameters), others))
+    confirm = partial(confirmed, case, rest, here, seen)
+    sure = [confirm(replace(best, name=first.name)), *settle(fits, confirm)[0]]
+    sure, rivals = chosen_of(null, here, seen, values, sorted(sure, key=lambda f: f.misfit))
+    name = sure[0].name
+    order = sorted(turn.fits, key=lambda f: f.name != name)
+    if name != first.name:
+        best = replace(sure[0], name=best.name, parameters=best.parameters, sd=best.sd)
+    return best, replace(turn, fits=tuple(order), rivals=rivals)
+
+
+def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screened) -> Fit:
+    return fit(case, model, null, values, s.name, s.start, s.expected, s.white)
+
+
+def standing_on(null: Null, predicted: Prediction) -> Null:
+    """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
+    law = TOLERANCE * (predicted.mean - null.mean)
+    floor = np.sqrt(null.floor**2 + law**2 + own_variance(null, predicted))
+    return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, draws=predicted.draws)
+
+
+def line_of(case: Case) -> float | None:
+    """Frequency [Hz] of the strongest line in steady light; None where no line stands out."""
+    both = zip(case.conditions, case.observations, strict=True)
+    steady = [o.frame for c, o in both if not c.moves and c.use == "fit"]
+    lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > 1000]
+    (ratio, at), frame = max(lines, key=lambda line: line[0][0], default=((0.0, 0), np.zeros(1)))
+    return frequency(frame, at) * case.frame_rate_hz if ratio > 30 else None
+
+
+def worth_fitting(screened: Sequence[Screened], before: float, loud: Collection[str] = ()) -> list[Screened]:
+    """The best by their templates, FEWEST and those that explain half of what the best does.  before: misfit of none.
+
+    loud: groups of statistics that stand out.  Where the pattern does, with the two best of those that only change it,
+    whose statistics are not in proportion to their strength; where motion does, with all that show by it alone, whose
+    templates are of other pictures.
+    """
+    if not screened:
+        return []
+    best = before - screened[0].misfit
+    tried = [s for i, s in enumerate(screened[:TRIED]) if i < FEWEST or before - s.misfit > 0.5 * best]
+    also = [s for s in screened if is_pattern(s.name)][:2] if "pattern" in loud else []
+    also += [s for s in screened if of_motion(s.name)] if {"moving", "step"} & set(loud) else []
+    return tried + [s for s in also if s not in tried]
+
+
+def loud(null: Null, distance: Array) -> set[str]:
+    """Groups of which a statistic stands out by itself."""
+    return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) > LOUD}

@@ -1,0 +1,191 @@
+"""From a search to a verdict: what is named, what is left, and the gap on recordings that were held out."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.audit import Contradiction
+from spikecam_env.gap.candidates import candidate
+from spikecam_env.gap.case import Case
+from spikecam_env.gap.compare import (
+    Null,
+    Prediction,
+    adjusted,
+    alarmed,
+    deviates,
+    misfit,
+    residual,
+)
+from spikecam_env.gap.fit import Fit
+from spikecam_env.gap.missing import Missing
+from spikecam_env.gap.parameters import Off, with_strengths
+from spikecam_env.gap.place import when, where
+from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.search import Round
+from spikecam_env.gap.structure import structure
+from spikecam_env.gap.words import LENT
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+SURE = 0.002
+"""Adjusted p-value below which a discrepancy is unknown where no candidate takes it up; above, it may be chance."""
+
+UNEXPLAINED = 0.02
+"""Share of the evidence that may stay unexplained when something is named."""
+
+QUIET = 0.1
+"""The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
+
+
+def explains(null: Null, before: Array, rho: Array) -> bool:
+    """Whether residuals `rho` are chance; or, beside those of the model as given, little and quiet, and none that was
+    not there, which would contradict what was added."""
+    by_chance = float(np.sum(null.weight * np.ones(len(rho))))
+    left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
+    quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
+    contradicted = alarmed(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0))
+    return not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet and not contradicted)
+
+
+def concluded(
+    case: Case,
+    model: SensorModel,
+    null: Null,
+    given: Array,
+    values: Array,
+    lacking: Sequence[Missing],
+    off: Off,
+    rounds: Sequence[Round],
+    contradictions: Sequence[Contradiction],
+    untestable: Sequence[tuple[str, str]],
+) -> Diagnosis:
+    """From the search to a verdict.  given: (S,) predictions of the model as it was given."""
+    z = deviates(replace(null, mean=given), values)
+    p = adjusted(z)
+    before = residual(null, values, null.prediction)
+    last = rounds[-1] if rounds else None
+    kept = {e.name: e for e in last.model.effects} if last else {}
+    turns = [r for r, after in itertools.pairwise(rounds) if after.model is not r.model and r.fits[0].name in kept]
+    found = [replace(r.fits[0], parameters={k: kept[r.fits[0].name].parameters()[k] for k in r.fits[0].parameters})
+             for r in turns]  # fmt: skip
+    rho = residual(null, values, last.prediction) if last else before
+    predicted = last.prediction.mean if last else null.mean
+    explained = explains(null, before, rho)
+    chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
+    place, time_ = where(case), when(case)
+    share = lambda f: gap_of(case, null, values, given, f.prediction).removed  # noqa: E731
+    others = lambda r: {o.name: share(o) for o in r.fits[1:] if len(o.prediction.draws) > 1}  # noqa: E731
+    effects = tuple(
+        replace(named(f, r, null, values), where=place, when=time_, instead=others(r))
+        for f, r in zip(found, turns, strict=True)
+    )
+    unsure = [(f.name, r.rivals) for f, r in zip(found, turns, strict=True) if r.rivals]
+    if explained or chance or not rounds:
+        effects = (*(named_missing(m) for m in lacking), *effects)
+    unknown, class_ = None, None
+    if contradictions:
+        verdict = "data"
+    elif rounds and not chance and not (found and explained):
+        verdict, effects = "unknown", ()
+        unknown = {**structure(case, null, before), "best_candidate": found[0].name if found else None}
+    elif unsure and not lacking:
+        verdict = "class"
+        name, rivals = unsure[0]
+        class_ = {"members": [name, *rivals], "experiment": candidate(name).experiment}
+    elif found or lacking:
+        verdict = "named"
+    else:
+        verdict = "parameter" if off.parameters else "none"
+    return Diagnosis(
+        verdict=verdict,
+        sentence="",
+        effects=effects,
+        unknown=unknown,
+        class_=class_,
+        parameters=off.parameters,
+        data=(*(c.text for c in contradictions), *([LENT] if any(r.lent for r in turns) else [])),
+        gap=gap_of(case, null, values, given, last.prediction if last else null.prediction),
+        statistics=table(case, null, values, given, z, p, predicted, rho),
+        ranking=tuple(ranked(f, r, f is r.fits[0] and any(r is t for t in turns)) for r in rounds for f in r.fits),
+        not_testable=tuple(untestable),
+        bounds=(),
+        patched=with_strengths(last.model if last else model, off.parameters),
+        model_name=model.name,
+        campaign="",
+        seed=case.seed,
+        stages={},
+    )
+
+
+def named_missing(found: Missing) -> NamedEffect:
+    """An effect of the base pixel, as the refit measured it."""
+    effect = found.effect
+    key = type(effect).strength
+    estimate = {key: Estimate(effect.parameters()[key], found.sd)}
+    share = 0.99 / (1 + len(found.also))
+    rivals = tuple((name, share) for name in found.also)
+    return NamedEffect(effect.name, candidate(effect.name).family, share, estimate, rivals)
+
+
+def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
+    """A candidate as the diagnosis names it, with its rivals and the share of the gap that each would remove."""
+    rivals = [(f, float(np.exp(-max(f.misfit - found.misfit, 0.0) / 2))) for f in turn.fits if f.name != found.name]
+    total = 1.0 + sum(w for _, w in rivals)
+    parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
+    return NamedEffect(
+        found.name,
+        candidate(found.name).family,
+        min(1.0 / total, 0.99),
+        parameters,
+        tuple((f.name, w / total) for f, w in rivals),
+    )
+
+
+def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
+    """A row of the ranking."""
+    before = turn.misfit
+    parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
+    worst = float(np.abs(found.rho).max())
+    reason = f"leaves {worst:.1f} noises at worst" if found.misfit < before else "explains nothing"
+    return Ranked(found.name, candidate(found.name).family, before, found.misfit, parameters, accepted, reason)
+
+
+def gap_of(case: Case, null: Null, values: Array, given: Array, after: Prediction) -> Gap:
+    """Mean square distance on held-out recordings, in the noise that each model predicts."""
+    use = np.array([case.use(k.recording) for k in null.keys])
+    held = use == "holdout" if np.any(use == "holdout") else np.ones(len(use), bool)
+    wider = np.sqrt(np.maximum(after.spread**2 - null.sd**2, 0.0) + null.noise**2)
+    b, a = (np.nan_to_num((values - mean) / sd) ** 2 for mean, sd in ((given, null.noise), (after.mean, wider)))
+    by = {}
+    for c in case.conditions:
+        of = np.array([k.recording == c.name for k in null.keys])
+        if np.any(of):
+            by[c.name] = {"before": float(b[of].mean()), "after": float(a[of].mean()), "floor": 1.0}
+    before, then = float(b[held].mean()), float(a[held].mean())
+    return grounded(Gap(before, then, 1.0, 0.0, by), 1.0)
+
+
+def grounded(gap: Gap, floor: float) -> Gap:
+    """A gap with its floor: what two halves of the measurement differ by, or 1 where there are no halves."""
+    ground = floor if np.isfinite(floor) else 1.0
+    removed = (gap.before - gap.after) / (gap.before - ground) if gap.before > 1.5 * ground else 0.0
+    by = {name: {**values, "floor": ground} for name, values in gap.by_recording.items()}
+    return Gap(gap.before, gap.after, ground, removed, by)
+
+
+def table(
+    case: Case, null: Null, values: Array, given: Array, z: Array, p: Array, after: Array, rho: Array
+) -> tuple[Statistic, ...]:
+    """The bank as the result states it."""
+    return tuple(
+        Statistic(f"{k.group}: {k.name}", k.group, (k.recording,), float(values[j]), float(given[j]),
+                  float(after[j]), float(null.noise[j]), float(z[j]), float(rho[j]), float(p[j]),
+                  case.use(k.recording) == "holdout")
+        for j, k in enumerate(null.keys)
+    )  # fmt: skip
