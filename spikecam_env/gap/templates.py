@@ -69,6 +69,12 @@ class Template:
     times: float = 1.0
     white: float = 1.0
 
+    @property
+    def shape(self) -> tuple[str, frozenset[Any]]:
+        """Name and all parameters but the strength."""
+        strength = CATALOGUE[self.name].strength
+        return self.name, frozenset((key, value) for key, value in self.parameters.items() if key != strength)
+
 
 @dataclass(frozen=True)
 class Templates:
@@ -120,13 +126,13 @@ def screen(
     names: Sequence[str],
     line_hz: float | None = None,
 ) -> list[Screened]:
-    """Candidates by what their best template, scaled, would leave unexplained; least first.
+    """Candidates by what their best template of each shape, scaled, would leave unexplained; least first.
 
     line_hz: frequency of the strongest line of the measured spectra, to start periodic candidates from.
     """
     at = _places(templates, conditions, null.keys)
     d = np.nan_to_num((measured - null.mean) / null.noise)
-    best: dict[str, Screened] = {}
+    best: dict[tuple[str, frozenset[Any]], Screened] = {}
     for entry in templates.entries:
         if entry.name not in names:
             continue
@@ -142,8 +148,8 @@ def screen(
             continue
         if line_hz and "frequency_hz" in entry.parameters:
             now = replace(now, start=bounded(entry.name, {**now.start, "frequency_hz": line_hz}))
-        if entry.name not in best or now.misfit < best[entry.name].misfit:
-            best[entry.name] = now
+        if entry.shape not in best or now.misfit < best[entry.shape].misfit:
+            best[entry.shape] = now
     return sorted(best.values(), key=lambda s: s.misfit)
 
 
