@@ -34,7 +34,7 @@ class BlindTrial:
     jobs: int = 1
     """Processes."""
     only: list[str] = field(default_factory=list)
-    """Groups: none, strong, weak, base, outside, left_out, pair, tricky; default all."""
+    """Groups: none, strong, weak, base, outside, left_out, pair, tricky, severe; default all."""
     limit: int | None = None
     """At most so many cases of each group."""
     keep: bool = False

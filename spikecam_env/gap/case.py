@@ -20,6 +20,10 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
+HIDDEN = 0.5
+"""Share of a refit's s^2 that is the unit's own, below which it stays: beside so much noise of an effect, the refit of
+twins does not tell it (`polish` does, by all statistics)."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -112,7 +116,7 @@ def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Seque
     gain = used.gain * np.exp(_surface(used, live, ratio))
     dark = used.dark + _surface(used, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))
     white = used.white + wanted.white - float(np.mean([s.white for s in simulated]))
-    white = float(np.clip(white, 0.1 * used.white, 10.0 * used.white))
+    white = used.white if used.white < HIDDEN * wanted.white else max(white, 0.1 * used.white)
     return within(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
 
 

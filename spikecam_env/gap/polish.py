@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.case import Case
+from spikecam_env.gap.case import HIDDEN, Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, slope_of, step_of
 from spikecam_env.gap.fit import (
     FINAL,
@@ -27,7 +27,7 @@ from spikecam_env.gap.fit import (
     with_held_out,
     with_pattern,
 )
-from spikecam_env.gap.refit import within
+from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -43,8 +43,11 @@ FURTHEST = 0.7
 WORSE = 3.0
 """Misfit by which a step may seem worse, by chance of the draws."""
 
-Probe = Callable[[SensorModel], Prediction]
-"""What a model gives."""
+WHITE = ("the unit", "white")
+"""The unit's own s^2, among parameters by effect and name, where an effect hides it."""
+
+Probe = Callable[[SensorModel, BaseFit], Prediction]
+"""What a model and a unit give."""
 
 AGREE = 3.0
 """Errors by which a parameter may move when held-out recordings are fitted as well, for them to agree."""
@@ -81,16 +84,17 @@ def _refined(
     What wanders is left as it was fitted, since one twin has no direction of it.
     """
     free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
+    free += [WHITE] if 0 < found.base.white < HIDDEN * case.base.white else []
     probe = _probe(case, null, measured, found, names)
     now, base = found.model, found.base
     columns, covariance = np.zeros((len(measured), len(free))), np.zeros((len(free), len(free)))
     for _ in range(TURNS if free else 0):
-        at = probe(now)
-        columns = np.stack([_column(probe, now, at, null, name, key) for name, key in free], axis=1)
+        at = probe(now, base)
+        columns = np.stack([_column(probe, now, base, at, null, *what) for what in free], axis=1)
         step, covariance = step_of(null, measured, at, columns)
         step = np.clip(step, -FURTHEST, FURTHEST)
-        base = as_seen(now, within(now, found.base), null, at)
-        now = moved(now, free, step)
+        seen_as = as_seen(now, within(now, base), null, at)
+        now, base = moved(now, replace(seen_as, white=base.white) if WHITE in free else seen_as, free, step)
         if np.all(np.abs(step) < np.maximum(SETTLED, 0.5 * np.sqrt(np.diag(covariance)))):
             break
     best = confirmed(case, model, null, measured, replace(found, model=now, base=base), FINAL)
@@ -99,7 +103,8 @@ def _refined(
     values = {e.name: e.parameters() for e in best.model.effects}
     errors: Errors = {name: dict(found.sd) if name == found.name else {} for name in names}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
-        errors[name][key] = float(abs(values[name][key]) * e)
+        if (name, key) != WHITE:
+            errors[name][key] = float(abs(values[name][key]) * e)
     own: Mapping[str, float] = values[found.name]
     best = replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name])
     return best, errors, np.einsum("sn,nm,sm->s", columns, covariance, columns)
@@ -118,19 +123,25 @@ def agree(before: Fit, after: Fit, errors: Errors) -> bool:
     return all(m < AGREE for m in moves)
 
 
-def moved(model: SensorModel, free: Sequence[tuple[str, str]], step: Array) -> SensorModel:
-    """The model with the logarithms of these parameters moved."""
+def moved(
+    model: SensorModel, base: BaseFit, free: Sequence[tuple[str, str]], step: Array
+) -> tuple[SensorModel, BaseFit]:
+    """The model and the unit with the logarithms of these parameters moved."""
     for (name, key), s in zip(free, step, strict=True):
+        if (name, key) == WHITE:
+            base = replace(base, white=base.white * float(np.exp(s)))
+            continue
         here = next(e for e in model.effects if e.name == name).parameters()
         model = with_effect(model, name, bounded(name, {**here, key: here[key] * float(np.exp(s))}))
-    return model
+    return model, base
 
 
-def _column(probe: Probe, model: SensorModel, at: Prediction, null: Null, name: str, key: str) -> Array:
+def _column(probe: Probe, model: SensorModel, base: BaseFit, at: Prediction, null: Null, name: str, key: str) -> Array:
     """(S,) change of the statistics for one more of a parameter's logarithm."""
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
-    nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if key == candidate(name).fitted[0] else -0.2
-    return slope_of(null, probe(moved(model, [(name, key)], np.array([nudge]))), at, nudge)
+    first = (name, key) != WHITE and key == candidate(name).fitted[0]
+    nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if first else -0.2
+    return slope_of(null, probe(*moved(model, base, [(name, key)], np.array([nudge]))), at, nudge)
 
 
 def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:
@@ -138,10 +149,10 @@ def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[
     only = with_held_out(case, concerned(case, names, null, measured, found.prediction.mean - null.mean))
     count = max(twins_of(name) for name in names)
 
-    def statistics(model: SensorModel) -> Prediction:
+    def statistics(model: SensorModel, base: BaseFit) -> Prediction:
         made = null.prediction
         if not all(is_pattern(name) for name in names):
-            made = predict(case, model, within(model, found.base), null, count, only)
+            made = predict(case, model, within(model, base), null, count, only)
         return with_pattern(case, model, null, made) if any(is_pattern(name) for name in names) else made
 
     return statistics

@@ -22,7 +22,7 @@ from tests.hidden_world.world import MECHANISMS, Recipe, stream
 
 SETS = ("quick", "full")
 PARTS = ("tune", "report")
-GROUPS = ("none", "strong", "weak", "base", "outside", "left_out", "pair", "tricky")
+GROUPS = ("none", "strong", "weak", "base", "outside", "left_out", "pair", "tricky", "severe")
 BASE_CAMERAS = ("scsim", "physical")
 
 
@@ -69,9 +69,10 @@ class Counts:
     left_out_each: int
     pairs: int
     tricky_each: int
+    severe_each: int
 
 
-COUNTS = {"full": Counts(60, 3, 2, 2, 3, 1, 30, 2), "quick": Counts(6, 1, 1, 1, 1, 1, 4, 1)}
+COUNTS = {"full": Counts(60, 3, 2, 2, 3, 1, 30, 2, 1), "quick": Counts(6, 1, 1, 1, 1, 1, 4, 1, 1)}
 QUICK_SHARE = 4
 """Of the groups that go through mechanisms, `quick` takes every fourth."""
 
@@ -124,6 +125,7 @@ def cases(which: str, part: str) -> list[Case]:
     made += [_left_out(name, next(seeds)) for name in left_out for _ in range(counts.left_out_each)]
     made += [_pair(next(seeds)) for _ in range(counts.pairs)]
     made += [trick(next(seeds)) for trick in TRICKY[:: max(1, every // 2)] for _ in range(counts.tricky_each)]
+    made += [_single("severe", name, next(seeds), 30, 100) for name in known for _ in range(counts.severe_each)]
     return made
 
 

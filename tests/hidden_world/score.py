@@ -254,10 +254,12 @@ def figures(scored: Sequence[Scored]) -> list[Figure]:
         return [s for s in scored if s.group in names]
 
     none, strong, weak, base = group("none"), group("strong"), group("weak"), group("base")
-    pairs, tricky, catalogue = group("pair"), group("tricky"), group("strong", "weak", "pair")
+    pairs, tricky, severe = group("pair"), group("tricky"), group("severe")
+    catalogue = group("strong", "severe", "weak", "pair")
     share("1", "false alarms, nothing hidden", "<= 0.07", none, [s.answer != "none" for s in none])
     share("2", "strong: right name", ">= 0.90", strong, [s.right for s in strong])
     share("2", "strong: right family", ">= 0.97", strong, [s.family for s in strong])
+    share("2", "severe: right name", ">= 0.90", severe, [s.right for s in severe])
     share("2", "near the limit: right name", ">= 0.70", weak, [s.right for s in weak])
     share("2", "base effects from `ideal`: right name", ">= 0.90", base, [_base_right(s) for s in base])
     for name, title in (("outside", "outside the catalogue"), ("left_out", "name withheld")):
@@ -269,8 +271,8 @@ def figures(scored: Sequence[Scored]) -> list[Figure]:
     share("4", "pairs: at least one right", ">= 0.95", pairs, [len(s.found) >= 1 for s in pairs])
     share("4", "pairs: both right", ">= 0.75", pairs, [len(s.found) == len(s.truth) for s in pairs])
     share("4", "pairs: a spurious third", "<= 0.10", pairs, [bool(s.spurious) for s in pairs])
-    made += _gap_figures([s for s in strong + weak if s.right and s.removed is not None])
-    made += _parameter_figures([e for s in strong + weak + pairs if s.right or s.found for e in s.errors])
+    made += _gap_figures([s for s in strong + severe + weak if s.right and s.removed is not None])
+    made += _parameter_figures([e for s in strong + severe + weak + pairs if s.right or s.found for e in s.errors])
     share("6", "tricky: right verdict", ">= 0.80", tricky, [s.right for s in tricky])
     if scored:
         slowest = max(s.seconds for s in scored)
@@ -327,12 +329,12 @@ def confusion(scored: Sequence[Scored]) -> dict[str, dict[str, int]]:
 
 def by_effect(scored: Sequence[Scored]) -> list[Json]:
     """One row an effect: how often it was seen and named, strong and near its limit."""
-    singles = [s for s in scored if s.group in ("strong", "weak", "base", "outside")]
+    singles = [s for s in scored if s.group in ("strong", "severe", "weak", "base", "outside")]
     rows = []
     for name in sorted({s.what for s in singles}):
         cases = [s for s in singles if s.what == name]
         row: Json = {"effect": name}
-        for group in ("strong", "weak", "base", "outside"):
+        for group in ("strong", "severe", "weak", "base", "outside"):
             some = [s for s in cases if s.group == group]
             if some:
                 row[group] = f"{sum(s.right for s in some)}/{len(some)}"

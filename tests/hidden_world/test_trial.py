@@ -62,7 +62,7 @@ def test_parts_and_sets_share_no_seed_and_no_outside_mechanism():
 
 def test_strengths_are_within_their_group():
     for case in FULL["tune"]:
-        low, high = {"strong": (3, 10), "weak": (1, 3), "pair": (3, 10)}.get(case.group, (0, 1e9))
+        low, high = {"strong": (3, 10), "severe": (30, 100), "weak": (1, 3), "pair": (3, 10)}.get(case.group, (0, 1e9))
         assert all(low <= h.times_limit <= high for h in case.recipe.hidden)
 
 

@@ -158,7 +158,9 @@ def as_text(trial: dict[str, Any]) -> str:
         _table(rows),
         "## By effect: right of tried, by group",
         "",
-        _table(trial["effects"], ("effect", "strong", "weak", "base", "outside", "strength/limit", "answers")),
+        _table(
+            trial["effects"], ("effect", "strong", "severe", "weak", "base", "outside", "strength/limit", "answers")
+        ),
         "## Confusion: what was there, what was said",
         "",
         _table(matrix),
