@@ -38,6 +38,7 @@ from spikecam_env.gap.parameters import USUAL
 from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.result import Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.statistics import Key, pattern, texture
+from spikecam_env.gap.units import SPREADS as OF_A_UNIT
 from spikecam_env.gap.units import WITHIN
 from spikecam_env.gap.world import KNOWN, Shown, shown
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -56,10 +57,7 @@ ALARM, GAIN, UNEXPLAINED = 0.02, 25.0, 0.08
 MOST = 5
 """Effects that one diagnosis of maps names together."""
 
-SPREADS = {
-    "response": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
-    "dark": {"dark_current_spread": "sigma_pA"},
-}
+SPREADS = {"response": OF_A_UNIT["gain"], "dark": OF_A_UNIT["dark"]}
 """What is scaled to fit how pixels differ: parameters of effects, by what they spread."""
 
 _SHARES = ("centre_x", "centre_y")
