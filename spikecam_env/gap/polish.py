@@ -100,6 +100,8 @@ def _refined(
     best = confirmed(case, model, null, measured, replace(found, model=now, base=base), FINAL)
     if best.misfit > judged(null, measured, found.prediction)[1] + WORSE:
         best = found
+    if free:
+        covariance = step_of(null, measured, best.prediction, columns)[1]  # FINAL twins know by how much they scatter
     values = {e.name: e.parameters() for e in best.model.effects}
     errors: Errors = {name: dict(found.sd) if name == found.name else {} for name in names}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
