@@ -49,13 +49,15 @@ class Draw:
 class Prediction:
     """What a model gives.  mean: (S,).  error: (S,) standard deviation of that mean.  spread: (S,) of one campaign.
 
-    draws: the campaigns it was learnt from.
+    draws: the campaigns it was learnt from.  own: (S,) what its effects do to the very unit; where None, that is its
+    distance from the null, whose unit has taken an effect's noise for its own where they are severe.
     """
 
     mean: Array
     error: Array
     spread: Array
     draws: tuple[Draw, ...] = ()
+    own: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,8 @@ def scaled(null: Null, one: Prediction, factor: float) -> Prediction:
     error2 = null.sd**2 / null.twins + own_variance(null, one) * factor**2
     spread2 = null.sd**2 + np.maximum(one.spread**2 - null.sd**2, 0.0) * abs(factor)
     mean = null.mean + factor * (one.mean - null.mean)
-    return replace(one, mean=mean, error=np.sqrt(error2), spread=np.sqrt(spread2))
+    own = None if one.own is None else factor * one.own
+    return replace(one, mean=mean, error=np.sqrt(error2), spread=np.sqrt(spread2), own=own)
 
 
 def likeliest(null: Null, measured: Array, one: Prediction) -> tuple[float, float]:
@@ -186,7 +189,12 @@ def alarmed(null: Null, rho: Array) -> bool:
 
 def variance(null: Null, predicted: Prediction) -> Array:
     """(S,) of measured less predicted; a prediction is good to TOLERANCE of its effect."""
-    return predicted.spread**2 + predicted.error**2 + null.floor**2 + (TOLERANCE * (predicted.mean - null.mean)) ** 2
+    return predicted.spread**2 + predicted.error**2 + null.floor**2 + law(null, predicted) ** 2
+
+
+def law(null: Null, predicted: Prediction) -> Array:
+    """(S,) by how much a prediction's laws may be off."""
+    return TOLERANCE * (predicted.mean - null.mean if predicted.own is None else predicted.own)
 
 
 def residual(null: Null, measured: Array, predicted: Prediction) -> Array:
@@ -246,8 +254,8 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
     astray = np.array([solve @ np.nan_to_num(d.values - null.mean) for d in null.draws])
     known = len(astray) > 1
     drawn = np.cov(astray.T) * (1 + 1 / len(astray)) if known else (solve * null.sd**2) @ solve.T
-    law = solve @ (TOLERANCE * (predicted.mean - null.mean))
-    return np.asarray(step, np.float64), np.atleast_2d(drawn) + alone + np.outer(law, law)
+    off = solve @ law(null, predicted)
+    return np.asarray(step, np.float64), np.atleast_2d(drawn) + alone + np.outer(off, off)
 
 
 def slope_of(null: Null, there: Prediction, here: Prediction, step: float) -> Array:

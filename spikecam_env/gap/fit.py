@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.case import Case, rests_on, settled, twins
+from spikecam_env.gap.case import HIDDEN, Case, rests_on, settled, twins
 from spikecam_env.gap.compare import (
     Draw,
     Null,
@@ -308,7 +308,11 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
     if not (added and all(is_pattern(name) for name in added)):
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
         count = max(count, *(WANDER if candidate(name).wanders else twins_of(name) for name in added), 1)
-        predicted = predict(case, found.model, within(found.model, found.base), null, count, with_held_out(case, only))
+        there, base = with_held_out(case, only), within(found.model, found.base)
+        predicted = predict(case, found.model, base, null, count, there)
+        if base.white < HIDDEN * case.base.white:
+            bare = predict(case, model, within(model, found.base), null, 1, there)
+            predicted = replace(predicted, own=predicted.mean - bare.mean)
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)
     rho, left = judged(null, measured, predicted)

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates import candidate, is_pattern, of_motion
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import (
-    TOLERANCE,
     Null,
     Prediction,
     alarmed,
     judged,
+    law,
     misfit,
     own_variance,
     residual,
@@ -56,6 +56,9 @@ another to be looked for beside them: less is a stand-in's."""
 
 PROMISE = 15.0
 """Misfit by which a fit that is not confirmed may be worse than the best that is, to be confirmed as well."""
+
+SEEN = 2.0
+"""Noises by which an effect has to change a statistic to be added: twins of nothing may be luckier than others."""
 
 RETRIED, NEAR = 4, 0.25
 """Runners-up of an effect that are tried anew beside a later one: so many at most, and of what it removed the share
@@ -106,7 +109,8 @@ def search(
         screened = [s for i, s in enumerate(shapes) if s.name not in {before.name for before in shapes[:i]}]
         distance = np.nan_to_num((seen - here.mean) / here.noise)
         tried = worth_fitting(screened, misfit(distance, here.weight), loud(here, distance))
-        fitted, confirm = partial(_fitted, case, now, here, seen), partial(confirmed, case, now, here, seen)
+        fitted = partial(_fitted, replace(case, base=base), now, here, seen)
+        confirm = partial(confirmed, case, now, here, seen)
         with ThreadPoolExecutor(case.jobs) as pool:
             sure, rest = settle(list(pool.map(fitted, tried)), confirm)
             again = other_shapes(sure[0].name, shapes, left_over) if sure else []
@@ -115,7 +119,7 @@ def search(
             sure[0] = anew[0]
         sure, rivals = chosen_of(null, here, seen, values, sure)
         rounds.append(Round(now, base, prediction, rho, left_over, (*sure, *rest), rivals))
-        if not sure or left_over - sure[0].misfit < GAIN:
+        if not sure or left_over - sure[0].misfit < GAIN or not shows(here, sure[0]):
             break
         best = sure[0]
         earlier = [r.fits[0].name for r in rounds[:-1]]
@@ -145,6 +149,12 @@ def other_shapes(name: str, screened: Sequence[Screened], before: float) -> list
     best, *others = [s for s in screened if s.name == name]
     several = set(candidate(name).shapes) & set(candidate(name).fitted)
     return [s for s in others if several and before - s.misfit > 0.5 * (before - best.misfit)]
+
+
+def shows(here: Null, found: Fit) -> bool:
+    """Whether an effect does anything that a statistic would show, but where it wanders."""
+    change = np.abs(found.prediction.mean - here.mean) / here.noise
+    return candidate(found.name).wanders or bool(change.max() > SEEN)
 
 
 def with_errors(turn: Round, errors: Errors) -> Round:
@@ -197,7 +207,8 @@ def revisited(
     rest = best.model.without(first.name)
     here = standing_on(null, confirmed(case, model, null, seen, resettled(case, null, best, rest)).prediction)
     with ThreadPoolExecutor(case.jobs) as pool:
-        fits = list(pool.map(lambda f: fit(case, rest, here, seen, f.name, f.parameters), others))
+        unit = replace(case, base=best.base)
+        fits = list(pool.map(lambda f: fit(unit, rest, here, seen, f.name, f.parameters), others))
     confirm = partial(confirmed, case, rest, here, seen)
     sure = [confirm(replace(best, name=first.name)), *settle(fits, confirm)[0]]
     sure, rivals = chosen_of(null, here, seen, values, sorted(sure, key=lambda f: f.misfit))
@@ -214,8 +225,7 @@ def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screen
 
 def standing_on(null: Null, predicted: Prediction) -> Null:
     """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
-    law = TOLERANCE * (predicted.mean - null.mean)
-    floor = np.sqrt(null.floor**2 + law**2 + own_variance(null, predicted))
+    floor = np.sqrt(null.floor**2 + law(null, predicted) ** 2 + own_variance(null, predicted))
     return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, draws=predicted.draws)
 
 
