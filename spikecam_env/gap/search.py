@@ -77,7 +77,7 @@ class Round:
     prediction: Prediction
     rho: Array
     misfit: float
-    fits: tuple[Fit, ...]
+    fits: tuple[Fit, ...] = ()
     rivals: tuple[str, ...] = ()
     lent: bool = False
 
@@ -104,41 +104,62 @@ def search(
             break
         here = standing_on(null, prediction)
         left_over = judged(here, seen, here.prediction)[1]
-        left = [n for n in names if n not in {e.name for e in now.effects}]
-        shapes = screen(templates, case.conditions, here, seen, left, line_of(case))
-        screened = [s for i, s in enumerate(shapes) if s.name not in {before.name for before in shapes[:i]}]
-        distance = np.nan_to_num((seen - here.mean) / here.noise)
-        tried = worth_fitting(screened, misfit(distance, here.weight), loud(here, distance))
-        fitted = partial(_fitted, replace(case, base=base), now, here, seen)
-        confirm = partial(confirmed, case, now, here, seen)
-        with ThreadPoolExecutor(case.jobs) as pool:
-            sure, rest = settle(list(pool.map(fitted, tried)), confirm)
-            again = other_shapes(sure[0].name, shapes, left_over) if sure else []
-            anew = settle(list(pool.map(fitted, again)), confirm)[0]
-        if anew and anew[0].misfit < sure[0].misfit:
-            sure[0] = anew[0]
-        sure, rivals = chosen_of(null, here, seen, values, sure)
-        rounds.append(Round(now, base, prediction, rho, left_over, (*sure, *rest), rivals))
-        if not sure or left_over - sure[0].misfit < GAIN or not shows(here, sure[0]):
+        turn = compared(case, null, here, seen, values, names, templates, Round(now, base, prediction, rho, left_over))
+        rounds.append(turn)
+        if not turn.fits or left_over - turn.fits[0].misfit < GAIN or not shows(here, turn.fits[0]):
             break
-        best = sure[0]
-        earlier = [r.fits[0].name for r in rounds[:-1]]
-        if earlier:
-            best = rejoined(case, model, null, seen, best, earlier)
-            for i, turn in enumerate(rounds[:-1]):
-                if turn.fits[0].name in {e.name for e in best.model.effects}:
-                    best, rounds[i] = revisited(case, model, null, seen, values, best, turn)
-            earlier = [r.fits[0].name for r in rounds[:-1]]
-        names_now = [n for n in (*earlier, best.name) if n in {e.name for e in best.model.effects}]
-        best, errors, lent = polished(case, model, null, seen, values, best, names_now)
-        rounds[-1] = replace(rounds[-1], fits=(best, *rounds[-1].fits[1:]), lent=lent)
-        rounds = [with_errors(r, errors) for r in rounds]
+        rounds = joined(case, model, null, seen, values, rounds)
+        best = rounds[-1].fits[0]
         now, base, prediction = best.model, best.base, best.prediction
-        if left_over - sure[0].misfit < LITTLE[len(rounds) > 1] * (left_over - chance):
+        if left_over - turn.fits[0].misfit < LITTLE[len(rounds) > 1] * (left_over - chance):
             break
     rho, left_over = judged(null, seen, prediction)
-    rounds.append(Round(now, base, prediction, rho, left_over, ()))
-    return rounds
+    return [*rounds, Round(now, base, prediction, rho, left_over)]
+
+
+def compared(
+    case: Case,
+    null: Null,
+    here: Null,
+    seen: Array,
+    values: Array,
+    names: Sequence[str],
+    templates: Templates,
+    turn: Round,
+) -> Round:
+    """The round with its candidates: screened, fitted, confirmed, the chosen one first.  here: what it stands on."""
+    left = [n for n in names if n not in {e.name for e in turn.model.effects}]
+    shapes = screen(templates, case.conditions, here, seen, left, line_of(case))
+    screened = [s for i, s in enumerate(shapes) if s.name not in {before.name for before in shapes[:i]}]
+    distance = np.nan_to_num((seen - here.mean) / here.noise)
+    tried = worth_fitting(screened, misfit(distance, here.weight), loud(here, distance))
+    fitted = partial(_fitted, replace(case, base=turn.base), turn.model, here, seen)
+    confirm = partial(confirmed, case, turn.model, here, seen)
+    with ThreadPoolExecutor(case.jobs) as pool:
+        sure, rest = settle(list(pool.map(fitted, tried)), confirm)
+        again = other_shapes(sure[0].name, shapes, turn.misfit) if sure else []
+        anew = settle(list(pool.map(fitted, again)), confirm)[0]
+    if anew and anew[0].misfit < sure[0].misfit:
+        sure[0] = anew[0]
+    sure, rivals = chosen_of(null, here, seen, values, sure)
+    return replace(turn, fits=(*sure, *rest), rivals=rivals)
+
+
+def joined(
+    case: Case, model: SensorModel, null: Null, seen: Array, values: Array, rounds: Sequence[Round]
+) -> list[Round]:
+    """The rounds with the last one's best together with what was found before, and all of it polished."""
+    *before, last = rounds
+    best = last.fits[0]
+    if before:
+        best = rejoined(case, model, null, seen, best, [r.fits[0].name for r in before])
+        for i, turn in enumerate(before):
+            if turn.fits[0].name in {e.name for e in best.model.effects}:
+                best, before[i] = revisited(case, model, null, seen, values, best, turn)
+    names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
+    best, errors, lent = polished(case, model, null, seen, values, best, names)
+    last = replace(last, fits=(best, *last.fits[1:]), lent=lent)
+    return [with_errors(r, errors) for r in (*before, last)]
 
 
 def other_shapes(name: str, screened: Sequence[Screened], before: float) -> list[Screened]:
