@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.case import Case, case_of
+from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import GATE, adjusted, deviates, values_of
 from spikecam_env.gap.observe import BIN, Observation
 from spikecam_env.gap.statistics.moving import light_film
@@ -206,14 +206,14 @@ def upheld(case: Case, model: SensorModel, found: Sequence[Contradiction]) -> li
     of its recording is off.  What takes spikes of bright light alone looks like a wrong label of the brightest."""
     levels = {c.name: c.level for c in case.conditions if c.kind == "flat"}
     brightest = max(levels, key=lambda name: levels[name], default="")
-    return [c for c in found if c.kind != "label" or c.recordings != (brightest,) or in_order(case, model, c)]
+    return [c for c in found if c.kind != "label" or c.recordings != (brightest,) or is_right_but_for(case, model, c)]
 
 
-def in_order(case: Case, model: SensorModel, label: Contradiction) -> bool:
+def is_right_but_for(case: Case, model: SensorModel, label: Contradiction) -> bool:
     """Whether a recording is as the model has it, but for its label."""
     [name] = label.recordings
     conditions = [relabelled(c, label.factor) if c.name == name else c for c in case.conditions]
-    again = case_of(case.shape, conditions, case.observations, case.seed, case.jobs, case.frame_rate_hz)
+    again = case.of(conditions, case.observations)
     null = model_null(again, model, RELABELLED)
     of = np.array([k.recording == name and k.group != "rates" for k in null.keys])
     return not adjusted(deviates(null, values_of(again.bank, null.keys))[of]).min() < GATE

@@ -48,6 +48,10 @@ class Case:
         """fit or holdout."""
         return next((c.use for c in self.conditions if c.name == recording), "fit")
 
+    def of(self, conditions: Sequence[Shown], observations: Sequence[Observation]) -> Case:
+        """Other recordings of the same camera, refitted anew."""
+        return case_of(self.shape, conditions, observations, self.seed, self.jobs, self.frame_rate_hz)
+
 
 @dataclass(frozen=True)
 class Twin:

@@ -168,14 +168,7 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     keep = [i for i, c in enumerate(case.conditions) if c.name not in bad]
     if not bad or not refittable([case.conditions[i] for i in keep]):
         return case
-    return case_of(
-        case.shape,
-        [case.conditions[i] for i in keep],
-        [case.observations[i] for i in keep],
-        case.seed,
-        case.jobs,
-        case.frame_rate_hz,
-    )
+    return case.of([case.conditions[i] for i in keep], [case.observations[i] for i in keep])
 
 
 def in_order(other: Null, null: Null) -> Array:

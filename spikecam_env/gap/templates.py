@@ -366,7 +366,7 @@ def severe(
         return Template(name, dict(parameters), _shift(case, model, null, name, parameters), times)
     seed = case.seed * 1000 + 7
     made = simulate(there, within(there, case.base), case.conditions, case.shape, seed)
-    seen = case_of(case.shape, case.conditions, made, case.seed, case.jobs, case.frame_rate_hz)
+    seen = case.of(case.conditions, made)
     without = twins(seen, model, within(model, seen.base), range(REFITTED))
     mean = np.mean([values_of(t.bank, null.keys) for t in without], axis=0)
     shift = np.nan_to_num((values_of(seen.bank, null.keys) - mean) / null.noise)

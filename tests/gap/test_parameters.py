@@ -40,8 +40,8 @@ def test_a_strength_that_is_off_is_measured_in_its_own_unit(other):
                                   if name == other.name else "sigma_mV"]  # fmt: skip
     if name == other.name:
         assert row["measured"] == pytest.approx(other.parameters()[type(other).strength], rel=0.1)
-    patched = with_strengths(MODEL, off)
-    assert next(e for e in patched.effects if e.name == name).parameters() != MODEL
+    patched = next(e for e in with_strengths(MODEL, off).effects if e.name == name)
+    assert patched.parameters()[type(patched).strength] == row["measured"]
 
 
 def test_less_noise_than_shot_noise_is_more_electrons():
