@@ -86,110 +86,147 @@ def advance(  # type: ignore[no-untyped-def]
     """
     per_root_rate, per_rate, kept, kick, left, left_tau, droop = feedback
     frames = spikes.shape[0]
-    light_step = 0 if light.shape[0] == 1 else 1
-    dark_step = 0 if dark.shape[0] == 1 else 1
-    field_step = 0 if field.shape[0] == 1 else 1
+    light_moves, dark_moves, field_moves = light.shape[0] > 1, dark.shape[0] > 1, field.shape[0] > 1
     rows = bottom - top if kick != 0.0 else max(1, min(bottom - top, BAND // columns))
     pitch = (columns + 7) // 8 * 8
-    most = rows * pitch + 8
+    most = rows * pitch
     hit = np.zeros(most, np.uint8)
     eights = hit.view(np.uint64)
-    at = np.empty(most, np.uint32)
-    row_of = np.empty(most, np.uint32)
-    times = np.empty(most, np.uint32)
+    arrives, held, phi, limit = np.zeros((4, most), np.float64)
+    line_of, pixel_of = np.zeros((2, most), np.uint32)
+    at = np.empty(most + 8, np.uint32)
+    pixel, times = np.empty(most, np.uint32), np.empty(most, np.uint32)
     draw = np.empty(most, np.float32)
-    rate, over, phi, electrons, shift, noise, jitter = np.empty((7, most), np.float64)
+    rate, over, shift, stands = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
+    electrons, noise, jitter = np.empty(most), np.empty(most), np.empty(most)
+    stood = np.empty((5, rows), np.float64)
     for row0 in range(top, bottom, rows):
         row1 = min(row0 + rows, bottom)
+        used = (row1 - row0) * pitch
+        stood[:] = np.nan
+        limit[:] = np.inf
+        for r in range(row0, row1):
+            for j in range(columns):
+                h, p = (r - row0) * pitch + j, r * columns + j
+                line_of[h], pixel_of[h] = r, p
+                held[h], phi[h] = charge[p], threshold[p]
         for t in range(frames):
-            lights, darks, fields, bits = light[light_step * t], dark[dark_step * t], field[field_step * t], spikes[t]
+            lights, darks, fields = light[t * light_moves], dark[t * dark_moves], field[t * field_moves]
             light_scale, dark_scale, factors, commons = light_factor[t], dark_factor[t], factor[t], common[t]
-            n = 0
             for r in range(row0, row1):
-                q, h = r * columns, (r - row0) * pitch
+                i, p0, h0 = r - row0, r * columns, (r - row0) * pitch
                 a, d, f, m = light_scale[r], dark_scale[r], factors[r], commons[r]
                 load = 1.0 + droop * activity[r]
-                row_light, row_dark, row_field = (
-                    lights[q : q + columns],
-                    darks[q : q + columns],
-                    fields[q : q + columns],
-                )
-                row_charge, row_threshold = charge[q : q + columns], threshold[q : q + columns]
-                row_scale, row_hit, row_bits = (
-                    grains_per_mV[q : q + columns],
-                    hit[h : h + columns],
-                    bits[q : q + columns],
-                )
-                for j in range(columns):
-                    x = max(row_light[j] * a, 0.0) + max(row_dark[j] * d, 0.0)
-                    c = row_charge[j] + x * _G
-                    row_charge[j] = c
-                    row_hit[j] = c >= (row_threshold[j] * f + row_scale[j] * (m + row_field[j])) * load
+                if light_moves or dark_moves or a != stood[0, i] or d != stood[1, i]:
+                    stood[0, i], stood[1, i] = a, d
+                    arrive(lights[p0 : p0 + columns], darks[p0 : p0 + columns], a, d, arrives[h0 : h0 + columns])
+                if field_moves or f != stood[2, i] or m != stood[3, i] or load != stood[4, i]:
+                    stood[2, i], stood[3, i], stood[4, i] = f, m, load
+                    references(
+                        grains_per_mV[p0 : p0 + columns],
+                        fields[p0 : p0 + columns],
+                        phi[h0 : h0 + columns],
+                        f,
+                        m,
+                        load,
+                        limit[h0 : h0 + columns],
+                    )
+            for h in range(used):
+                c = held[h] + arrives[h]
+                held[h] = c
+                hit[h] = c >= limit[h]
+            n = listed(eights[: used // 8], at)
+            bits = spikes[t]
+            for r in range(row0, row1):
+                row_bits, row_hit = bits[r * columns : (r + 1) * columns], hit[(r - row0) * pitch :]
                 for j in range(columns):
                     row_bits[j] = row_hit[j]
-                n = listed(eights[h // 8 : (h + pitch) // 8], q, r, at, row_of, n)
             for i in range(n):
-                p, line = _Q(at[i]), _Q(row_of[i])
+                h = _Q(at[i])
+                p = _Q(pixel_of[h])
+                pixel[i] = p
                 times[i] = fired[p]
                 fired[p] = _U(fired[p] + _U(1))
-                rate[i] = max(lights[p] * light_scale[line], 0.0) + max(darks[p] * dark_scale[line], 0.0)
+                rate[i] = arrives[h] / _G
+                over[i] = held[h] - limit[h]
+                line = _Q(line_of[h])
                 shift[i] = grains_per_mV[p] * (commons[line] + fields[p])
-                over[i] = charge[p] - (threshold[p] * factors[line] + shift[i]) * (1.0 + droop * activity[line])
-                phi[i] = (_G * factors[line] + shift[i]) * (1.0 + droop * activity[line])
+                stands[i] = (_G * factors[line] + shift[i]) * (1.0 + droop * activity[line])
                 noise[i] = per_electron[p]
                 jitter[i] = kappa_squared[p]
+            for i in range(n):
+                draw[i] = drawn(pixel[i], times[i], seed_low, seed_high, polynomial)
+            for i in range(n):
+                over[i], electrons[i] = after_reset(over[i], rate[i], stands[i], per_root_rate, per_rate, kept)
+                stands[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
 
             for i in range(n):
-                draw[i] = drawn(at[i], times[i], seed_low, seed_high, polynomial)
-            for i in range(n):
-                over[i], electrons[i] = after_reset(over[i], rate[i], phi[i], per_root_rate, per_rate, kept)
-                phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
-
-            for i in range(n):
-                p, line = _Q(at[i]), _Q(row_of[i])
-                f, load = factors[line], 1.0 + droop * activity[line]
-                limit = (phi[i] * f + shift[i]) * load
-                while over[i] >= limit:
-                    draw[i] = drawn(at[i], fired[p], seed_low, seed_high, polynomial)
+                h = _Q(at[i])
+                f, load = factors[line_of[h]], 1.0 + droop * activity[line_of[h]]
+                now = (stands[i] * f + shift[i]) * load
+                while over[i] >= now:
+                    p = _Q(pixel[i])
+                    draw[i] = drawn(pixel[i], fired[p], seed_low, seed_high, polynomial)
                     fired[p] = _U(fired[p] + _U(1))
                     level = (_G * f + shift[i]) * load
-                    over[i], electrons[i] = after_reset(over[i] - limit, rate[i], level, per_root_rate, per_rate, kept)
-                    phi[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
-                    limit = (phi[i] * f + shift[i]) * load
-                charge[p] = over[i]
-                threshold[p] = phi[i]
+                    over[i], electrons[i] = after_reset(over[i] - now, rate[i], level, per_root_rate, per_rate, kept)
+                    stands[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
+                    now = (stands[i] * f + shift[i]) * load
+                held[h], phi[h], limit[h] = over[i], stands[i], now
 
             if kick != 0.0:
-                kick_neighbours(kick, hit, pitch, columns, charge[row0 * columns : row1 * columns])
+                kick_neighbours(kick, hit, pitch, columns, held[:used])
             if left != 0.0:
                 for i in range(n):
-                    pixel = _Q(at[i])
-                    late = min(max(charge[pixel] / _G / max(rate[i], 1e-12), 0.0), 1.0)
-                    now = number + t + 1.0 - late
-                    stays = left * math.expm1(-(now - crossing[pixel]) / left_tau)
-                    charge[pixel] = (charge[pixel] / _G - stays) * _G
-                    crossing[pixel] = now
-                    threshold[pixel] = needed(electrons[i] + stays, noise[i], jitter[i], draw[i])
+                    h, p = _Q(at[i]), _Q(pixel[i])
+                    late = min(max(held[h] / _G / max(rate[i], 1e-12), 0.0), 1.0)
+                    crossed = number + t + 1.0 - late
+                    stays = left * math.expm1(-(crossed - crossing[p]) / left_tau)
+                    crossing[p] = crossed
+                    held[h] = (held[h] / _G - stays) * _G
+                    phi[h] = needed(electrons[i] + stays, noise[i], jitter[i], draw[i])
+                    load = 1.0 + droop * activity[line_of[h]]
+                    limit[h] = (phi[h] * factors[line_of[h]] + shift[i]) * load
             if droop != 0.0:
                 for r in range(row0, row1):
                     activity[r] = 0.0
                 for i in range(n):
-                    activity[row_of[i]] += 1.0
+                    activity[line_of[at[i]]] += 1.0
                 for r in range(row0, row1):
                     activity[r] /= columns
+        for r in range(row0, row1):
+            for j in range(columns):
+                h, p = (r - row0) * pitch + j, r * columns + j
+                charge[p], threshold[p] = held[h], phi[h]
 
 
 @njit(inline="always")
-def listed(eights, first, row, at, row_of, n):  # type: ignore[no-untyped-def]
-    """Append to at[:n] the numbers, from `first`, of the bytes that are one; returns how many there are then.
+def arrive(light, dark, light_factor, dark_factor, out):  # type: ignore[no-untyped-def]
+    """Charge of a row in one frame [grains]."""
+    for j in range(out.size):
+        out[j] = (max(light[j] * light_factor, 0.0) + max(dark[j] * dark_factor, 0.0)) * _G
+
+
+@njit(inline="always")
+def references(grains_per_mV, field, phi, factor, common, load, out):  # type: ignore[no-untyped-def]
+    """Charge at which the pixels of a row fire in one frame [grains]."""
+    for j in range(out.size):
+        out[j] = (phi[j] * factor + grains_per_mV[j] * (common + field[j])) * load
+
+
+@njit(inline="always")
+def listed(eights, at):  # type: ignore[no-untyped-def]
+    """Write to `at` the numbers of the bytes that are one; returns how many there are.
 
     The bytes of a word are gathered to eight bits, and the table says at once where the ones are.
     """
+    n = 0
     for word in range(eights.size):
         which = (eights[word] * _Q(0x0102040810204080)) >> _Q(56)
+        if which == 0:
+            continue
         for k in range(8):
-            at[_Q(n + k)] = _U(_U(first + 8 * word) + _ONES[which, k])
-            row_of[_Q(n + k)] = _U(row)
+            at[_Q(n + k)] = _U(_U(8 * word) + _ONES[which, k])
         n += _COUNT[which]
     return n
 
@@ -221,8 +258,8 @@ def needed(electrons, per_electron, kappa_squared, draw):  # type: ignore[no-unt
 
 @njit(inline="always")
 def kick_neighbours(kick, hit, pitch, columns, charge):  # type: ignore[no-untyped-def]
-    """Charge of whole rows [grains] with what the neighbours that fired couple in; hit: rows of `pitch` bytes."""
-    rows = charge.size // columns
+    """Charge [grains] with what the neighbours that fired couple in; hit and charge are of whole rows of `pitch`."""
+    rows = charge.size // pitch
     for r in range(rows):
         for x in range(columns):
             j = r * pitch + x
@@ -235,5 +272,4 @@ def kick_neighbours(kick, hit, pitch, columns, charge):  # type: ignore[no-untyp
                 around += hit[j - 1]
             if x < columns - 1:
                 around += hit[j + 1]
-            p = r * columns + x
-            charge[p] = (charge[p] / _G + kick * around) * _G
+            charge[j] = (charge[j] / _G + kick * around) * _G
