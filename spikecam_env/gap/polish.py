@@ -37,7 +37,7 @@ TURNS = 4
 SETTLED = 0.05
 """Largest step of a logarithm that needs no other; nor does half of its error."""
 
-FURTHEST = 0.7
+LONGEST = 0.7
 """Largest step of a logarithm at once."""
 
 WORSE = 3.0
@@ -92,7 +92,7 @@ def _refined(
         at = probe(now, base)
         columns = np.stack([_column(probe, now, base, at, null, *what) for what in free], axis=1)
         step, covariance = step_of(null, measured, at, columns)
-        step = np.clip(step, -FURTHEST, FURTHEST)
+        step = np.clip(step, -LONGEST, LONGEST)
         seen_as = as_seen(now, within(now, base), null, at)
         now, base = moved(now, replace(seen_as, white=base.white) if WHITE in free else seen_as, free, step)
         if np.all(np.abs(step) < np.maximum(SETTLED, 0.5 * np.sqrt(np.diag(covariance)))):

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -153,6 +154,11 @@ class Ramp:
     level: NDArray[np.int32]
     curve: NDArray[np.int32]
     rest: NDArray[np.int32]
+
+    @cached_property
+    def steady(self) -> bool:
+        """Whether the light stays, for every pixel."""
+        return not (self.curve.any() or self.rest.any())
 
     def collected(self, frame: int) -> NDArray[np.int32]:
         """Grains (P,) collected from the start of the key interval to the start of its frame."""

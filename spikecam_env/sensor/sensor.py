@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from types import ModuleType
@@ -96,11 +96,14 @@ class SpikeSensor:
         frames = checked_frames(frames)
         light = as_light(radiance, self.shape)
         spikes = _recycled(out, (frames, *self.shape)).reshape(frames, -1)
-        done = 0
-        for segment in segments(light, self.frame, frames):
-            at = self.frame + done - segment.first
-            self._run(self._imaged(segment, light, at), spikes[done : done + segment.count])
-            done += segment.count
+        seen = self._seen_by_pixels(light, frames)
+        if self.engine == "fast" and self._frame_effects:
+            block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes)
+        else:
+            done = 0
+            for segment in seen:
+                self._run(segment, spikes[done : done + segment.count])
+                done += segment.count
         self.frame += frames
         return spikes.reshape(frames, *self.shape)
 
@@ -151,16 +154,20 @@ class SpikeSensor:
             self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
 
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
-        if self.engine == "fast" and not self._frame_effects:
+        if self.engine == "fast":
             ahead.run(self._pixels, segment, out)
-        elif self.engine == "fast":
-            block.run(self._first_exposure(), self._frame_effects, self._pixels, segment, out)
         elif self.engine == "cuda":
             cuda = _cuda()
             batch = cuda.BatchSegment.of([segment], self._pixels.device)
             out[:] = cuda.run(self._pixels, batch)[0].cpu().numpy()
         else:
             out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
+
+    def _seen_by_pixels(self, light: Keyframes | NDArray[np.float32], frames: int) -> Iterator[Segment]:
+        at = self.frame
+        for segment in segments(light, at, frames):
+            yield self._imaged(segment, light, at - segment.first)
+            at += segment.count
 
     def _imaged(self, segment: Segment, light: Keyframes | NDArray[np.float32], begin: int) -> Segment:
         """Optics act once a key interval, not once a step; `begin` is the interval's first frame."""

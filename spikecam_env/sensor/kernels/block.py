@@ -11,7 +11,7 @@ variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -25,7 +25,7 @@ from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Fe
 from spikecam_env.sensor.kernels import block_loop, fast
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.kernels.threads import together
-from spikecam_env.sensor.light import GRAINS, Segment, ramp
+from spikecam_env.sensor.light import GRAINS, Ramp, Segment, ramp
 from spikecam_env.sensor.unit import Unit
 
 _BLOCK = 1 << 22
@@ -103,34 +103,78 @@ def run(
     first: Exposure,
     effects: Sequence[Effect],
     state: BlockState,
-    segment: Segment,
-    out: NDArray[np.uint8] | None = None,
+    segments: Iterable[Segment],
+    spikes: NDArray[np.uint8],
     *,
     threads: int | None = None,
 ) -> NDArray[np.uint8]:
-    """Advance `state` over a segment; returns spikes (count, P) uint8, 0 or 1, in `out` where that is given.
+    """Advance `state` over segments; writes their spikes to `spikes` (all frames, P) uint8, 0 or 1, and returns it.
 
     first, effects: as given to `start`.  threads: default NUMBA_NUM_THREADS.
     """
-    spikes = np.empty((segment.count, state.charge.size), dtype=np.uint8) if out is None else out
-    frames = max(1, _BLOCK // state.charge.size)
-    for done in range(0, segment.count, frames):
-        part = replace(segment, first=segment.first + done, count=min(frames, segment.count - done))
-        now = replace(first, number=state.frame, frames=part.count)
-        _block(now, effects, state, part, spikes[done : done + part.count], threads)
-        state.frame += part.count
+    done = 0
+    for parts in _blocks(state.law, segments, max(1, _BLOCK // state.charge.size)):
+        mean = _mean(parts)
+        count = sum(part.count for part in parts)
+        now = replace(first, number=state.frame, frames=count)
+        _block(now, effects, state, mean, spikes[done : done + count], threads)
+        state.frame += count
+        done += count
     return spikes
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Frames first .. first + count of a ramp of light."""
+
+    light: Ramp
+    first: int
+    count: int
+
+
+def _blocks(law: BlockLaw, segments: Iterable[Segment], most: int) -> Iterator[list[_Part]]:
+    """Parts that make a block of at most so many frames: light that moves, or the same light that stays."""
+    block: list[_Part] = []
+    frames = 0
+    for part in _parts(law, segments, most):
+        if block and (frames + part.count > most or not _alike(block[-1].light, part.light)):
+            yield block
+            block, frames = [], 0
+        block.append(part)
+        frames += part.count
+    if block:
+        yield block
+
+
+def _parts(law: BlockLaw, segments: Iterable[Segment], most: int) -> Iterator[_Part]:
+    last, light = None, None
+    for s in segments:
+        if last is None or light is None or s.length != last.length or not _same_light(s, last):
+            light = ramp(s, law.gain, law.dark)
+        last = s
+        for done in range(0, s.count, most):
+            yield _Part(light, s.first + done, min(most, s.count - done))
+
+
+def _same_light(one: Segment, other: Segment) -> bool:
+    return one.radiance0 is other.radiance0 and one.radiance1 is other.radiance1
+
+
+def _alike(one: Ramp, other: Ramp) -> bool:
+    if one is other or not (one.steady or other.steady):
+        return True
+    return one.steady and other.steady and np.array_equal(one.level, other.level)
 
 
 def _block(
     now: Exposure,
     effects: Sequence[Effect],
     state: BlockState,
-    segment: Segment,
+    mean: Array,
     spikes: NDArray[np.uint8],
     threads: int | None,
 ) -> None:
-    light, dark = drive.expected_charge(now, effects, state.memory, _mean(state.law, segment))
+    light, dark = drive.expected_charge(now, effects, state.memory, mean)
     law = drive.comparators(now, effects, state.memory)
     feedback = _sum([e.feedback(now) for e in effects])
     work = (
@@ -165,13 +209,16 @@ def _block(
         spikes[:] = drive.read_out(now, effects, state.memory, fired).reshape(spikes.shape)
 
 
-def _mean(law: BlockLaw, segment: Segment) -> Array:
+def _mean(parts: Sequence[_Part]) -> Array:
     """Charge of the light law (count, P) [thresholds], or (1, P) in steady light."""
-    light = ramp(segment, law.gain, law.dark)
-    if not light.curve.any() and not light.rest.any():
+    light = parts[0].light
+    if light.steady:
         return light.level[None] / GRAINS
-    mean = np.empty((segment.count, light.level.size))
-    block_loop.ramp_charge(light.level, light.curve, light.rest, segment.first, mean)
+    mean = np.empty((sum(p.count for p in parts), light.level.size))
+    done = 0
+    for p in parts:
+        block_loop.ramp_charge(p.light.level, p.light.curve, p.light.rest, p.first, mean[done : done + p.count])
+        done += p.count
     return mean
 
 

@@ -85,6 +85,7 @@ def advance(  # type: ignore[no-untyped-def]
     spikes: (F, P) uint8, overwritten.  What is not said to be otherwise is float64.
     """
     per_root_rate, per_rate, kept, kick, left, left_tau, droop = feedback
+    whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
     frames = spikes.shape[0]
     light_moves, dark_moves, field_moves = light.shape[0] > 1, dark.shape[0] > 1, field.shape[0] > 1
     rows = bottom - top if kick != 0.0 else max(1, min(bottom - top, BAND // columns))
@@ -156,10 +157,14 @@ def advance(  # type: ignore[no-untyped-def]
                 jitter[i] = kappa_squared[p]
             for i in range(n):
                 draw[i] = drawn(pixel[i], times[i], seed_low, seed_high, polynomial)
+            if whole:
+                for i in range(n):
+                    electrons[i] = stands[i] * (1.0 / _G)
+            else:
+                for i in range(n):
+                    over[i], electrons[i] = after_reset(over[i], rate[i], stands[i], per_root_rate, per_rate, kept)
             for i in range(n):
-                over[i], electrons[i] = after_reset(over[i], rate[i], stands[i], per_root_rate, per_rate, kept)
                 stands[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
-
             for i in range(n):
                 h = _Q(at[i])
                 f, load = factors[line_of[h]], 1.0 + droop * activity[line_of[h]]
