@@ -29,7 +29,7 @@ from spikecam_env.gap.compare import (
     values_of,
 )
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.units import drawn_banks
+from spikecam_env.gap.units import drawn, drawn_banks
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import build
 
@@ -317,6 +317,18 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
         predicted = with_pattern(case, found.model, null, predicted)
     rho, left = judged(null, measured, predicted)
     return replace(found, prediction=predicted, rho=rho, misfit=left)
+
+
+def of_any_dark(case: Case, model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> Prediction:
+    """A prediction known no better than the dark levels of a fresh unit of the model would change it.
+
+    Slow pixels lock to a severe noise, or drown in it: a refit then does not show how they differ.
+    """
+    _, dark = drawn(model, base, case.shape, case.seed)
+    other = predict(case, model, within(model, replace(base, dark=dark)), null, 1)
+    here = next(d for d in predicted.draws if d.number == other.draws[-1].number)
+    change = np.nan_to_num(other.draws[-1].values - here.values)
+    return replace(predicted, error=np.hypot(predicted.error, change))
 
 
 def resettled(case: Case, null: Null, found: Fit, model: SensorModel) -> Fit:

@@ -73,8 +73,13 @@ def measured_base(observations: list[Observation], conditions: list[Shown]) -> B
     alike = ~unused[use & (unused.mean(axis=1) < RARE)].any(axis=0)
     known = ~unused & alike & (expected > 0) & (expected < 0.95)
     residual = np.where(known, rates.rate / np.where(known, expected, 1.0) - 1.0, np.nan)
-    live = gain > 0.1 * np.median(gain) if np.median(gain) > 0 else np.ones(gain.shape, bool)
-    return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, live)
+    return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, responds(gain))
+
+
+def responds(gain: Array) -> NDArray[np.bool_]:
+    """(P,) pixels with a tenth of the usual gain; all where most get darker in more light."""
+    usual = np.median(gain)
+    return gain > 0.1 * usual if usual > 0 else np.ones(gain.shape, bool)
 
 
 def _of_scenes(observations: list[Observation]) -> BaseFit:

@@ -28,7 +28,7 @@ from spikecam_env.gap.compare import (
     own_variance,
     residual,
 )
-from spikecam_env.gap.fit import Fit, confirmed, fit, rejoined, resettled
+from spikecam_env.gap.fit import Fit, confirmed, fit, of_any_dark, rejoined, resettled
 from spikecam_env.gap.polish import Errors, polished
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.rivals import is_rival
@@ -111,6 +111,8 @@ def search(
         rounds = joined(case, model, null, seen, values, rounds)
         best = rounds[-1].fits[0]
         now, base, prediction = best.model, best.base, best.prediction
+        if prediction.own is not None:
+            prediction = of_any_dark(case, now, base, null, prediction)
         if left_over - turn.fits[0].misfit < LITTLE[len(rounds) > 1] * (left_over - chance):
             break
     rho, left_over = judged(null, seen, prediction)

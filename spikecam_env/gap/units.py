@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.refit import BaseFit
+from spikecam_env.gap.refit import BaseFit, responds
 from spikecam_env.gap.statistics import Key, pattern
 from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import SensorModel
@@ -58,7 +58,8 @@ def spread_factor(model: SensorModel, what: str, wanted: float, shape: tuple[int
     rest = model
     for name in {e.name for e in model.effects} & SPREADS[what].keys():
         rest = rest.without(name)
-    whole, others = (width(getattr(m.draw_unit(shape, seed), what)) for m in (model, rest))
+    units = [m.draw_unit(shape, seed) for m in (model, rest)]
+    whole, others = (width(getattr(unit, what)[responds(unit.gain)]) for unit in units)
     own = whole**2 - others**2
     return float(np.sqrt(max(wanted**2 - others**2, 0.0) / own)) if own > 1e-10 else 1.0
 
@@ -73,9 +74,9 @@ def width(values: Array) -> float:
 def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:
     """gain, dark (P,) of a fresh unit of the model, scaled to the measured unit's medians."""
     unit = model.draw_unit(shape, seed)
-    live = base.live & (base.gain > 0)
-    gain = unit.gain * (np.median(base.gain[live]) / max(float(np.median(unit.gain)), 1e-12))
-    middle = float(np.median(unit.dark))
+    live, alive = base.live & (base.gain > 0), responds(unit.gain)
+    gain = unit.gain * (np.median(base.gain[live]) / max(float(np.median(unit.gain[alive])), 1e-12))
+    middle = float(np.median(unit.dark[alive]))
     dark = unit.dark * (np.median(base.dark[live]) / middle) if middle > 0 else unit.dark
     return gain, dark
 

@@ -13,7 +13,19 @@ from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_patter
 from spikecam_env.gap.candidates import testable as split_testable
 from spikecam_env.gap.case import settled
 from spikecam_env.gap.compare import judged, misfit, scale_of, values_of
-from spikecam_env.gap.fit import FURTHEST, bounded, concerned, fit, predict, shifted, with_effect, with_held_out
+from spikecam_env.gap.fit import (
+    FURTHEST,
+    bounded,
+    concerned,
+    fit,
+    of_any_dark,
+    predict,
+    shifted,
+    with_effect,
+    with_held_out,
+)
+from spikecam_env.gap.refit import within
+from spikecam_env.gap.units import spread_factor
 from spikecam_env.sensor import CATALOGUE
 
 ONE, NONE = np.ones(200), np.zeros(200)
@@ -195,3 +207,26 @@ def test_held_out_flats_are_simulated_only_where_a_refit_can_judge_them():
     held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
     assert set(with_held_out(case, moving)) == set(moving)
     assert set(with_held_out(case, sorted(still))) == still | held
+
+
+def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_known():
+    """Dark levels all alike, as of pixels that have locked to the noise, against those of a fresh unit; bright light
+    does not depend on them."""
+    case, there = recorded(), null()
+    loud = with_effect(MODEL, "common_threshold_noise", {"sigma_mV": 20.0})
+    alike = within(loud, replace(case.base, dark=np.full_like(case.base.dark, np.median(case.base.dark))))
+    made = predict(case, loud, alike, there, 2)
+    wider = of_any_dark(case, loud, alike, there, made)
+    more = dict(zip(there.keys, np.sqrt(wider.error**2 - made.error**2) / there.noise, strict=True))
+    slopes = {k.recording: more[k] for k in there.keys if k.name == "slope"}
+    print(slopes)
+    np.testing.assert_array_equal(wider.mean, made.mean)
+    assert slopes["flat-0.03"] > 3 and slopes["flat-0.65"] < 3
+
+
+def test_pixels_that_do_not_respond_are_none_of_the_spread():
+    """Of a fifth of the array, which a refit leaves out as well."""
+    dead = with_effect(MODEL, "dead_pixels", {"fraction": 0.2})
+    factors = [spread_factor(m, "gain", 0.02, (64, 64), 3) for m in (MODEL, dead)]
+    print(factors)
+    assert factors[1] == pytest.approx(factors[0], rel=0.1)

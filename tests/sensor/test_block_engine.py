@@ -78,8 +78,10 @@ def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.
     for threads, longest in ((1, 1 << 18), (3, 1 << 18), (2, 1), (1, 5 * unit.gain.size)):
         monkeypatch.setattr(block, "_BLOCK", longest)
         state = block.start(first, effects, generator(0, "phase").random(unit.gain.size), 7)
-        parts = [Segment(*light, 64, 0, 64), Segment(light[1], light[1], 64, 0, 64)]
-        spikes = np.empty((128, unit.gain.size), np.uint8)
+        rise, stay = Segment(*light, 64, 0, 40), Segment(light[1], light[1], 64, 0, 30)
+        fall, again = Segment(light[1], light[0], 8, 0, 8), Segment(light[1].copy(), light[1].copy(), 64, 0, 30)
+        parts = [rise, replace(rise, first=40, count=24), fall, stay, again, Segment(light[0], light[0], 64, 0, 5)]
+        spikes = np.empty((sum(part.count for part in parts), unit.gain.size), np.uint8)
         streams.append(block.run(first, effects, state, parts, spikes, threads=threads))
     for other in streams[1:]:
         np.testing.assert_array_equal(other, streams[0])
