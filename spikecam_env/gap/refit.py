@@ -141,5 +141,20 @@ def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
     inverse = min(inverse, base.white)
     kappa = np.sqrt(max(base.white - inverse, 0.0))
     electrons = np.full_like(law.electrons, 1.0 / inverse) if inverse > 0 else law.electrons
+    swing = law.swing_V * _swings(model, base.gain)
     return replace(law, gain=base.gain, dark=base.dark, electrons=electrons, kappa=np.full_like(law.kappa, kappa),
-                   shot=inverse > 0)  # fmt: skip
+                   swing_V=swing, shot=inverse > 0)  # fmt: skip
+
+
+def _swings(model: SensorModel, gain: Array) -> Array:
+    """(P,) swing of each pixel over nominal, as its response lets expect: of what makes pixels differ by the model, a
+    share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less."""
+    circuit, spreads = model.circuit, {e.name: e.parameters() for e in model.effects}
+    bias = spreads.get("bias_voltage_spread", {}).get("sigma_V", 0.0) / circuit.swing_V
+    others = np.hypot(
+        spreads.get("conversion_gain_spread", {}).get("sigma", 0.0),
+        spreads.get("capacitor_spread", {}).get("sigma_fF", 0.0) / circuit.capacitance_fF,
+    )
+    share = bias**2 / (bias**2 + others**2) if bias > 0 else 0.0
+    usual = np.median(gain)
+    return np.clip(gain / usual, 0.5, 2.0) ** -share if usual > 0 else np.ones_like(gain)

@@ -7,6 +7,7 @@ import pytest
 from small import MODEL, SHAPE, effect, recorded, unit
 
 from spikecam_env.gap.refit import BaseFit, measured_base, unit_of, within
+from spikecam_env.gap.templates import unit_as_base
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 PIXELS = SHAPE[0] * SHAPE[1]
@@ -151,3 +152,16 @@ def test_unit_has_the_maps_of_the_refit():
     base = made_up()
     law = unit_of(MODEL, within(MODEL, base), SHAPE)
     assert np.array_equal(law.gain, base.gain) and np.array_equal(law.dark, base.dark)
+
+
+def test_a_slow_pixel_has_as_much_larger_a_swing_as_slow_pixels_of_the_model_have():
+    """Regression of log swing on log gain, over 16 384 drawn pixels: at one V_d no single pixel's swing is known."""
+    shape = (128, 128)
+    true = MODEL.draw_unit(shape, 3)
+    law = unit_of(MODEL, unit_as_base(true), shape)
+    x = np.log(true.gain / np.median(true.gain))
+    slopes = [np.polyfit(x, np.log(swing), 1)[0] for swing in (true.swing_V, law.swing_V)]
+    print(slopes)
+    assert slopes[0] < -0.2 and slopes[1] == pytest.approx(slopes[0], abs=0.03)
+    without = unit_of(MODEL.without("bias_voltage_spread"), unit_as_base(true), shape)
+    assert np.ptp(without.swing_V) == 0.0
