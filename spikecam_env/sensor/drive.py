@@ -46,9 +46,12 @@ def begin(first: Exposure, effects: Sequence[Effect], seed: int, unit_seed: int 
     }
 
 
-def expected_charge(now: Exposure, effects: Sequence[Effect], memory: Memory, mean: Array) -> tuple[Charge, Charge]:
+def expected_charge(
+    now: Exposure, effects: Sequence[Effect], memory: Memory, mean: Array, rise: Array | float = 0.0
+) -> tuple[Charge, Charge]:
     """Charge of the frames from light and in the dark, given that of the light law, mean (F or 1, P) [thresholds].
 
+    rise: of that law within each frame, as mean, where `wants_rise`.
     The dark part matters, and is worked out, where an effect wants it or where dark charge is free of noise.
     Updates `memory`.
     """
@@ -58,10 +61,16 @@ def expected_charge(now: Exposure, effects: Sequence[Effect], memory: Memory, me
         return Charge(whole), Charge(np.zeros((1, *now.shape)))
     dark_grains = np.floor(now.unit.dark * GRAINS).reshape(now.shape)
     below = np.minimum(dark_grains / GRAINS, whole)
-    light, dark = Charge(whole - below), Charge(below)
+    light = Charge(whole - below, rise=rise if isinstance(rise, float) else rise.reshape(-1, *now.shape))
+    dark = Charge(below)
     for effect in acting:
         light, dark, memory[effect.name] = effect.collect(light, dark, now, memory[effect.name])
     return light, dark
+
+
+def wants_rise(effects: Sequence[Effect]) -> bool:
+    """Whether an effect asks how light changes within a frame."""
+    return any(effect.within_frame for effect in effects)
 
 
 def comparators(now: Exposure, effects: Sequence[Effect], memory: Memory) -> Comparators:

@@ -160,6 +160,11 @@ class Ramp:
         """Whether the light stays, for every pixel."""
         return not (self.curve.any() or self.rest.any())
 
+    @property
+    def rise(self) -> NDArray[np.float64]:
+        """(P,) by how much more light there is at a frame's end than at its start [grains/frame]."""
+        return 2.0 * self.curve + self.rest * (1.0 / (1 << 17))
+
     def collected(self, frame: int) -> NDArray[np.int32]:
         """Grains (P,) collected from the start of the key interval to the start of its frame."""
         k = np.int32(frame)

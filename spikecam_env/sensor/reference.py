@@ -60,15 +60,18 @@ def run(first: Exposure, effects: Sequence[Effect], state: ReferenceState, segme
     for i in range(segment.count):
         after = light.collected(segment.first + i + 1)
         now = replace(first, number=state.frame)
-        spikes[i] = step(now, effects, state, (after - before).astype(np.float64))
+        spikes[i] = step(now, effects, state, (after - before).astype(np.float64), light.rise)
         state.frame += 1
         before = after
     return spikes
 
 
-def step(now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array) -> NDArray[np.bool_]:
-    """One frame: `mean` (P,) is its expected charge [grains]; returns which pixels report a spike (P,)."""
-    light, dark = drive.expected_charge(now, effects, state.memory, mean / GRAINS)
+def step(
+    now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array, rise: Array
+) -> NDArray[np.bool_]:
+    """One frame: `mean` (P,) is its expected charge [grains], which rises by `rise` (P,) from its start to its end;
+    returns which pixels report a spike (P,)."""
+    light, dark = drive.expected_charge(now, effects, state.memory, mean / GRAINS, rise / GRAINS)
     dark_grains = np.maximum(dark.values[0], 0.0).reshape(-1) * GRAINS
     mean = np.maximum(light.values[0], 0.0).reshape(-1) * GRAINS + dark_grains
     state.charge += collect(now.unit, mean, dark_grains, state.rng)

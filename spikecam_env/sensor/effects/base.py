@@ -94,19 +94,27 @@ class Charge:
 
     pixels: (F, H, W), or (1, H, W) where all frames are alike.  factor: (F, 1, 1), (F, H, 1) or a number.
     Two parts, so that what is common to all pixels costs a number a frame and not a picture.
+    rise: as pixels, or 0: by how much more of it comes at a frame's end than at its start, a frame.  An effect that
+    changes charge otherwise than by a factor may leave it out.
     """
 
     pixels: Array
     factor: Array | float = 1.0
+    rise: Array | float = 0.0
 
     def scaled(self, factor: Array | float) -> Charge:
         """This, times a number a frame or a row."""
-        return Charge(self.pixels, self.factor * factor)
+        return Charge(self.pixels, self.factor * factor, self.rise)
 
     @property
     def values(self) -> Array:
         """Multiplied out: (F, H, W), or (1, H, W) where all frames are alike."""
-        return self.pixels if isinstance(self.factor, float) else self.pixels * self.factor
+        return self.pixels if isinstance(self.factor, float) and self.factor == 1.0 else self.pixels * self.factor
+
+    @property
+    def rises(self) -> Array:
+        """`rise`, multiplied out."""
+        return np.asarray(self.rise * self.factor)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,6 +164,8 @@ class Effect:
     """
 
     stage: ClassVar[Stage]
+    within_frame: ClassVar[bool] = False
+    """Whether `collect` asks for the rise of light within a frame."""
     name: ClassVar[str] = "effect"
     strength: ClassVar[str]
     neutral: ClassVar[float] = 0.0

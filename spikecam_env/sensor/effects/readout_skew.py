@@ -1,12 +1,14 @@
 """Read-out skew: rows are read one after the other, the first earlier than the last.
 
     row r is read e = s (1 - r/(H - 1)) frames before the end of the frame that its bit is counted in
-    light of its frame: x_t <- (1 - e) x_t + e x_(t-1)
+    light of its frame: x_t <- x_t + e (x_(t-1) - x_t) + e (1 - e) / 2 (d_(t-1) - d_t)
+
+x_t being the light of frame t, which rises by d_t from its start to its end: exact where light is linear in a frame.
 
 Stage: read-out.  Seen in: steps of light (a row's response comes up to s frames later), moving edges (a slant);
 nothing in static light.
-Source: sequential read-out of rows, as in a rolling shutter.  Light within a frame, and before
-frame 0, is taken as steady.
+Source: sequential read-out of rows, as in a rolling shutter.  Light before frame 0 is taken as steady; where another
+effect has changed it otherwise than by a factor, within a frame as well.
 """
 
 from __future__ import annotations
@@ -24,19 +26,21 @@ class ReadoutSkew(Effect):
 
     stage = Stage.READOUT
     strength = "span"
+    within_frame = True
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None
 
     def collect(
-        self, light: Charge, dark: Charge, now: Exposure, memory: Array | None
-    ) -> tuple[Charge, Charge, Array | None]:
-        x = light.values
-        first = x[0] if memory is None else memory
-        if len(x) == 1 and np.array_equal(first, x[0]):
-            return light, dark, first
-        x = np.broadcast_to(x, (now.frames, *now.shape))
+        self, light: Charge, dark: Charge, now: Exposure, memory: tuple[Array, Array] | None
+    ) -> tuple[Charge, Charge, tuple[Array, Array]]:
+        x, d = light.values, light.rises
+        last, last_d = memory or (x[0], np.zeros(now.shape))
+        if len(x) == 1 and not d.any() and not last_d.any() and np.array_equal(last, x[0]):
+            return light, dark, (last, last_d)
+        x, d = np.broadcast_to(x, (now.frames, *now.shape)), np.broadcast_to(d, (now.frames, *now.shape))
         rows = now.shape[0]
         early = self.span * (1.0 - np.arange(rows)[:, None] / max(rows - 1, 1))
-        before = np.concatenate([first[None], x[:-1]])
-        return Charge(x + early * (before - x)), dark, x[-1].copy()
+        before, before_d = np.concatenate([last[None], x[:-1]]), np.concatenate([last_d[None], d[:-1]])
+        read = x + early * (before - x) + 0.5 * early * (1.0 - early) * (before_d - d)
+        return Charge(read), dark, (x[-1].copy(), d[-1].copy())

@@ -115,9 +115,10 @@ def run(
     done = 0
     for parts in _blocks(state.law, segments, max(1, _BLOCK // state.charge.size)):
         mean = _mean(parts)
+        rise = _rise(parts) if drive.wants_rise(effects) else 0.0
         count = sum(part.count for part in parts)
         now = replace(first, number=state.frame, frames=count)
-        _block(now, effects, state, mean, spikes[done : done + count], threads)
+        _block(now, effects, state, mean, rise, spikes[done : done + count], threads)
         state.frame += count
         done += count
     return spikes
@@ -171,10 +172,11 @@ def _block(
     effects: Sequence[Effect],
     state: BlockState,
     mean: Array,
+    rise: Array | float,
     spikes: NDArray[np.uint8],
     threads: int | None,
 ) -> None:
-    light, dark = drive.expected_charge(now, effects, state.memory, mean)
+    light, dark = drive.expected_charge(now, effects, state.memory, mean, rise)
     law = drive.comparators(now, effects, state.memory)
     feedback = _sum([e.feedback(now) for e in effects])
     work = (
@@ -220,6 +222,13 @@ def _mean(parts: Sequence[_Part]) -> Array:
         block_loop.ramp_charge(p.light.level, p.light.curve, p.light.rest, p.first, mean[done : done + p.count])
         done += p.count
     return mean
+
+
+def _rise(parts: Sequence[_Part]) -> Array:
+    """Of that charge within a frame, as `_mean`."""
+    if parts[0].light.steady:
+        return np.zeros((1, parts[0].light.level.size))
+    return np.repeat([p.light.rise / GRAINS for p in parts], [p.count for p in parts], axis=0)
 
 
 def _pixels(charge: Charge) -> Array:
