@@ -3,12 +3,11 @@
     row r is read e = s (1 - r/(H - 1)) frames before the end of the frame that its bit is counted in
     light of its frame: x_t <- x_t + e (x_(t-1) - x_t) + e (1 - e) / 2 (d_(t-1) - d_t)
 
-x_t being the light of frame t, which rises by d_t from its start to its end: exact where light is linear in a frame.
-
 Stage: read-out.  Seen in: steps of light (a row's response comes up to s frames later), moving edges (a slant);
 nothing in static light.
-Source: sequential read-out of rows, as in a rolling shutter.  Light before frame 0 is taken as steady; where another
-effect has changed it otherwise than by a factor, within a frame as well.
+Source: sequential read-out of rows, as in a rolling shutter.  The light x_t of a frame rises by d_t from its start to
+its end: exact where it is linear in a frame.  Before frame 0 it is taken as steady; where another effect has changed it
+otherwise than by a factor, within a frame as well.
 """
 
 from __future__ import annotations
