@@ -11,6 +11,7 @@ ones: their sd is that of independent spikes, scaled by what two twins of one mo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -91,9 +92,11 @@ def evidence_of(
         seed, takes = case.seed * 1000 + 900 + number, range(len(case.conditions))
         return tuple(simulate_seen(model, unit, case.conditions, case.observations, case.shape, seed, takes))
 
-    unit = after_base or base
-    first, again = twin(before, base, 0), twin(before, base, 1)
-    last = twin(after, unit, 2) if after else None
+    with ThreadPoolExecutor(case.jobs) as pool:
+        of_before = [pool.submit(twin, before, base, number) for number in (0, 1)]
+        of_after = pool.submit(twin, after, after_base or base, 2) if after else None
+        first, again = (made.result() for made in of_before)
+        last = of_after.result() if of_after else None
     return Evidence(
         conditions=case.conditions,
         measured=case.observations,
