@@ -101,16 +101,18 @@ def advance(  # type: ignore[no-untyped-def]
     rate, over, shift, stands = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
     electrons, noise, jitter = np.empty(most), np.empty(most), np.empty(most)
     stood = np.empty((5, rows), np.float64)
+    limit[:] = np.inf
+    for i in range(rows):
+        for j in range(columns):
+            line_of[i * pitch + j], pixel_of[i * pitch + j] = i, i * columns + j
     for row0 in range(top, bottom, rows):
         row1 = min(row0 + rows, bottom)
         used = (row1 - row0) * pitch
         stood[:] = np.nan
-        limit[:] = np.inf
         for r in range(row0, row1):
-            for j in range(columns):
-                h, p = (r - row0) * pitch + j, r * columns + j
-                line_of[h], pixel_of[h] = r, p
-                held[h], phi[h] = charge[p], threshold[p]
+            p0, h0 = r * columns, (r - row0) * pitch
+            copy(charge[p0 : p0 + columns], held[h0 : h0 + columns])
+            copy(threshold[p0 : p0 + columns], phi[h0 : h0 + columns])
         for t in range(frames):
             lights, darks, fields = light[t * light_moves], dark[t * dark_moves], field[t * field_moves]
             light_scale, dark_scale, factors, commons = light_factor[t], dark_factor[t], factor[t], common[t]
@@ -132,10 +134,10 @@ def advance(  # type: ignore[no-untyped-def]
                         load,
                         limit[h0 : h0 + columns],
                     )
-            for h in range(used):
-                c = held[h] + arrives[h]
-                held[h] = c
-                hit[h] = c >= limit[h]
+            for j in range(used):
+                c = held[j] + arrives[j]
+                held[j] = c
+                hit[j] = c >= limit[j]
             n = listed(eights[: used // 8], at)
             bits = spikes[t]
             for r in range(row0, row1):
@@ -144,13 +146,13 @@ def advance(  # type: ignore[no-untyped-def]
                     row_bits[j] = row_hit[j]
             for i in range(n):
                 h = _Q(at[i])
-                p = _Q(pixel_of[h])
+                p = _Q(row0 * columns + pixel_of[h])
                 pixel[i] = p
                 times[i] = fired[p]
                 fired[p] = _U(fired[p] + _U(1))
                 rate[i] = arrives[h] / _G
                 over[i] = held[h] - limit[h]
-                line = _Q(line_of[h])
+                line = _Q(row0 + line_of[h])
                 shift[i] = grains_per_mV[p] * (commons[line] + fields[p])
                 stands[i] = (_G * factors[line] + shift[i]) * (1.0 + droop * activity[line])
                 noise[i] = per_electron[p]
@@ -167,7 +169,8 @@ def advance(  # type: ignore[no-untyped-def]
                 stands[i] = needed(electrons[i], noise[i], jitter[i], draw[i])
             for i in range(n):
                 h = _Q(at[i])
-                f, load = factors[line_of[h]], 1.0 + droop * activity[line_of[h]]
+                line = _Q(row0 + line_of[h])
+                f, load = factors[line], 1.0 + droop * activity[line]
                 now = (stands[i] * f + shift[i]) * load
                 while over[i] >= now:
                     p = _Q(pixel[i])
@@ -190,19 +193,25 @@ def advance(  # type: ignore[no-untyped-def]
                     crossing[p] = crossed
                     held[h] = (held[h] / _G - stays) * _G
                     phi[h] = needed(electrons[i] + stays, noise[i], jitter[i], draw[i])
-                    load = 1.0 + droop * activity[line_of[h]]
-                    limit[h] = (phi[h] * factors[line_of[h]] + shift[i]) * load
+                    line = _Q(row0 + line_of[h])
+                    limit[h] = (phi[h] * factors[line] + shift[i]) * (1.0 + droop * activity[line])
             if droop != 0.0:
                 for r in range(row0, row1):
                     activity[r] = 0.0
                 for i in range(n):
-                    activity[line_of[at[i]]] += 1.0
+                    activity[row0 + line_of[at[i]]] += 1.0
                 for r in range(row0, row1):
                     activity[r] /= columns
         for r in range(row0, row1):
-            for j in range(columns):
-                h, p = (r - row0) * pitch + j, r * columns + j
-                charge[p], threshold[p] = held[h], phi[h]
+            p0, h0 = r * columns, (r - row0) * pitch
+            copy(held[h0 : h0 + columns], charge[p0 : p0 + columns])
+            copy(phi[h0 : h0 + columns], threshold[p0 : p0 + columns])
+
+
+@njit(inline="always")
+def copy(values, out):  # type: ignore[no-untyped-def]
+    for j in range(out.size):
+        out[j] = values[j]
 
 
 @njit(inline="always")
