@@ -15,6 +15,7 @@ from spikecam_env.gap.scene import simulate_seen
 from spikecam_env.gap.statistics import Key, bank, pattern_bank
 from spikecam_env.gap.statistics.moving import Film, films
 from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.twin import FIRST
 from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import SensorModel
 
@@ -89,7 +90,7 @@ def twins(
     only: recordings to simulate, by index; without all of those that the refit rests on, `base` stands for it.
     """
     with ThreadPoolExecutor(case.jobs) as pool:
-        return list(pool.map(lambda n: _twin(case, model, base, case.seed * 1000 + 17 + n, only), numbers))
+        return list(pool.map(lambda n: _twin(case, model, base, case.seed * 1000 + FIRST + n, only), numbers))
 
 
 def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None) -> Twin:

@@ -24,6 +24,9 @@ HEAVY = 8.0
 """Degrees of freedom of the loss: statistics far off count by their logarithm."""
 
 
+MEDIAN = 0.455
+"""Of the square of a normal deviate."""
+
 GATE = 0.005
 """Adjusted p-value of what a named effect leaves, below which something is left."""
 
@@ -239,12 +242,16 @@ def halved(null: Null, variances: Array) -> Array:
 def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array) -> tuple[Array, Array]:
     """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n).
 
+    What is far off is judged by how far off most is that moves: it would be outliers all, and hardly be heard.
+
     Statistics are not independent: the covariance is of how far the null's own draws would have led the step astray,
     with the floors and TOLERANCE of the effect, all of one sign, on top.
     """
     noise2 = variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
-    w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2) / noise2
+    concerned = np.isfinite(measured) & np.any(jacobian != 0, axis=1)
+    usual = max(float(np.median((gap**2 / noise2)[concerned])) / MEDIAN, 1.0) if concerned.any() else 1.0
+    w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2 / usual) / noise2
     normal = jacobian.T @ (w[:, None] * jacobian)
     scale = np.diag(normal) + 1e-12
     step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))

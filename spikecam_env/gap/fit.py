@@ -1,8 +1,8 @@
 """Fitting one candidate: simulate the campaign with it, scale and shape it until its statistics are the measured ones.
 
 Every twin is compared with the null's of the same draws, so that what is left of their difference is the effect.
-Statistics move in proportion to the strength (or its square), so each twin says by how much to scale the next; other
-parameters follow by Gauss-Newton.  The unit is refitted along the way, so that the candidate cannot borrow from it.
+Statistics move in proportion to the strength (or its square), so each twin says by how much to scale the next; its
+other parameters are of `shapes`.  The unit is refitted along the way, so that the candidate cannot borrow from it.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ from spikecam_env.gap.compare import (
     paired,
     scale_to,
     scaled,
-    slope_of,
-    step_of,
     values_of,
 )
 from spikecam_env.gap.refit import BaseFit, within
@@ -42,7 +40,7 @@ HOPE = 5.0
 """Misfit that a twin, scaled at best, has to remove for its fit to go on."""
 
 TURNS = 5
-"""Most twins, Gauss-Newton steps apart, that the fit of one candidate takes."""
+"""Most twins that the fit of one candidate's strength takes."""
 
 FURTHEST = 4.0
 """Times as far that a unit is shifted at once for a stronger effect: a straight line leads nowhere."""
@@ -122,7 +120,7 @@ def fit(
     expected: Array | None = None,
     white: float = 1.0,
 ) -> Fit:
-    """Best fit of one candidate added to `model`, whose own predictions are `null`.
+    """Best fit of one candidate's strength (of a pattern, all its parameters) added to `model`, which predicts `null`.
 
     start: parameters near the best.  expected: (S,) change of the statistics to expect there, to leave out recordings
     that it does not concern.  white: s^2 of the unit there, over the refit's.
@@ -162,7 +160,7 @@ def _fit_twins(
     white: float,
 ) -> Fit:
     """Twins at the start, made stronger until they show, scaled until the strength is right to a third and the unit has
-    settled; then, with shapes, Gauss-Newton; the last step is a scaling of what was simulated, without another twin."""
+    settled; the last step is a scaling of what was simulated, without another twin."""
     what = candidate(name)
     strength = what.fitted[0]
     power = what.power
@@ -190,14 +188,6 @@ def _fit_twins(
         if factor < 0 and not _may_be_negative(name):
             factor = 0.1
         near = 0.7 < factor < 1.4
-        if near and len(what.fitted) > 1 and turn < TURNS - 1:
-            step = _gauss_newton(case, model, null, measured, name, parameters, predicted, base, only)
-            parameters = bounded(name, {k: v * step.get(k, 1.0) for k, v in parameters.items()})
-            if max(abs(np.log(f)) for f in step.values()) > 0.1:
-                continue
-            predicted = predict(case, with_effect(model, name, parameters), base, null, twins_of(name), only)
-            scale, sd = scale_to(null, measured, predicted)
-            factor, near = float(np.clip(abs(scale) ** (1 / power), 0.7, 1.4)), True
         near |= abs(scale) * seen < VISIBLE
         if (near and turn) or turn == TURNS - 1:
             break
@@ -278,27 +268,6 @@ def _may_be_negative(name: str) -> bool:
     strength = CATALOGUE[name].strength
     bounds = CATALOGUE[name].__dataclass_fields__[strength].metadata["bounds"]
     return bool(bounds and bounds[0] < 0)
-
-
-def _gauss_newton(
-    case: Case,
-    model: SensorModel,
-    null: Null,
-    measured: Array,
-    name: str,
-    parameters: dict[str, float],
-    predicted: Prediction,
-    base: BaseFit,
-    only: Sequence[int],
-) -> dict[str, float]:
-    """Factors to multiply the fitted parameters by: one damped step in their logarithms, differences of 30 %."""
-    columns, fitted = [], candidate(name).fitted
-    for key in fitted:
-        nudged = with_effect(model, name, bounded(name, {**parameters, key: parameters[key] * 1.3}))
-        there = predict(case, nudged, within(nudged, base), null, twins_of(name), only)
-        columns.append(slope_of(null, there, predicted, np.log(1.3)))
-    step, _ = step_of(null, measured, predicted, np.stack(columns, axis=1))
-    return {key: float(np.exp(s)) for key, s in zip(fitted, np.clip(step, -1.0, 1.0), strict=True)}
 
 
 def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, count: int = AGAIN) -> Fit:

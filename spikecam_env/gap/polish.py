@@ -1,11 +1,8 @@
-"""The last touch: all parameters of the effects found, refined together, and how surely each is known.
-
-Gauss-Newton in their logarithms, on twins of the same draws as the null's.
-"""
+"""The last touch: all parameters of the effects found, refined together, and how surely each is known."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,17 +10,15 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import HIDDEN, Case
-from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, slope_of, step_of
+from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, step_of
+from spikecam_env.gap.descent import WHITE, Probe, descend
 from spikecam_env.gap.fit import (
     FINAL,
     Fit,
-    as_seen,
-    bounded,
     concerned,
     confirmed,
     predict,
     twins_of,
-    with_effect,
     with_held_out,
     with_pattern,
 )
@@ -32,22 +27,8 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-TURNS = 4
-
-SETTLED = 0.05
-"""Largest step of a logarithm that needs no other; nor does half of its error."""
-
-LONGEST = 0.7
-"""Largest step of a logarithm at once."""
-
 WORSE = 3.0
 """Misfit by which a step may seem worse, by chance of the draws."""
-
-WHITE = ("the unit", "white")
-"""The unit's own s^2, among parameters by effect and name, where an effect hides it."""
-
-Probe = Callable[[SensorModel, BaseFit], Prediction]
-"""What a model and a unit give."""
 
 AGREE = 3.0
 """Errors by which a parameter may move when held-out recordings are fitted as well, for them to agree."""
@@ -85,18 +66,11 @@ def _refined(
     """
     free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
     free += [WHITE] if 0 < found.base.white < HIDDEN * case.base.white else []
-    probe = _probe(case, null, measured, found, names)
     now, base = found.model, found.base
-    columns, covariance = np.zeros((len(measured), len(free))), np.zeros((len(free), len(free)))
-    for _ in range(TURNS if free else 0):
-        at = probe(now, base)
-        columns = np.stack([_column(probe, now, base, at, null, *what) for what in free], axis=1)
-        step, covariance = step_of(null, measured, at, columns)
-        step = np.clip(step, -LONGEST, LONGEST)
-        seen_as = as_seen(now, within(now, base), null, at)
-        now, base = moved(now, replace(seen_as, white=base.white) if WHITE in free else seen_as, free, step)
-        if np.all(np.abs(step) < np.maximum(SETTLED, 0.5 * np.sqrt(np.diag(covariance)))):
-            break
+    columns, covariance = np.zeros((len(measured), 0)), np.zeros((0, 0))
+    if free:
+        end = descend(_probe(case, null, measured, found, names), null, measured, now, base, free)
+        now, base, columns = end.model, end.base, end.columns
     best = confirmed(case, model, null, measured, replace(found, model=now, base=base), FINAL)
     if best.misfit > judged(null, measured, found.prediction)[1] + WORSE:
         best = found
@@ -123,27 +97,6 @@ def agree(before: Fit, after: Fit, errors: Errors) -> bool:
     here = {e.name: e.parameters() for e in before.model.effects}
     moves = [abs(then[n][k] - here[n][k]) / sd for n, by in errors.items() for k, sd in by.items() if sd > 0]
     return all(m < AGREE for m in moves)
-
-
-def moved(
-    model: SensorModel, base: BaseFit, free: Sequence[tuple[str, str]], step: Array
-) -> tuple[SensorModel, BaseFit]:
-    """The model and the unit with the logarithms of these parameters moved."""
-    for (name, key), s in zip(free, step, strict=True):
-        if (name, key) == WHITE:
-            base = replace(base, white=base.white * float(np.exp(s)))
-            continue
-        here = next(e for e in model.effects if e.name == name).parameters()
-        model = with_effect(model, name, bounded(name, {**here, key: here[key] * float(np.exp(s))}))
-    return model, base
-
-
-def _column(probe: Probe, model: SensorModel, base: BaseFit, at: Prediction, null: Null, name: str, key: str) -> Array:
-    """(S,) change of the statistics for one more of a parameter's logarithm."""
-    peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
-    first = (name, key) != WHITE and key == candidate(name).fitted[0]
-    nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if first else -0.2
-    return slope_of(null, probe(*moved(model, base, [(name, key)], np.array([nudge]))), at, nudge)
 
 
 def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:

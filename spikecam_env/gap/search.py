@@ -1,6 +1,6 @@
 """Forward selection: the effect that explains most is fitted, confirmed and added, while something is left.
 
-    [screen -> fit -> confirm -> add -> revisit the earlier ones -> polish all]*
+    [screen -> fit -> shape -> confirm -> add -> revisit the earlier ones -> polish all]*
 
 Held-out recordings take no part but in the choice between what others cannot tell apart, and, within errors, in
 parameters that others leave open.
@@ -31,7 +31,8 @@ from spikecam_env.gap.compare import (
 from spikecam_env.gap.fit import Fit, confirmed, fit, of_any_dark, rejoined, resettled
 from spikecam_env.gap.polish import Errors, polished
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.rivals import is_rival
+from spikecam_env.gap.rivals import LEAST, is_rival
+from spikecam_env.gap.shapes import shaped, worth_shaping
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.templates import Screened, Templates, screen
 from spikecam_env.sensor import SensorModel
@@ -135,16 +136,27 @@ def compared(
     screened = [s for i, s in enumerate(shapes) if s.name not in {before.name for before in shapes[:i]}]
     distance = np.nan_to_num((seen - here.mean) / here.noise)
     tried = worth_fitting(screened, misfit(distance, here.weight), loud(here, distance))
-    fitted = partial(_fitted, replace(case, base=turn.base), turn.model, here, seen)
+    unit = replace(case, base=turn.base)
+    fitted = partial(fits_of, unit, turn.model, here, seen, turn.misfit)
     confirm = partial(confirmed, case, turn.model, here, seen)
-    with ThreadPoolExecutor(case.jobs) as pool:
-        sure, rest = settle(list(pool.map(fitted, tried)), confirm)
-        again = other_shapes(sure[0].name, shapes, turn.misfit) if sure else []
-        anew = settle(list(pool.map(fitted, again)), confirm)[0]
+    sure, rest = settle(fitted(tried), confirm)
+    again = other_shapes(sure[0].name, shapes, turn.misfit) if sure else []
+    anew = settle(fitted(again), confirm)[0]
     if anew and anew[0].misfit < sure[0].misfit:
         sure[0] = anew[0]
     sure, rivals = chosen_of(null, here, seen, values, sure)
     return replace(turn, fits=(*sure, *rest), rivals=rivals)
+
+
+def fits_of(
+    case: Case, model: SensorModel, null: Null, seen: Array, before: float, starts: Sequence[Screened]
+) -> list[Fit]:
+    """Candidates fitted from where their templates say; before: misfit of none."""
+    with ThreadPoolExecutor(case.jobs) as pool:
+        fits = list(pool.map(lambda s: fit(case, model, null, seen, s.name, s.start, s.expected, s.white), starts))
+        worth = worth_shaping(null, before, fits)
+        better = list(pool.map(partial(shaped, case, model, null, seen), worth))
+    return [*better, *(f for f in fits if f not in worth)]
 
 
 def joined(
@@ -200,17 +212,21 @@ def chosen_of(
     null: Null, here: Null, seen: Array, values: Array, sure: Sequence[Fit]
 ) -> tuple[list[Fit], tuple[str, ...]]:
     """(fits, the chosen one first; names of its rivals).  What may as well be true as the first, by the recordings to
-    fit (`seen`), is put in order by all recordings (`values`), and has to remain a rival by them."""
+    fit (`seen`), is put in order by all recordings (`values`), and has to remain a rival by them.  A parameter more has
+    to explain more: what has one is chosen where it leaves LEAST less, and is a rival where it leaves less at all."""
     if not sure:
         return [], ()
     close = [f for f in sure if f is sure[0] or is_rival(here, null.draws, seen, sure[0].prediction, f.prediction)]
-    close.sort(key=lambda f: judged(here, values, f.prediction)[1])
+    misfits = {f.name: judged(here, values, f.prediction)[1] for f in close}
+    free = {f.name: len(candidate(f.name).fitted) for f in close}
+    close.sort(key=lambda f: misfits[f.name] + LEAST * free[f.name])
     best = close[0]
     left = residual(here, values, best.prediction)
     rivals = [
         f.name
         for f in close[1:]
-        if is_rival(here, null.draws, values, best.prediction, f.prediction)
+        if (free[f.name] <= free[best.name] or misfits[f.name] < misfits[best.name])
+        and is_rival(here, null.draws, values, best.prediction, f.prediction)
         and (alarmed(here, left) or not alarmed(here, residual(here, values, f.prediction)))
     ]
     return [*close, *(f for f in sure if f not in close)], tuple(rivals)
@@ -240,10 +256,6 @@ def revisited(
     if name != first.name:
         best = replace(sure[0], name=best.name, parameters=best.parameters, sd=best.sd)
     return best, replace(turn, fits=tuple(order), rivals=rivals)
-
-
-def _fitted(case: Case, model: SensorModel, null: Null, values: Array, s: Screened) -> Fit:
-    return fit(case, model, null, values, s.name, s.start, s.expected, s.white)
 
 
 def standing_on(null: Null, predicted: Prediction) -> Null:

@@ -16,6 +16,9 @@ from spikecam_env.streams import pack_frames
 
 _BLOCK = 1024
 
+FIRST = 17
+"""Seed of a campaign's first twin; the others' follow."""
+
 
 def simulate(
     model: SensorModel,
@@ -51,9 +54,15 @@ def expose(
 
 
 def at_any_phase(model: SensorModel, seed: int, take: int) -> SensorModel:
-    """The model with its waves at phases drawn for one recording: nobody starts a recording by the mains."""
-    rng = np.random.default_rng([seed, take])
+    """The model with its waves at phases drawn for one recording: nobody starts a recording by the mains.
+
+    Those of successive seeds are spread over the wave, two on opposite sides and four at right angles: of so few that
+    were drawn at random, all may be alike, and their scatter nothing.
+    """
+    rng = np.random.default_rng(take)
+    spread = int(f"{max(seed - FIRST, 0):064b}"[::-1], 2) / 2**64  # van der Corput's sequence
     for effect in model.effects:
         if "phase_cycles" in effect.parameters():
-            model = model.with_effect(replace(effect, phase_cycles=float(rng.random())))  # type: ignore[call-arg]
+            phase = (float(rng.random()) + spread) % 1.0
+            model = model.with_effect(replace(effect, phase_cycles=phase))  # type: ignore[call-arg]
     return model

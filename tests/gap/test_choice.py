@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from small import MODEL, effect, recorded, unit
 
 from spikecam_env.gap import search
@@ -44,24 +45,35 @@ def test_recordings_held_out_decide_between_what_the_others_cannot_tell_apart():
     """A twin that is a little better on the recordings to fit, and wrong on those held out."""
     n, effect, values, seen = campaign()
     nudge = np.where(np.arange(COUNT) < 50, 0.1 * np.sign(values - n.mean - effect), 0.0)
-    true, twin = a_fit(n, "true", effect, seen), a_fit(n, "twin", np.where(FIT, effect + nudge, 0.0), seen)
+    true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
     assert twin.misfit < true.misfit
     fits, rivals = chosen_of(n, n, seen, values, [twin, true])
-    assert [f.name for f in fits] == ["true", "twin"] and rivals == ()
+    assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
 
 
 def test_what_all_recordings_together_cannot_tell_apart_are_rivals():
     n, effect, values, seen = campaign()
-    one, other = a_fit(n, "one", effect, seen), a_fit(n, "other", 1.002 * effect, seen)
+    one, other = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", 1.002 * effect, seen)
     assert chosen_of(n, n, seen, values, [one, other])[1]
+
+
+@pytest.mark.parametrize(("better", "first"), [(0.0, "dead_time"), (20.0, "incomplete_reset")])
+def test_a_parameter_more_has_to_explain_more(better, first):
+    """An incomplete reset, whose time constant is free, with the change of a dead time, and once with what it lacks."""
+    n, effect, values, seen = campaign()
+    nudge = np.where((np.arange(COUNT) >= 50) & (np.arange(COUNT) < 60), better * n.sd, 0.0)
+    simple = a_fit(n, "dead_time", effect, seen + nudge)
+    richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
+    fits, rivals = chosen_of(n, n, seen + nudge, values + nudge, [richer, simple])
+    assert fits[0].name == first and rivals == ()
 
 
 def test_recordings_held_out_have_no_say_where_the_others_tell():
     """The wrong one is perfect where it is not asked, and has nothing to offer where it is."""
     n, effect, values, seen = campaign()
-    wrong = a_fit(n, "wrong", np.where(FIT, np.roll(effect * FIT, 60), values - n.mean), seen)
-    fits, rivals = chosen_of(n, n, seen, values, [a_fit(n, "true", effect, seen), wrong])
-    assert fits[0].name == "true" and rivals == ()
+    wrong = a_fit(n, "crosstalk", np.where(FIT, np.roll(effect * FIT, 60), values - n.mean), seen)
+    fits, rivals = chosen_of(n, n, seen, values, [a_fit(n, "dead_time", effect, seen), wrong])
+    assert fits[0].name == "dead_time" and rivals == ()
     assert chosen_of(n, n, seen, values, []) == ([], ())
 
 

@@ -1,0 +1,103 @@
+"""Gauss-Newton over the parameters of effects, in their logarithms, on twins of the same draws as the null's.
+
+Derivatives cost a twin a parameter: they are taken once, and then corrected by what each step turns out to change
+(Broyden), unless it was a long one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates import candidate
+from spikecam_env.gap.compare import Null, Prediction, slope_of, step_of
+from spikecam_env.gap.fit import as_seen, bounded, with_effect
+from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+TURNS = 4
+
+SETTLED = 0.05
+"""Largest step of a logarithm that needs no other; nor does half of its error."""
+
+FAR = 0.5
+"""Step of a logarithm beyond which derivatives are taken anew."""
+
+LONGEST = 0.7
+"""Largest step of a logarithm at once."""
+
+WHITE = ("the unit", "white")
+"""The unit's own s^2, among parameters by effect and name, where an effect hides it."""
+
+Probe = Callable[[SensorModel, BaseFit], Prediction]
+"""What a model and a unit give."""
+
+Free = Sequence[tuple[str, str]]
+"""Parameters by effect and name."""
+
+
+@dataclass(frozen=True)
+class Descent:
+    """Where it ended.  prediction: of the last twins, the last step added in proportion.  columns: (S, n) derivatives.
+
+    covariance: (n, n) of the logarithms.
+    """
+
+    model: SensorModel
+    base: BaseFit
+    prediction: Prediction
+    columns: Array
+    covariance: Array
+
+
+def descend(probe: Probe, null: Null, measured: Array, model: SensorModel, base: BaseFit, free: Free) -> Descent:
+    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best."""
+    at = probe(model, base)
+    columns = derivatives(probe, null, model, base, at, free)
+    for turn in range(TURNS):
+        step, covariance = step_of(null, measured, at, columns)
+        step = np.clip(step, -LONGEST, LONGEST)
+        there = as_seen(model, within(model, base), null, at)
+        model, base = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
+        if turn == TURNS - 1 or np.all(np.abs(step) < np.maximum(SETTLED, 0.5 * np.sqrt(np.diag(covariance)))):
+            break
+        after = probe(model, base)
+        if np.abs(step).max() < FAR:
+            columns = broyden(columns, step, after.mean - at.mean)
+        else:
+            columns = derivatives(probe, null, model, base, after, free)
+        at = after
+    return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
+
+
+def broyden(columns: Array, step: Array, change: Array) -> Array:
+    """(S, n) derivatives that give the change (S,) that a step (n,) turned out to make, where there are any."""
+    return np.asarray(columns + (columns != 0) * np.outer(change - columns @ step, step) / (step @ step))
+
+
+def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[SensorModel, BaseFit]:
+    """The model and the unit with the logarithms of these parameters moved."""
+    for (name, key), s in zip(free, step, strict=True):
+        if (name, key) == WHITE:
+            base = replace(base, white=base.white * float(np.exp(s)))
+            continue
+        here = next(e for e in model.effects if e.name == name).parameters()
+        model = with_effect(model, name, bounded(name, {**here, key: here[key] * float(np.exp(s))}))
+    return model, base
+
+
+def derivatives(probe: Probe, null: Null, model: SensorModel, base: BaseFit, at: Prediction, free: Free) -> Array:
+    """(S, n) change of the statistics for one more of each parameter's logarithm; at: what the model gives."""
+    peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
+    columns = []
+    for name, key in free:
+        strength = (name, key) != WHITE and key == candidate(name).fitted[0]
+        nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if strength else -0.2
+        there = probe(*moved(model, base, [(name, key)], np.array([nudge])))
+        columns.append(slope_of(null, there, at, nudge))
+    return np.stack(columns, axis=1)

@@ -1,0 +1,42 @@
+"""Time constants and other second parameters: found where they matter, and not asked for where they do not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small import MODEL, effect, null, recorded
+
+from spikecam_env.gap.compare import values_of
+from spikecam_env.gap.fit import fit
+from spikecam_env.gap.shapes import has_shapes, shaped, worth_shaping
+
+
+@pytest.mark.parametrize("start", [0.4, 2.5])
+def test_a_time_constant_is_found_from_a_start_far_off(start):
+    """Lag of 8 % and 1 ms."""
+    case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
+    measured = values_of(case.bank, null().keys)
+    first = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0 * start})
+    found = shaped(case, MODEL, null(), measured, first)
+    print(found.parameters, found.sd, f"misfit {first.misfit:.0f}, then {found.misfit:.0f} of {len(measured)}")
+    assert first.parameters["tau_us"] == 1000.0 * start
+    assert found.parameters["tau_us"] == pytest.approx(1000.0, rel=0.2)
+    assert found.parameters["fraction"] == pytest.approx(0.08, rel=0.15)
+    assert found.misfit < min(first.misfit - 10.0, 1.5 * len(measured))
+
+
+def test_more_parameters_are_not_fitted_where_fewer_leave_nothing():
+    case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
+    measured = values_of(case.bank, null().keys)
+    lag = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
+    loud = np.where(np.arange(len(lag.rho)) == 0, 50.0, 0.0)
+    enough = replace(lag, name="readout_skew", misfit=lag.misfit - 1.0, rho=0.0 * lag.rho)
+    assert has_shapes("photodiode_lag") and not has_shapes("readout_skew")
+    assert not has_shapes("hot_pixels"), "patterns are fitted whole"
+    before = lag.misfit + 100.0
+    assert worth_shaping(null(), before, [lag]) == [lag]
+    assert worth_shaping(null(), before, [lag, enough]) == []
+    assert worth_shaping(null(), before, [lag, replace(enough, rho=loud)]) == [lag], "something is left"
+    assert worth_shaping(null(), before, [lag, replace(enough, misfit=lag.misfit + 1.0)]) == [lag], "worse"
+    poor = replace(lag, misfit=before - 10.0)
+    assert worth_shaping(null(), before, [poor, replace(enough, rho=loud)]) == [], "removes next to nothing"
