@@ -190,7 +190,7 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
         return []
     if light[i] == 0:
         off = float(rate[i] / max(dark, 1e-9) - 1)
-        if abs(off) < LEAST_DARK or abs(rate[i] - dark) < 4 * left * rate[keep].min():
+        if off < LEAST_DARK or rate[i] - dark < 4 * left * rate[keep].min():  # none is darker than dark
             return []
         text = f"{names[i]}: labelled dark, but {100 * off:+.2g} % off what the flats extrapolate to"
     else:
