@@ -7,6 +7,7 @@ Derivatives cost a twin a parameter: they are taken once, and then corrected by 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,10 +56,12 @@ class Descent:
     covariance: Array
 
 
-def descend(probe: Probe, null: Null, measured: Array, model: SensorModel, base: BaseFit, free: Free) -> Descent:
-    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best."""
+def descend(
+    probe: Probe, null: Null, measured: Array, model: SensorModel, base: BaseFit, free: Free, jobs: int = 1
+) -> Descent:
+    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best.  jobs: threads."""
     at = probe(model, base)
-    columns = derivatives(probe, null, model, base, at, free)
+    columns = derivatives(probe, null, model, base, at, free, jobs)
     for turn in range(TURNS):
         step, covariance = step_of(null, measured, at, columns)
         step = np.clip(step, -LONGEST, LONGEST)
@@ -70,7 +73,7 @@ def descend(probe: Probe, null: Null, measured: Array, model: SensorModel, base:
         if np.abs(step).max() < FAR:
             columns = broyden(columns, step, after.mean - at.mean)
         else:
-            columns = derivatives(probe, null, model, base, after, free)
+            columns = derivatives(probe, null, model, base, after, free, jobs)
         at = after
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
 
@@ -91,13 +94,16 @@ def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[S
     return model, base
 
 
-def derivatives(probe: Probe, null: Null, model: SensorModel, base: BaseFit, at: Prediction, free: Free) -> Array:
+def derivatives(
+    probe: Probe, null: Null, model: SensorModel, base: BaseFit, at: Prediction, free: Free, jobs: int = 1
+) -> Array:
     """(S, n) change of the statistics for one more of each parameter's logarithm; at: what the model gives."""
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
-    columns = []
-    for name, key in free:
+
+    def column(name: str, key: str) -> Array:
         strength = (name, key) != WHITE and key == candidate(name).fitted[0]
         nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if strength else -0.2
-        there = probe(*moved(model, base, [(name, key)], np.array([nudge])))
-        columns.append(slope_of(null, there, at, nudge))
-    return np.stack(columns, axis=1)
+        return slope_of(null, probe(*moved(model, base, [(name, key)], np.array([nudge]))), at, nudge)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        return np.stack(list(pool.map(lambda what: column(*what), free)), axis=1)

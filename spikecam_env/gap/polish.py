@@ -69,7 +69,7 @@ def _refined(
     now, base = found.model, found.base
     columns, covariance = np.zeros((len(measured), 0)), np.zeros((0, 0))
     if free:
-        end = descend(_probe(case, null, measured, found, names), null, measured, now, base, free)
+        end = descend(_probe(case, null, measured, found, names), null, measured, now, base, free, case.jobs)
         now, base, columns = end.model, end.base, end.columns
     best = confirmed(case, model, null, measured, replace(found, model=now, base=base), FINAL)
     if best.misfit > judged(null, measured, found.prediction)[1] + WORSE:

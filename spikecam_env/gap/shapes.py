@@ -50,7 +50,8 @@ def shaped(case: Case, model: SensorModel, null: Null, measured: Array, found: F
         return predict(case, there, within(there, base), null, twins_of(found.name), only)
 
     names = candidate(found.name).fitted
-    end = descend(probe, null, measured, found.model, found.base, [(found.name, key) for key in names])
+    free = [(found.name, key) for key in names]
+    end = descend(probe, null, measured, found.model, found.base, free, case.jobs)
     rho, left = judged(null, measured, end.prediction)
     if left > found.misfit:
         return found

@@ -209,6 +209,16 @@ def test_step_finds_a_parameter_within_its_error_though_statistics_go_together()
     assert 0.8 < inside / 200 < 0.97
 
 
+@pytest.mark.parametrize("agree, step", [(10, 0.75), (35, 0.0)])
+def test_far_off_a_step_goes_where_most_point_and_not_where_few_agree_already(agree, step):
+    """Of 40 statistics that move alike some are 40 noises off; where those are the few, they are outliers."""
+    null = made_up(count=40)
+    measured = np.where(np.arange(40) < agree, 0.0, 40.0)
+    found, _ = step_of(null, measured, null.prediction, np.full((40, 1), 40.0))
+    print(found)
+    assert found[0] == pytest.approx(step, abs=0.05)
+
+
 def test_what_is_chance_in_each_recording_may_be_none_in_all():
     keys = [Key("intervals", f"r{i}", name) for i in range(9) for name in ("short", "long")]
     z = np.array([2.0 if k.name == "short" else 0.0 for k in keys])

@@ -7,6 +7,7 @@ import pytest
 from small import MODEL, effect, null, recorded
 
 from spikecam_env.gap.compare import values_of
+from spikecam_env.gap.descent import broyden
 from spikecam_env.gap.fit import fit
 from spikecam_env.gap.shapes import has_shapes, shaped, worth_shaping
 
@@ -23,6 +24,15 @@ def test_a_time_constant_is_found_from_a_start_far_off(start):
     assert found.parameters["tau_us"] == pytest.approx(1000.0, rel=0.2)
     assert found.parameters["fraction"] == pytest.approx(0.08, rel=0.15)
     assert found.misfit < min(first.misfit - 10.0, 1.5 * len(measured))
+
+
+def test_derivatives_are_corrected_to_what_a_step_turned_out_to_change():
+    """But those of statistics that do not move stay none."""
+    columns = np.array([[1.0, 0.5], [0.0, 2.0], [0.0, 0.0]])
+    step, change = np.array([0.5, 0.2]), np.array([1.0, 0.3, 0.7])
+    after = broyden(columns, step, change)
+    assert (after @ step)[0] == pytest.approx(1.0) and np.all(after[2] == 0) and after[1, 0] == 0
+    assert np.allclose(broyden(columns, step, columns @ step), columns)
 
 
 def test_more_parameters_are_not_fitted_where_fewer_leave_nothing():
