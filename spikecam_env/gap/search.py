@@ -109,12 +109,12 @@ def search(
         rounds.append(turn)
         if not turn.fits or left_over - turn.fits[0].misfit < GAIN or not shows(here, turn.fits[0]):
             break
-        rounds = joined(case, model, null, seen, values, rounds)
+        rounds = joined(case, model, null, seen, values, rounds, chance)
         best = rounds[-1].fits[0]
         now, base, prediction = best.model, best.base, best.prediction
         if prediction.own is not None:
             prediction = of_any_dark(case, now, base, null, prediction)
-        if left_over - turn.fits[0].misfit < LITTLE[len(rounds) > 1] * (left_over - chance):
+        if is_little(turn, turn.fits[0].misfit, chance, len(rounds) > 1):
             break
     rho, left_over = judged(null, seen, prediction)
     return [*rounds, Round(now, base, prediction, rho, left_over)]
@@ -159,10 +159,16 @@ def fits_of(
     return [*better, *(f for f in fits if f not in worth)]
 
 
+def is_little(turn: Round, left: float, chance: float, later: bool) -> bool:
+    """Whether a misfit `left` is little less than what a round started from; chance: misfit of noise alone."""
+    return turn.misfit - left < LITTLE[later] * (turn.misfit - chance)
+
+
 def joined(
-    case: Case, model: SensorModel, null: Null, seen: Array, values: Array, rounds: Sequence[Round]
+    case: Case, model: SensorModel, null: Null, seen: Array, values: Array, rounds: Sequence[Round], chance: float
 ) -> list[Round]:
-    """The rounds with the last one's best together with what was found before, and all of it polished."""
+    """The rounds with the last one's best together with what was found before, and all of it polished, unless it is
+    a stand-in: has little to say and leaves something."""
     *before, last = rounds
     best = last.fits[0]
     if before:
@@ -171,6 +177,8 @@ def joined(
             if turn.fits[0].name in {e.name for e in best.model.effects}:
                 best, before[i] = revisited(case, model, null, seen, values, best, turn)
     names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
+    if is_little(last, best.misfit, chance, bool(before)) and alarmed(null, best.rho):
+        return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
     last = replace(last, fits=(best, *last.fits[1:]), lent=lent)
     return [with_errors(r, errors) for r in (*before, last)]
