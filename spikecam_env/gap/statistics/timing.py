@@ -10,16 +10,21 @@ import numpy as np
 
 from spikecam_env.gap.statistics.reading import STILL, Reading, log
 
+LONGEST = 1.5
+"""Intervals of the slowest pixels that count, over the usual one."""
+
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """late: log variance over frames of the mean lateness of their spikes, over that of spikes on their own.
 
-    next: correlation of one frame's lateness with the next one's.  Of pixels without odd intervals, where most are.
+    next: correlation of one frame's lateness with the next one's.  Of pixels without odd intervals, where most are, and
+    once an interval of any of them may have ended: in the first frames only short ones have.
     """
     if reading.conditions[i].kind not in STILL:
         return {}
     o = reading.observations[i]
-    enough = o.timed >= 10
+    begins = min(int(np.ceil(LONGEST * o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9))), o.frames // 4)
+    enough = (o.timed >= 10) & (np.arange(o.frames) >= begins)
     if enough.sum() < 500 or o.timed.sum() < 0.5 * o.frame.sum():
         return {}
     alone = float(np.nanmean(o.variance[reading.base.live & (o.short + o.long == 0)]))
