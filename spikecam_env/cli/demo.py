@@ -38,30 +38,30 @@ class Demo:
         from spikecam_env.cli.showcase import comparison, film_frames, stream
         from spikecam_env.cli.table import table
 
-        folder = out_folder(self.out)
-        run = stream(
-            scene=self.scene,
-            rpm=self.rpm,
-            frames=self.frames,
-            mode=self.mode,
-            model=self.camera.load(),
-            shape=self.size,
-            seed=self.seed,
-        )
-        frames, rows = film_frames(run), comparison(run)
-        speed = {
-            "frames": len(run.noisy),
-            "camera's time, ms": 1e3 * len(run.noisy) / run.frame_rate_hz,
-            "scene and camera, s": run.camera_s,
-            "denoiser, s": run.denoiser_s,
-            "x real time": run.times_real,
-            "latency, frames": run.latency,
-        }
-        write_film(folder / "demo.mp4", frames, fps=15.0)
-        write_picture(folder / "demo.png", frames[len(frames) // 2])
-        options = {**asdict(self), "out": str(self.out)}
-        write_json(folder / "demo.json", {"options": options, "speed": speed, "table": rows})
-        print(table(rows))
-        print()
-        print(table([speed]))
-        print(f"wrote demo.mp4, demo.png and demo.json in {folder}")
+        with out_folder(self.out) as folder:
+            run = stream(
+                scene=self.scene,
+                rpm=self.rpm,
+                frames=self.frames,
+                mode=self.mode,
+                model=self.camera.load(),
+                shape=self.size,
+                seed=self.seed,
+            )
+            frames, rows = film_frames(run), comparison(run)
+            speed = {
+                "frames": len(run.noisy),
+                "camera's time, ms": 1e3 * len(run.noisy) / run.frame_rate_hz,
+                "scene and camera, s": run.camera_s,
+                "denoiser, s": run.denoiser_s,
+                "x real time": run.times_real,
+                "latency, frames": run.latency,
+            }
+            write_film(folder / "demo.mp4", frames, fps=15.0)
+            write_picture(folder / "demo.png", frames[len(frames) // 2])
+            options = {**asdict(self), "out": str(self.out)}
+            write_json(folder / "demo.json", {"options": options, "speed": speed, "table": rows})
+            print(table(rows))
+            print()
+            print(table([speed]))
+            print(f"wrote demo.mp4, demo.png and demo.json in {folder}")

@@ -60,46 +60,46 @@ class Denoise:
         recording = read_recording(self.file, **options, **({"flip": True} if self.flip else {}))
         noisy = recording.spikes
         frames = picture_frames(len(noisy), self.window)
-        folder = out_folder(self.out)
-        clean, rates = restore(noisy, self.mode, self.window, frames)
+        with out_folder(self.out) as folder:
+            clean, rates = restore(noisy, self.mode, self.window, frames)
 
-        attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
-        attributes |= {"denoiser": self.mode, "source": self.file.name}
-        with SpikeWriter(folder / "denoised.h5", clean.shape[1:], recording.frame_rate_hz, **attributes) as writer:
-            writer.append(clean)
+            attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
+            attributes |= {"denoiser": self.mode, "source": self.file.name}
+            with SpikeWriter(folder / "denoised.h5", clean.shape[1:], recording.frame_rate_hz, **attributes) as writer:
+                writer.append(clean)
 
-        white = float(np.percentile(noisy.mean(axis=0), 99.5)) or 1.0
-        streams = {
-            "noisy spikes": {t: middleTFP(noisy, t, self.window) for t in frames},
-            "denoised spikes": {t: middleTFP(clean, t, self.window) for t in frames},
-            "denoised rate": rates,
-        }
-        judged = frames[:: -(-len(frames) // 12)]
-        rows: list[dict[str, Any]] = []
-        for name, pictures in tqdm(streams.items(), desc="judge", unit="stream", leave=False):
-            rate = float(np.mean([p.mean() for p in pictures.values()]))
-            row: dict[str, Any] = {"picture": name, "spikes/frame": rate}
-            try:
-                scores = [niqe(display(pictures[t], white) / 255) for t in judged]
-                row |= {"NIQE": float(np.mean(scores)), "+-": float(np.std(scores)), "pictures": len(scores)}
-            except InputError as error:
-                why = str(error)
-                row |= {"NIQE": None, "+-": None, "pictures": 0}
-            rows.append(row)
+            white = float(np.percentile(noisy.mean(axis=0), 99.5)) or 1.0
+            streams = {
+                "noisy spikes": {t: middleTFP(noisy, t, self.window) for t in frames},
+                "denoised spikes": {t: middleTFP(clean, t, self.window) for t in frames},
+                "denoised rate": rates,
+            }
+            judged = frames[:: -(-len(frames) // 12)]
+            rows: list[dict[str, Any]] = []
+            for name, pictures in tqdm(streams.items(), desc="judge", unit="stream", leave=False):
+                rate = float(np.mean([p.mean() for p in pictures.values()]))
+                row: dict[str, Any] = {"picture": name, "spikes/frame": rate}
+                try:
+                    scores = [niqe(display(pictures[t], white) / 255) for t in judged]
+                    row |= {"NIQE": float(np.mean(scores)), "+-": float(np.std(scores)), "pictures": len(scores)}
+                except InputError as error:
+                    why = str(error)
+                    row |= {"NIQE": None, "+-": None, "pictures": 0}
+                rows.append(row)
 
-        def side_by_side(frame: int) -> np.ndarray:
-            shown = [
-                Panel(pictures[frame], row["picture"], "" if row["NIQE"] is None else f"NIQE {row['NIQE']:.2f}")
-                for row, pictures in zip(rows, streams.values(), strict=True)
-            ]
-            return compose(shown, white, f"{self.mode}, {self.window} frames about frame {frame}")
+            def side_by_side(frame: int) -> np.ndarray:
+                shown = [
+                    Panel(pictures[frame], row["picture"], "" if row["NIQE"] is None else f"NIQE {row['NIQE']:.2f}")
+                    for row, pictures in zip(rows, streams.values(), strict=True)
+                ]
+                return compose(shown, white, f"{self.mode}, {self.window} frames about frame {frame}")
 
-        write_picture(folder / "pictures.png", side_by_side(frames[len(frames) // 2]))
-        if self.film:
-            write_film(folder / "film.mp4", (side_by_side(t) for t in frames), total=len(frames))
-        summary = {"file": str(self.file), "mode": self.mode, "window": self.window, "rows": rows}
-        write_json(folder / "summary.json", summary)
-        print(table(rows))
-        if rows[0]["NIQE"] is None:
-            print(f"no NIQE: {why}")
-        print(f"wrote {', '.join(sorted(p.name for p in folder.iterdir()))} in {folder}")
+            write_picture(folder / "pictures.png", side_by_side(frames[len(frames) // 2]))
+            if self.film:
+                write_film(folder / "film.mp4", (side_by_side(t) for t in frames), total=len(frames))
+            summary = {"file": str(self.file), "mode": self.mode, "window": self.window, "rows": rows}
+            write_json(folder / "summary.json", summary)
+            print(table(rows))
+            if rows[0]["NIQE"] is None:
+                print(f"no NIQE: {why}")
+            print(f"wrote {', '.join(sorted(p.name for p in folder.iterdir()))} in {folder}")

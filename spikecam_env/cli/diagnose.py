@@ -48,20 +48,20 @@ class Diagnose:
         from spikecam_env.gap.diagnose import diagnose
         from spikecam_env.gap.report import write_report
 
-        folder = out_folder(self.out)
-        diagnosis = diagnose(
-            self.campaign,
-            self.model,
-            candidates=self.candidates,
-            exclude=self.exclude,
-            seed=self.seed,
-            jobs=self.jobs,
-            progress=True,
-        )
-        diagnosis.write(folder)
-        write_report(diagnosis, folder / "report.html")
-        print(summary(diagnosis))
-        print(f"\nthe page: {folder / 'report.html'}   the model: {folder / 'model.toml'}")
+        with out_folder(self.out) as folder:
+            diagnosis = diagnose(
+                self.campaign,
+                self.model,
+                candidates=self.candidates,
+                exclude=self.exclude,
+                seed=self.seed,
+                jobs=self.jobs,
+                progress=True,
+            )
+            diagnosis.write(folder)
+            write_report(diagnosis, folder / "report.html")
+            print(summary(diagnosis))
+            print(f"\nthe page: {folder / 'report.html'}   the model: {folder / 'model.toml'}")
 
     def _known_effects(self) -> None:
         from spikecam_env.errors import unknown_name

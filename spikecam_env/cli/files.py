@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +12,22 @@ from spikecam_env.errors import InputError
 from spikecam_env.whole import write_text_whole
 
 
-def out_folder(path: Path) -> Path:
-    """Make (if needed) and return a folder for results; raises InputError where a file is in the way."""
+@contextmanager
+def out_folder(path: Path) -> Iterator[Path]:
+    """A folder for results, made if needed, and gone again if what was to fill it failed before it did; raises
+    InputError where a file is in the way."""
+    there = path.exists()
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot use {path} as a folder for results: {error.strerror}") from error
-    return path
+    try:
+        yield path
+    except BaseException:
+        if not there:
+            with suppress(OSError):
+                path.rmdir()
+        raise
 
 
 def write_json(path: Path, data: Any) -> None:

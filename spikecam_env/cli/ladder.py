@@ -37,9 +37,9 @@ class Ladder:
         SensorModel.load(self.model)
         from spikecam_env.gap import ladder
 
-        folder = out_folder(self.out)
-        made = ladder.ladder(self.campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
-        made.write(folder)
-        print(table(ladder.table(made)))
-        print(f"\ngap: mean square of {made.statistics} statistics' held-out part, in noise; 1 is chance")
-        print(f"the figure: {folder / 'ladder.png'}   the model: {folder / 'model.toml'}")
+        with out_folder(self.out) as folder:
+            made = ladder.ladder(self.campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
+            made.write(folder)
+            print(table(ladder.table(made)))
+            print(f"\ngap: mean square of {made.statistics} statistics' held-out part, in noise; 1 is chance")
+            print(f"the figure: {folder / 'ladder.png'}   the model: {folder / 'model.toml'}")

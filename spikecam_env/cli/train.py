@@ -37,6 +37,6 @@ class Train:
         from denoiser.train import TrainConfig, train
         from spikecam_env.cli.files import out_folder
 
-        out_folder(self.out)
-        path = train(TrainConfig(**vars(self)))
-        print(f"wrote {path}")
+        with out_folder(self.out):
+            path = train(TrainConfig(**vars(self)))
+            print(f"wrote {path}")
