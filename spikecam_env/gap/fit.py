@@ -58,7 +58,7 @@ UNITS = 24
 """Units drawn for the pattern statistics of one model."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A candidate at its best.  parameters, sd: by name.  prediction: what it gives; base: its unit.
 
