@@ -133,9 +133,8 @@ def compared(
     """The round with its candidates: screened, fitted, confirmed, the chosen one first.  here: what it stands on."""
     left = [n for n in names if n not in {e.name for e in turn.model.effects}]
     shapes = screen(templates, case.conditions, here, seen, left, line_of(case))
-    screened = [s for i, s in enumerate(shapes) if s.name not in {before.name for before in shapes[:i]}]
     distance = np.nan_to_num((seen - here.mean) / here.noise)
-    tried = worth_fitting(screened, misfit(distance, here.weight), loud(here, distance))
+    tried = worth_fitting(best_of_each(shapes), misfit(distance, here.weight), loud(here, distance))
     unit = replace(case, base=turn.base)
     fitted = partial(fits_of, unit, turn.model, here, seen, turn.misfit)
     confirm = partial(confirmed, case, turn.model, here, seen)
@@ -279,6 +278,11 @@ def line_of(case: Case) -> float | None:
     lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > 1000]
     (ratio, at), frame = max(lines, key=lambda line: line[0][0], default=((0.0, 0), np.zeros(1)))
     return frequency(frame, at) * case.frame_rate_hz if ratio > 30 else None
+
+
+def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
+    """Each candidate at the first, and best, of its shapes."""
+    return [s for i, s in enumerate(screened) if s.name not in {before.name for before in screened[:i]}]
 
 
 def worth_fitting(screened: Sequence[Screened], before: float, loud: Collection[str] = ()) -> list[Screened]:
