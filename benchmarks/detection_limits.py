@@ -5,7 +5,8 @@
 Limit: the strength at which the statistic that shows the effect best stands CLEAR noises off, in 64 x 64 pixels and
 8000 frames of the standard design, held-out recordings aside; the alarm, over some 450 statistics, rings from about
 4.2.  Effects in time are scaled from their template; those of the pattern, whose statistics are not in proportion, are
-searched for by drawing units.  The base model's own effects are not among them: they are hidden from `ideal`.
+searched for by drawing units; noise of a reset shows where it is more than units differ by.  The base model's own
+effects are not among them: they are hidden from `ideal`.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from numpy.typing import NDArray
 from spikecam_env.gap.campaign import standard_design
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.fit import bounded, with_effect, with_pattern
+from spikecam_env.gap.parameters import USUAL_NOISE
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.templates import FRAMES, SHAPE, load, standard_case
 from spikecam_env.gap.world import planned
-from spikecam_env.sensor import CATALOGUE
+from spikecam_env.sensor import CATALOGUE, SensorModel
 from tests.hidden_world.catalogue import CATALOGUE as HIDDEN
 
 CLEAR = 6.0
@@ -41,7 +43,16 @@ def measured() -> dict[str, float]:
         strength = abs(entry.parameters[CATALOGUE[entry.name].strength])
         by_name.setdefault(entry.name, []).append(strength * (CLEAR / peak) ** power)
     limits = {name: float(np.median(values)) for name, values in by_name.items() if name in HIDDEN}
-    return limits | of_pattern([name for name in limits if is_pattern(name)], limits)
+    limits |= of_pattern([name for name in limits if is_pattern(name)], limits)
+    return limits | {"excess_threshold_noise": of_a_reset()}
+
+
+def of_a_reset() -> float:
+    """Noise [mV] beside that of first principles."""
+    model = SensorModel.preset("physical")
+    unit = model.draw_unit(SHAPE, 0)
+    s2 = float(np.mean(1.0 / unit.electrons + unit.kappa**2))
+    return 1e3 * model.circuit.swing_V * float(np.sqrt((USUAL_NOISE - 1.0) * s2))
 
 
 def of_fit(keys: Sequence[Key]) -> NDArray[np.bool_]:

@@ -17,7 +17,10 @@ from spikecam_env.sensor import CATALOGUE, SensorModel
 Array = NDArray[np.float64]
 
 USUAL = 1.8
-"""Units differ from nominal by up to this factor; beyond, a parameter is wrong."""
+"""A unit's dark level and spreads differ from nominal by up to this factor; beyond, a parameter is wrong."""
+
+USUAL_NOISE = 1.5
+"""The same of s^2: the electrons, or the square of the millivolts, of a unit 20 % off."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> Off:
     ratios: dict[str, float] = {}
     shot = float(np.mean(1 / unit.electrons)) if unit.shot else 0.0
     reset = float(np.mean(unit.kappa**2))
-    if has.keys() & set(NOISE) and unusual(base.white / max(shot + reset, 1e-12)):
+    if has.keys() & set(NOISE) and unusual(base.white / max(shot + reset, 1e-12), USUAL_NOISE):
         if "reset_noise" in has and base.white > shot:
             ratios["reset_noise"] = float(np.sqrt((base.white - shot) / max(reset, 1e-12)))
         else:
@@ -67,9 +70,9 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> Off:
     return Off(rows, base)
 
 
-def unusual(ratio: float) -> bool:
+def unusual(ratio: float, usual: float = USUAL) -> bool:
     """Whether units do not differ by so much."""
-    return not 1 / USUAL < ratio < USUAL
+    return not 1 / usual < ratio < usual
 
 
 def nearer(values: Array, live: NDArray[np.bool_], factor: float) -> Array:

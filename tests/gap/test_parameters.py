@@ -50,6 +50,13 @@ def test_less_noise_than_shot_noise_is_more_electrons():
     assert list(off) == ["shot_noise"] and off["shot_noise"]["ratio"] > 2
 
 
+@pytest.mark.parametrize(("times", "off"), [(1.0, False), (1.2, False), (1.45, True)])
+def test_noise_is_off_where_units_20_percent_off_do_not_reach(times, off):
+    """Electrons a fifth fewer and a fifth more millivolts are a unit's; half as many millivolts again are none's."""
+    noisy = base_of(effect("shot_noise", quanta=50_000 / min(times, 1.2)), effect("reset_noise", sigma_mV=6.36 * times))
+    assert bool(off_nominal(recorded(), MODEL, noisy).parameters) == off
+
+
 def test_all_spreads_of_the_response_are_off_together_and_the_nominal_unit_has_the_models():
     wide = base_of(effect("conversion_gain_spread", sigma=0.2), effect("bias_voltage_spread", sigma_V=0.17))
     off = off_nominal(recorded(), MODEL, wide)
