@@ -1,4 +1,5 @@
-"""The floor of the gap: by how much two halves of the measurement differ, on the scale that the gap is stated on."""
+"""The floor of the gap: by how much two halves of the measurement differ, or two units in their pattern, on the scale
+that the gap is stated on."""
 
 from __future__ import annotations
 
@@ -24,8 +25,9 @@ def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: N
     """Mean of (first - second half)^2 / 4 noise^2 over the statistics of held-out steady recordings (of all steady
     ones where none is held out).
 
-    A statistic of n frames has a variance in 1/n, so two halves differ by four times the whole's.  Both halves are of
-    one unit, so the fixed pattern is the same on both sides.  NaN where no recording is long enough.
+    A statistic of n frames has a variance in 1/n, so two halves differ by four times the whole's.  Both are of one
+    unit: where the gap has the measured pattern against those of fresh units, the floor is by how much these differ.
+    NaN where no recording is long enough.
     """
     still = [
         (c, r)
@@ -43,9 +45,10 @@ def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: N
         for found, part in ((first, bits[:half]), (second, bits[half : 2 * half])):
             found.update(_bank(case.base, replace(c, frames=half), observe(part, case.shape)))
     keys = [k for k in null.keys if k in first and k in second]
-    noise = dict(zip(null.keys, null.noise, strict=True))
-    differ = values_of(first, keys) - values_of(second, keys)
-    return float(np.mean((differ / [2.0 * noise[k] for k in keys]) ** 2))
+    at = [null.keys.index(k) for k in keys]
+    halves = ((values_of(first, keys) - values_of(second, keys)) / 2.0) ** 2
+    units = (null.noise**2 - null.floor**2)[at]
+    return float(np.mean(np.where([k.group == "pattern" for k in keys], units, halves) / null.noise[at] ** 2))
 
 
 def _bank(base: BaseFit, condition: Shown, seen: Observation) -> dict[Key, float]:

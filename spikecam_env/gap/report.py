@@ -271,7 +271,7 @@ def _gap(d: Diagnosis) -> Iterator[str]:
     caption = (
         "Mean square distance of statistics from the model, in units of their noise. Orange: model as given; "
         "blue: patched; grey: floor, "
-        + ("chance." if d.gap.floor == 1.0 else "what two halves of the measurement differ by.")
+        + ("chance." if d.gap.floor == 1.0 else "two halves of the measurement, or the patterns of two units.")
     )
     use = {c.name: c.use for c in d.evidence.conditions} if d.evidence else {}
     held = [name for name in d.gap.by_recording if use.get(name, "holdout") == "holdout"]

@@ -102,7 +102,10 @@ class Bound:
 
 @dataclass(frozen=True)
 class Gap:
-    """Mean square distance of held-out statistics, in noise; floor: of two halves of the measurement."""
+    """Mean square distance of held-out statistics, in noise.
+
+    floor: of two halves of the measurement; in the pattern, of two units.
+    """
 
     before: float
     after: float

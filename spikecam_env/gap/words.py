@@ -97,7 +97,7 @@ LENT = (
 def gap_line(gap: Gap) -> str:
     """What a model's patch did to the gap."""
     off = f"statistics are {gap.before:.3g} off the model (mean square, in noise)"
-    chance = "1 is chance" if gap.floor == 1.0 else f"two halves of the measurement differ by {gap.floor:.3g}"
+    chance = "1 is chance" if gap.floor == 1.0 else f"chance, by two halves of the measurement, {gap.floor:.3g}"
     said = f"On recordings kept out of the fit, {off}; {chance}."
     if not math.isfinite(gap.removed) or gap.before <= 1.2 * gap.floor:
         return said

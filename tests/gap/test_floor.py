@@ -1,0 +1,32 @@
+"""The floor of the gap: what a model without fault would leave."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from small import MODEL, SHAPE, TWINS, case_from, conditions, unit
+
+from spikecam_env.gap.compare import values_of
+from spikecam_env.gap.floor import floor_of_halves
+from spikecam_env.gap.refit import unit_of
+from spikecam_env.gap.templates import model_null
+from spikecam_env.gap.twin import expose
+from spikecam_env.streams import unpack_frames
+
+
+def test_where_nothing_is_wrong_the_gap_is_its_floor_pattern_and_all():
+    """Three units of the model against it: gap and floor on the flat held out, of which a fifth is of the pattern."""
+    gaps, floors = [], []
+    for seed in (20, 21, 22):
+        law = unit_of(MODEL, unit(MODEL, seed), SHAPE)
+        packed = {c.name: expose(MODEL, law, c, SHAPE, seed, take) for take, c in enumerate(conditions())}
+        case = case_from({name: unpack_frames(bits, SHAPE) for name, bits in packed.items()}, seed)
+        null = model_null(case, MODEL, TWINS)
+        off = (values_of(case.bank, null.keys) - null.mean) / null.noise
+        gaps.append(np.nanmean(off[[k.recording == "flat-0.5" for k in null.keys]] ** 2))
+        files = [SimpleNamespace(name=name, packed=lambda bits=bits: bits) for name, bits in packed.items()]
+        floors.append(floor_of_halves(case, files, null))
+    print(gaps, floors)
+    assert np.mean(floors) == pytest.approx(np.mean(gaps), rel=0.5)
