@@ -34,12 +34,14 @@ from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import missing
+from spikecam_env.gap.null import model_null
 from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.parameters import Off, off_nominal
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.result import Diagnosis
+from spikecam_env.gap.screen import bounds
 from spikecam_env.gap.search import Round, of_fit, search
-from spikecam_env.gap.templates import Templates, bounds, load, model_null
+from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.verdict import concluded, grounded
 from spikecam_env.gap.words import sentence
 from spikecam_env.gap.world import KNOWN, Shown, observed, shown

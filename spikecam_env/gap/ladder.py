@@ -26,8 +26,9 @@ from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, adjusted, deviates, values_of
 from spikecam_env.gap.diagnose import ALARM, in_order, read_case
 from spikecam_env.gap.missing import Missing, missing
+from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import of_fit, search
-from spikecam_env.gap.templates import load, model_null
+from spikecam_env.gap.templates import load
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.whole import whole_file, write_text_whole
 

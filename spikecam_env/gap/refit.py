@@ -146,6 +146,13 @@ def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
                    swing_V=swing, shot=inverse > 0)  # fmt: skip
 
 
+def unit_as_base(unit: Unit) -> BaseFit:
+    """A drawn unit in the refit's terms: what a refit without error would find."""
+    white = float(np.mean((1 / unit.electrons if unit.shot else 0.0) + unit.kappa**2))
+    zero = np.zeros_like(unit.gain)
+    return BaseFit(unit.gain, unit.dark, zero, zero, white, np.zeros((0, unit.gain.size)), unit.gain > 0)
+
+
 def _swings(model: SensorModel, gain: Array) -> Array:
     """(P,) swing of each pixel over nominal, as its response lets expect: of what makes pixels differ by the model, a
     share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less."""

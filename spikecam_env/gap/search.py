@@ -32,9 +32,10 @@ from spikecam_env.gap.fit import Fit, confirmed, fit, of_any_dark, rejoined, res
 from spikecam_env.gap.polish import Errors, polished
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.rivals import LEAST, is_rival
+from spikecam_env.gap.screen import Screened, screen
 from spikecam_env.gap.shapes import shaped, worth_shaping
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
-from spikecam_env.gap.templates import Screened, Templates, screen
+from spikecam_env.gap.templates import Templates
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

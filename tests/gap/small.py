@@ -13,10 +13,10 @@ from scipy import stats
 from spikecam_env.gap import Bars, Dark, Flat, Step
 from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import Null, deviates, values_of
+from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe import observe
-from spikecam_env.gap.refit import BaseFit, unit_of
+from spikecam_env.gap.refit import BaseFit, unit_as_base, unit_of
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.templates import model_null, unit_as_base
 from spikecam_env.gap.twin import expose
 from spikecam_env.gap.world import Shown, planned
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel

@@ -8,8 +8,10 @@ from small import MODEL, TWINS, effect, recorded
 
 from spikecam_env.gap.candidates import NOISE_OF_A_RESET
 from spikecam_env.gap.compare import misfit, values_of
+from spikecam_env.gap.null import model_null
+from spikecam_env.gap.screen import screen
 from spikecam_env.gap.search import best_of_each, worth_fitting
-from spikecam_env.gap.templates import TIMES, load, model_null, screen
+from spikecam_env.gap.templates import TIMES, load
 from spikecam_env.sensor import CATALOGUE
 
 

@@ -1,0 +1,50 @@
+"""What a model predicts for a case: twins of its unit, and drawn units for the pattern."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.case import Case, settled, twins
+from spikecam_env.gap.compare import Null, null_of
+from spikecam_env.gap.fit import UNITS
+from spikecam_env.gap.refit import within
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.units import drawn_banks
+from spikecam_env.gap.world import Shown
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+
+def model_null(case: Case, model: SensorModel, count: int) -> Null:
+    """The prediction of `count` twins."""
+    base = within(model, case.base)
+    if case.scenes_only:  # too short for the closed law of jitter
+        base = settled(model, base, case.base, [t.base for t in twins(case, model, base, range(50, 54)) if t.base])
+    drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
+    made = twins(case, model, base, range(count))
+    banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]
+    null = null_of(banks, list(case.bank), [t.base for t in made if t.base])
+    values = np.array([[d.get(k, np.nan) for k in null.keys] for d in drawn])
+    of_pattern = np.array([k.group == "pattern" for k in null.keys])
+    return replace(
+        null,
+        mean=np.where(of_pattern, values.mean(axis=0), null.mean),
+        sd=np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
+        twins=np.where(of_pattern, UNITS, count),
+        weight=np.where(of_pattern, 1.0 / told(null.keys, case.conditions), 1.0),
+    )
+
+
+def told(keys: Sequence[Key], conditions: Sequence[Shown]) -> Array:
+    """(S,) how many recordings of use fit tell the same statistic of the pattern: those in the dark, or in light."""
+    lit = {c.name: c.kind != "dark" for c in conditions}
+    fit = {c.name for c in conditions if c.use == "fit"}
+    kind = [(k.name, lit[k.recording]) for k in keys]
+    counts = Counter(one for one, k in zip(kind, keys, strict=True) if k.recording in fit)
+    return np.array([max(counts[one], 1) for one in kind], dtype=np.float64)
