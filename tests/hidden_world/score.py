@@ -7,7 +7,8 @@ Rules
   that effect is named, or when the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
 - Its family is right when one effect of its family (FAMILIES) is named and none of another.
 - `unknown` where something of the catalogue is hidden is a false unknown.
-- A pair: an effect counts as found when it, or an equivalent, is named; a third is spurious when it stands for neither.
+- A pair: an effect counts as found when it, or an equivalent, is named, or is in such a class; a third is spurious when
+  it stands for neither.
 - A tricky case has its own acceptable answers (`cases.Answer`).
 - Intervals beside shares are 90 % binomial ones (Clopper-Pearson).
 """
@@ -117,7 +118,8 @@ def score_case(key: Json, result: Json) -> Scored:
     found = tuple(t for t in truth if any(stands_for(name, t) for name in named))
     excused = _class_of_truth(diagnosis, truth)
     spurious = tuple(name for name in named if not any(stands_for(name, t) for t in truth) and name not in excused)
-    right = _accepted(key["accept"], diagnosis) if key["accept"] else _named_right(verdict, named, truth)
+    all_of_it = bool(named) and not spurious and len(found) == len(truth)
+    right = _accepted(key["accept"], diagnosis) if key["accept"] else all_of_it
     removed = (diagnosis.get("gap") or {}).get("removed")
     return Scored(
         id=key["id"],
@@ -138,20 +140,10 @@ def score_case(key: Json, result: Json) -> Scored:
     )
 
 
-def _named_right(verdict: str, named: Sequence[str], truth: Sequence[str]) -> bool:
-    if verdict == "class":
-        return any(t in named for t in truth) and any(set(named) <= same for same in INSEPARABLE)
-    return bool(named) and all(any(stands_for(n, t) for t in truth) for n in named) and _all_found(named, truth)
-
-
 def _class_of_truth(diagnosis: Json, truth: Sequence[str]) -> set[str]:
     """Members of a class that holds a true name, and none that can be told from it."""
     members = set((diagnosis.get("class") or {}).get("members") or [])
     return members if members & set(truth) and any(members <= same for same in INSEPARABLE) else set()
-
-
-def _all_found(named: Sequence[str], truth: Sequence[str]) -> bool:
-    return all(any(stands_for(n, t) for n in named) for t in truth)
 
 
 def _accepted(answers: Sequence[Json], diagnosis: Json) -> bool:

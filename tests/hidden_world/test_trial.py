@@ -126,6 +126,16 @@ def test_right_names_families_and_twins():
     assert not answered(other, "class", "comparator_delay", **{"class": wide}).right
 
 
+def test_of_two_effects_one_may_be_a_class():
+    case = replace(case_of("pair", ""), truth=("threshold_flicker_noise", "dead_time"))
+    members = {"members": ["dead_time", "photo_response_nonlinearity"], "experiment": "a masked row"}
+    both = answered(case, "class", "dead_time", "threshold_flicker_noise", **{"class": members})
+    assert both.right and set(both.found) == set(case.truth) and not both.spurious
+    assert not answered(case, "class", "dead_time", **{"class": members}).right
+    third = answered(case, "class", "dead_time", "threshold_flicker_noise", "vignetting", **{"class": members})
+    assert not third.right and third.spurious == ("vignetting",)
+
+
 def test_excess_noise_may_be_called_a_wrong_parameter():
     case = case_of("strong", "excess_threshold_noise")
     assert case.model == "physical"
