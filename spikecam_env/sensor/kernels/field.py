@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
+from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
 from spikecam_env.sensor.kernels.quantile import fitted_polynomial
 
 Field = NDArray[np.float32]
@@ -81,6 +82,7 @@ def _normal(sigma: float) -> tuple[np.float32, ...]:
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def _white(low, high, first, polynomial, out):  # type: ignore[no-untyped-def]
     """out: (F, P) float32, overwritten."""
+    use_widest_vectors()  # type: ignore[call-arg]
     frames, pixels = out.shape
     key = np.empty((2, TILE), np.uint32)
     for start in range(0, pixels, TILE):
@@ -95,9 +97,14 @@ def _white(low, high, first, polynomial, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def _octaves(words, every, kept, driven, first, polynomial, value, total):  # type: ignore[no-untyped-def]
-    """value: (J, P) float32, updated.  total: (F, P) float32, overwritten."""
+    """value: (J, P) float32, updated.  total: (F, P) float32, overwritten.
+
+    Slow octaves are summed only when they move: above[j] is the sum of octaves j and slower.
+    """
+    use_widest_vectors()  # type: ignore[call-arg]
     octaves, pixels = value.shape
     key = np.empty((octaves, 2, TILE), np.uint32)
+    above = np.zeros((octaves + 1, TILE), np.float32)
     for start in range(0, pixels, TILE):
         n = min(TILE, pixels - start)
         for j in range(octaves):
@@ -105,15 +112,20 @@ def _octaves(words, every, kept, driven, first, polynomial, value, total):  # ty
         for t in range(total.shape[0]):
             number = first + t
             step = _U(_U(number) * GOLDEN)
-            row = total[t, start : start + n]
-            row[:] = _F(0.0)
+            moved = octaves - 1 if t == 0 else -1
             for j in range(octaves):
-                v, a, b, of = value[j, start : start + n], kept[j], driven[j], key[j]
                 if number % every[j] == 0:
+                    moved = max(moved, j)
+                    v, a, b, of = value[j, start : start + n], kept[j], driven[j], key[j]
                     for p in range(n):
                         v[p] = a * v[p] + b * standard(_U(of[0, p] + step), of[1, p], polynomial)
+            for j in range(moved, -1, -1):
+                v, here, slower = value[j, start : start + n], above[j], above[j + 1]
                 for p in range(n):
-                    row[p] += v[p]
+                    here[p] = slower[p] + v[p]
+            row = total[t, start : start + n]
+            for p in range(n):
+                row[p] = above[0, p]
 
 
 @njit(inline="always")
