@@ -23,7 +23,7 @@ from spikecam_env.calibration.campaign import USES, Campaign, read_campaign
 from spikecam_env.calibration.campaign_files import campaign_folder, finish_campaign, save_light, save_spikes
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
-from spikecam_env.sensor.sensor import checked_frames, checked_seed, checked_shape
+from spikecam_env.sensor.sensor import checked_count, checked_seed, checked_shape
 from spikecam_env.streams.packing import packed_bytes
 from spikecam_env.version import __version__
 from spikecam_env.whole import write_text_whole
@@ -160,7 +160,7 @@ def _check(takes: Sequence[Take], shape: tuple[int, int]) -> None:
             )
         if take.use not in USES:
             raise unknown_name(f"use of recording {take.name!r}", take.use, USES)
-        checked_frames(take.frames)
+        checked_count(take.frames)
         size = take.light.radiance.shape[1:]
         if not all(n in (1, m) for n, m in zip(size, shape, strict=True)):
             raise InputError(

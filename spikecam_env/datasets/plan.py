@@ -17,7 +17,7 @@ from scenes.renderers.choose import BACKENDS
 from spikecam_env.datasets.renderer import AUTO, renderer_of_process
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.sensor import checked_frames, checked_seed, checked_shape
+from spikecam_env.sensor.sensor import checked_count, checked_seed, checked_shape
 
 RANDOM = "random"
 """The scene of the catalogue that its seed draws."""
@@ -75,7 +75,7 @@ class Plan:
             raise unknown_name("renderer", self.renderer, (AUTO, *BACKENDS))
         checked_seed(self.truth_every, "truth_every")
         checked_seed(self.seed)
-        checked_frames(self.frames)
+        checked_count(self.frames)
         checked_shape(self.shape)
 
     def scene(self, entry: Entry) -> Scene:

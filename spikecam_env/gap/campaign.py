@@ -9,7 +9,7 @@ from pathlib import Path
 from spikecam_env.calibration import Campaign, Take, record_takes
 from spikecam_env.gap.recordings import Bars, Dark, Disk, Flat, Planned, Step
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.sensor import checked_frames, checked_shape
+from spikecam_env.sensor.sensor import checked_count, checked_shape
 
 FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
 HOLDOUT_LEVELS = (0.05, 0.15, 0.5)
@@ -38,7 +38,7 @@ def write_campaign(
     camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
     planned = standard_design() if recordings is None else recordings
     size = checked_shape(shape)
-    takes = [_take(p, size, checked_frames(frames if p.frames is None else p.frames)) for p in planned]
+    takes = [_take(p, size, checked_count(frames if p.frames is None else p.frames)) for p in planned]
     return record_takes(folder, camera, takes, shape=size, seed=seed, engine=engine, progress=progress)
 
 

@@ -97,7 +97,7 @@ def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequen
     which = range(len(case.conditions)) if only is None else only
     conditions = [case.conditions[i] for i in which]
     seen = [case.observations[i] for i in which]
-    observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which)
+    observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)
     own = measured_base(observations, conditions) if rests_on(case) <= set(which) else None
     return Twin(bank(Reading(observations, conditions, own or base, case.films)), own)
 

@@ -90,7 +90,7 @@ def evidence_of(
 
     def twin(model: SensorModel, unit: BaseFit, number: int) -> tuple[Observation, ...]:
         seed, takes = case.seed * 1000 + 900 + number, range(len(case.conditions))
-        return tuple(simulate_seen(model, unit, case.conditions, case.observations, case.shape, seed, takes))
+        return tuple(simulate_seen(model, unit, case.conditions, case.observations, case.shape, seed, takes, case.jobs))
 
     with ThreadPoolExecutor(case.jobs) as pool:
         of_before = [pool.submit(twin, before, base, number) for number in (0, 1)]

@@ -19,6 +19,7 @@ from spikecam_env.calibration.real import plausible_rates
 from spikecam_env.gap.observe import Observation
 from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.workers import at_once
 from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import Keyframes, SensorModel
 
@@ -42,24 +43,33 @@ def simulate_seen(
     shape: tuple[int, int],
     seed: int,
     takes: Sequence[int],
+    jobs: int = 1,
 ) -> list[Observation]:
-    """As `twin.simulate`, with unknown scenes lit so that their pixels fire as in `seen`, recording by recording."""
-    out = []
-    for c, o, take in zip(conditions, seen, takes, strict=True):
-        if c.kind != "unknown":
-            out += simulate(model, base, [c], shape, seed, [take])
-            continue
-        wanted = likely_rates(o, base.white, np.random.default_rng([seed, take]))
-        light = np.maximum(wanted - base.dark, 0.0) / np.maximum(base.gain, 1e-9)
-        for turn in range(_TURNS):
-            lit = replace(c, light=Keyframes(np.zeros(1), light.reshape(1, *shape).astype(np.float32)))
-            [twin] = simulate(model, base, [lit], shape, seed, [take])
-            factor = missed_by(twin.rate, wanted)
-            if turn == _TURNS - 1 or np.abs(factor - 1.0).max() < EXACT:
-                break
-            light = light * factor
-        out.append(twin)
-    return out
+    """As `twin.simulate`, with unknown scenes lit so that their pixels fire as in `seen`, `jobs` recordings at once."""
+
+    def one(what: tuple[Shown, Observation, int]) -> Observation:
+        condition, there, take = what
+        if condition.kind == "unknown":
+            return simulate_scene(model, base, condition, there, shape, seed, take)
+        return simulate(model, base, [condition], shape, seed, [take])[0]
+
+    return at_once(one, zip(conditions, seen, takes, strict=True), jobs)
+
+
+def simulate_scene(
+    model: SensorModel, base: BaseFit, scene: Shown, seen: Observation, shape: tuple[int, int], seed: int, take: int
+) -> Observation:
+    """One recording of an unknown scene, lit so that its pixels fire as in `seen`."""
+    wanted = likely_rates(seen, base.white, np.random.default_rng([seed, take]))
+    light = np.maximum(wanted - base.dark, 0.0) / np.maximum(base.gain, 1e-9)
+    for turn in range(_TURNS):
+        lit = replace(scene, light=Keyframes(np.zeros(1), light.reshape(1, *shape).astype(np.float32)))
+        [twin] = simulate(model, base, [lit], shape, seed, [take])
+        factor = missed_by(twin.rate, wanted)
+        if turn == _TURNS - 1 or np.abs(factor - 1.0).max() < EXACT:
+            break
+        light = light * factor
+    return twin
 
 
 def likely_rates(seen: Observation, white: float, rng: np.random.Generator) -> Array:

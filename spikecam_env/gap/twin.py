@@ -43,7 +43,7 @@ def expose(
     model: SensorModel, unit: Unit, condition: Shown, shape: tuple[int, int], seed: int, take: int
 ) -> NDArray[np.uint8]:
     """(F, P/8) bits of one recording in known light."""
-    sensor = SpikeSensor(at_any_phase(model, seed, take), shape, seed, engine="auto", take=take, unit=unit)
+    sensor = SpikeSensor(at_any_phase(model, seed, take), shape, seed, engine="auto", take=take, unit=unit, threads=1)
     light = condition.light
     assert light is not None
     picture: Keyframes | NDArray[np.float32] = light.radiance[0] if not condition.moves else light

@@ -15,7 +15,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels import cuda
 from spikecam_env.sensor.light import MAX_SEGMENT, Keyframes, Segment, as_light, check_radiance, segments
 from spikecam_env.sensor.model import SensorModel, generator
-from spikecam_env.sensor.sensor import checked_frames, checked_seed, checked_shape, imaged
+from spikecam_env.sensor.sensor import checked_count, checked_seed, checked_shape, imaged
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class SpikeSensorBatch:
         B, on each camera's own absolute frame numbers.  Optics (blur, vignetting) act on the host: a tensor on the GPU
         is copied there and back once a step.  Raises InputError as SpikeSensor.step does.
         """
-        frames = checked_frames(frames)
+        frames = checked_count(frames)
         pieces = self._pieces(radiance, frames)
         spikes = torch.empty((len(self), frames, self._pixels.pixels), dtype=torch.uint8, device=self.device)
         done = 0

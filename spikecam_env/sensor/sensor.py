@@ -52,6 +52,7 @@ class SpikeSensor:
     take: another recording by the same unit: other starting phase, other temporal noise.
     unit: a camera's own firing law, as measured, in place of one drawn from the model.  The model's fixed patterns and
         noise strengths are then not used; its optics and what its effects do from frame to frame are.
+    threads: of the fast engine, default NUMBA_NUM_THREADS; one where several cameras run at once.
     Raises InputError for an unknown engine, a shape that is not two positive whole numbers, a negative seed, for
     engine="fast" or "cuda" with an effect that it does not carry, for engine="cuda" without a CUDA device, and for a
     unit of another number of pixels or with values that are no firing law.
@@ -69,7 +70,10 @@ class SpikeSensor:
         engine: str = "fast",
         take: int = 0,
         unit: Unit | None = None,
+        *,
+        threads: int | None = None,
     ) -> None:
+        self.threads = None if threads is None else checked_count(threads, "threads")
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
         self.shape = checked_shape(shape)
         self.take = checked_seed(take, "take")
@@ -93,12 +97,12 @@ class SpikeSensor:
         radiance: (H, W) held throughout, or Keyframes on the stream's absolute frame numbers; 1.0 makes the nominal
         pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light or frames < 1.
         """
-        frames = checked_frames(frames)
+        frames = checked_count(frames)
         light = as_light(radiance, self.shape)
         spikes = _recycled(out, (frames, *self.shape)).reshape(frames, -1)
         seen = self._seen_by_pixels(light, frames)
         if self.engine == "fast" and self._frame_effects:
-            block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes)
+            block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
         else:
             done = 0
             for segment in seen:
@@ -129,7 +133,7 @@ class SpikeSensor:
 
     def clean_twin(self) -> SpikeSensor:
         """A noise-free camera at frame 0 with this one's initial phase: on the same scene it gives the clean stream."""
-        twin = SpikeSensor(self.model.noise_free(), self.shape, self.seed, self.engine, self.take)
+        twin = SpikeSensor(self.model.noise_free(), self.shape, self.seed, self.engine, self.take, threads=self.threads)
         twin._start(self.seed, phase=self.phase)
         return twin
 
@@ -155,7 +159,7 @@ class SpikeSensor:
 
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
         if self.engine == "fast":
-            ahead.run(self._pixels, segment, out)
+            ahead.run(self._pixels, segment, out, threads=self.threads)
         elif self.engine == "cuda":
             cuda = _cuda()
             batch = cuda.BatchSegment.of([segment], self._pixels.device)
@@ -213,13 +217,13 @@ def checked_shape(shape: Any) -> tuple[int, int]:
     return rows, columns
 
 
-def checked_frames(frames: Any) -> int:
+def checked_count(count: Any, name: str = "frames") -> int:
     try:
-        number = operator.index(frames)
+        number = operator.index(count)
     except TypeError:
         number = 0
     if number < 1:
-        raise InputError(f"frames = {frames!r}; it must be a whole number, 1 or more")
+        raise InputError(f"{name} = {count!r}; it must be a whole number, 1 or more")
     return number
 
 
