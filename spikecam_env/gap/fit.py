@@ -48,6 +48,10 @@ FURTHEST = 4.0
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
+LOUD = 24.0
+"""Noises that a weak effect is simulated to show at best, FURTHEST times as strong at most.  Scaled down, what twins
+scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
+
 AGAIN, FINAL = 2, 4
 """Twins by which a candidate is confirmed, and what was chosen of them in the end."""
 
@@ -164,20 +168,21 @@ def _fit_twins(
     what = candidate(name)
     strength = what.fitted[0]
     power = what.power
-    parameters = bounded(name, parameters)
+    expected = np.full(len(null.keys), np.inf) if expected is None else expected
+    parameters, louder = as_loud(name, bounded(name, parameters), size_of(null, measured, expected))
     bare = within(with_effect(model, name, parameters), within(model, case.base))
-    base = replace(bare, white=white * bare.white)
-    everywhere, before = np.full(len(null.keys), np.inf), judged(null, measured, null.prediction)[1]
-    only = concerned(case, [name], null, measured, everywhere if expected is None else expected)
+    base = replace(bare, white=white**louder * bare.white)
+    before = judged(null, measured, null.prediction)[1]
+    only = concerned(case, [name], null, measured, expected * louder)
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
         predicted = predict(case, tried, base, null, twins_of(name), only)
-        seen = float(np.max(np.isfinite(measured) * np.abs(predicted.mean - null.mean) / null.noise))
+        seen = size_of(null, measured, predicted.mean - null.mean)
         if seen < VISIBLE and turn < TURNS - 1:
-            louder = (2 * VISIBLE / max(seen, 0.2)) ** (1 / power)
-            stronger = bounded(name, {**parameters, strength: parameters[strength] * louder})
+            more = (2 * VISIBLE / max(seen, 0.2)) ** (1 / power)
+            stronger = bounded(name, {**parameters, strength: parameters[strength] * more})
             if stronger != parameters:
-                parameters, only = stronger, concerned(case, [name], null, measured, everywhere)
+                parameters, only = stronger, concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
                 continue
         base = as_seen(tried, base, null, predicted)
         scale, sd = scale_to(null, measured, predicted)
@@ -187,10 +192,12 @@ def _fit_twins(
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
         if factor < 0 and not _may_be_negative(name):
             factor = 0.1
-        near = 0.7 < factor < 1.4
-        near |= abs(scale) * seen < VISIBLE
+        weak = abs(scale) * seen < VISIBLE or (is_linear(name) and 1 / FURTHEST < scale < 1 and scale * seen < LOUD)
+        near = weak or 0.7 < factor < 1.4
         if (near and turn) or turn == TURNS - 1:
             break
+        if weak:
+            continue
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
         base = shifted(bare, base, factor**power)
         only = concerned(case, [name], null, measured, (predicted.mean - null.mean) * factor**power)
@@ -225,6 +232,47 @@ def _fit_wander(
     rho, left = judged(null, measured, predicted)
     sds = {strength: parameters[strength] * max(sd, np.sqrt(2.0 / len(only))) / power}
     return Fit(name, parameters, sds, predicted, base, rho, left, with_effect(model, name, parameters))
+
+
+def size_of(null: Null, measured: Array, change: Array) -> float:
+    """Noises by which a change of the statistics (S,) shows at best, on those that were measured."""
+    return float(np.max(np.where(np.isfinite(measured), np.abs(change), 0.0) / null.noise))
+
+
+def is_linear(name: str) -> bool:
+    """Whether statistics are in proportion to an effect's strength, or its square, so that it may be scaled."""
+    return not (is_pattern(name) or candidate(name).wanders or candidate(name).events)
+
+
+def as_loud(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
+    """(parameters, times as much) of an effect that shows by `size` noises, strong enough for LOUD where it is weak."""
+    strength, power = candidate(name).fitted[0], candidate(name).power
+    times = float(np.clip(LOUD / max(size, 1e-9), 1.0, FURTHEST)) if is_linear(name) and parameters[strength] else 1.0
+    louder = bounded(name, {**parameters, strength: parameters[strength] * times ** (1 / power)})
+    return louder, (louder[strength] / parameters[strength]) ** power if times > 1.0 else 1.0
+
+
+def made_loud(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, name: str) -> tuple[Fit, float]:
+    """(fit, times as strong) with the effect that it adds to `model`, and its unit, as `as_loud`."""
+    [effect] = [e for e in found.model.effects if e.name == name]
+    size = size_of(null, measured, found.prediction.mean - null.mean)
+    parameters, times = as_loud(name, effect.parameters(), size)
+    base = shifted(within(model, case.base), found.base, times)
+    return replace(found, model=with_effect(found.model, name, parameters), base=base), times
+
+
+def quietened(null: Null, loud: Prediction, times: float) -> Prediction:
+    """A prediction of an effect simulated `times` as strong, and its draws, brought down to its strength."""
+    without = {d.number: d for d in null.draws}
+    draws = tuple(
+        replace(
+            d,
+            values=w.values + (d.values - w.values) / times,
+            refit=shifted(w.refit, d.refit, 1 / times) if w.refit and d.refit else d.refit,
+        )
+        for d, w in ((d, without[d.number]) for d in loud.draws)
+    )
+    return replace(scaled(null, loud, 1 / times), draws=draws)
 
 
 def shifted(bare: BaseFit, settled: BaseFit, factor: float) -> BaseFit:
@@ -277,9 +325,14 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
     if not (added and all(is_pattern(name) for name in added)):
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
         count = max(count, *(WANDER if candidate(name).wanders else twins_of(name) for name in added), 1)
-        there, base = with_held_out(case, only), within(found.model, found.base)
-        predicted = predict(case, found.model, base, null, count, there)
-        if base.white < HIDDEN * case.base.white:
+        there = with_held_out(case, only)
+        loud, times = found, 1.0
+        severe = found.base.white < HIDDEN * case.base.white
+        if len(added) == 1 and not severe:
+            loud, times = made_loud(case, model, null, measured, found, added[0])
+        predicted = predict(case, loud.model, within(loud.model, loud.base), null, count, there)
+        predicted = quietened(null, predicted, times) if times > 1.0 else predicted
+        if severe:
             bare = predict(case, model, within(model, found.base), null, 1, there)
             predicted = replace(predicted, own=predicted.mean - bare.mean)
     if any(is_pattern(name) for name in added):

@@ -138,7 +138,7 @@ def compared(
     tried = worth_fitting(best_of_each(shapes), misfit(distance, here.weight), loud(here, distance))
     unit = replace(case, base=turn.base)
     fitted = partial(fits_of, unit, turn.model, here, seen, turn.misfit)
-    confirm = partial(confirmed, case, turn.model, here, seen)
+    confirm = partial(confirmed, unit, turn.model, here, seen)
     sure, rest = settle(fitted(tried), confirm)
     again = other_shapes(sure[0].name, shapes, turn.misfit) if sure else []
     anew = settle(fitted(again), confirm)[0]
@@ -252,11 +252,11 @@ def revisited(
     if not others:
         return best, turn
     rest = best.model.without(first.name)
-    here = standing_on(null, confirmed(case, model, null, seen, resettled(case, null, best, rest)).prediction)
+    alone = confirmed(case, model, null, seen, resettled(case, null, best, rest))
+    here, unit = standing_on(null, alone.prediction), replace(case, base=alone.base)
     with ThreadPoolExecutor(case.jobs) as pool:
-        unit = replace(case, base=best.base)
         fits = list(pool.map(lambda f: fit(unit, rest, here, seen, f.name, f.parameters), others))
-    confirm = partial(confirmed, case, rest, here, seen)
+    confirm = partial(confirmed, unit, rest, here, seen)
     sure = [confirm(replace(best, name=first.name)), *settle(fits, confirm)[0]]
     sure, rivals = chosen_of(null, here, seen, values, sorted(sure, key=lambda f: f.misfit))
     name = sure[0].name
