@@ -48,7 +48,7 @@ FURTHEST = 4.0
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
-LOUD = 24.0
+LOUD = 60.0
 """Noises that a weak effect is simulated to show at best, FURTHEST times as strong at most.  Scaled down, what twins
 scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
 

@@ -48,7 +48,8 @@ class Observation:
     frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (LAGS, 2) spikes of one pixel with its neighbour's,
     lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
     late: (F,) sum over the `timed` (F,) intervals that end in a frame of what they are longer than the pixel's mean
-    [frames], of pixels without short or long ones.  odd: (F,) short and long intervals that end in a frame.
+    [frames], of pixels without short or long ones; scatter: (F,) of the variances of those pixels' intervals.
+    odd: (F,) short and long intervals that end in a frame.
     """
 
     shape: tuple[int, int]
@@ -65,6 +66,7 @@ class Observation:
     coincidences: Array
     film: NDArray[np.uint8] | None
     late: Array
+    scatter: Array
     timed: NDArray[np.int32]
     odd: NDArray[np.int32]
 
@@ -92,9 +94,9 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
     moments = np.full((pixels, 4), np.nan)
     blocks = np.zeros((BLOCKS, pixels), np.int32)
     lengths = np.zeros(LENGTHS + 1, np.int64)
-    late = np.zeros(len(packed))
+    late, scatter = np.zeros((2, len(packed)))
     timed, odd = np.zeros((2, len(packed)), np.int32)
-    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths, late, timed, odd)
+    _pixels(as_words(packed), ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd)
     by_row = _rows_in_words(packed, shape)
     row = np.zeros((len(packed), shape[0]), np.int32)
     coincidences = np.zeros((LAGS, 2))
@@ -115,6 +117,7 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
         coincidences,
         _film(unpack_frames(packed, shape)) if film else None,
         late,
+        scatter,
         timed,
         odd,
     )
@@ -147,7 +150,7 @@ def _film(spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _pixels(words, ends, square, terms, moments, blocks, lengths, late, timed, odd):  # type: ignore[no-untyped-def]
+def _pixels(words, ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd):  # type: ignore[no-untyped-def]
     frames = words.shape[0]
     bits = np.empty((64, (frames + 63) // 64), np.uint64)
     t = np.empty(frames + 1, np.int32)
@@ -189,17 +192,19 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late, timed, o
                 squares += np.int64(d[i]) * d[i]
                 short += d[i] < least
                 long += d[i] > most
+            variance = squares / (n - 1) - mean * mean
             if short + long:
                 for i in range(n - 1):
                     odd[t[i + 1]] += d[i] < least or d[i] > most
             else:
                 for i in range(n - 1):
                     late[t[i + 1]] += d[i] - mean
+                    scatter[t[i + 1]] += variance
                     timed[t[i + 1]] += 1
             for i in range(n - 2):
                 products += np.int64(d[i]) * d[i + 1]
             # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2
-            moments[p, 0] = squares / (n - 1) - mean * mean
+            moments[p, 0] = variance
             inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
             moments[p, 1] = (products - mean * inner) / (n - 2) + mean * mean
             moments[p, 2], moments[p, 3] = short, long

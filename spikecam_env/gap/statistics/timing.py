@@ -27,9 +27,8 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     enough = (o.timed >= 10) & (np.arange(o.frames) >= begins)
     if enough.sum() < 500 or o.timed.sum() < 0.5 * o.frame.sum():
         return {}
-    alone = float(np.nanmean(o.variance[reading.base.live & (o.short + o.long == 0)]))
     late = np.where(enough, o.late / np.maximum(o.timed, 1), 0.0)
-    own = alone / np.maximum(o.timed, 1)
+    own = o.scatter / np.maximum(o.timed, 1) ** 2
     ratio = float((late[enough] ** 2).sum() / max(own[enough].sum(), 1e-12))
     both = enough[1:] & enough[:-1]
     product = float((late[1:] * late[:-1])[both].mean()) if both.any() else 0.0
