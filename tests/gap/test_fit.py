@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small import MODEL, effect, null, recorded, unit
+from small import MODEL, TWINS, effect, null, recorded, unit
 
 from spikecam_env.gap import fit as fit_module
 from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_pattern
@@ -15,15 +15,20 @@ from spikecam_env.gap.case import settled
 from spikecam_env.gap.compare import judged, misfit, scale_of, values_of
 from spikecam_env.gap.fit import (
     FURTHEST,
+    as_loud,
     bounded,
     concerned,
     fit,
+    made_loud,
     of_any_dark,
     predict,
+    quietened,
     shifted,
+    size_of,
     with_effect,
     with_held_out,
 )
+from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.units import spread_factor
 from spikecam_env.sensor import CATALOGUE
@@ -63,7 +68,7 @@ def test_parameters_are_kept_within_their_bounds_and_whole_where_they_count():
 
 
 def test_with_effect_adds_or_replaces_one_effect():
-    once = with_effect(MODEL, "dead_time", {"tau_us": 0.1})
+    once = with_effect(MODEL, "dead_time", {"tau_us": 0.05})
     twice = with_effect(once, "dead_time", {"tau_us": 0.2})
     assert len(once.effects) == len(twice.effects) == len(MODEL.effects) + 1
     assert [e.tau_us for e in twice.effects if e.name == "dead_time"] == [0.2]
@@ -112,6 +117,34 @@ def test_fit_of_the_true_effect_finds_its_strength_from_half_or_twice_of_it(star
     assert found.parameters["fraction"] == pytest.approx(0.08, rel=0.15)
     assert found.misfit < 1.5 * len(measured)
     assert found.model.effects[-1].name == "photodiode_lag" or "photodiode_lag" in {e.name for e in found.model.effects}
+
+
+def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
+    """A dead time that shows by some noises: two twins of it some times as strong, or all twelve of it as it is."""
+    case = recorded(effect("dead_time", tau_us=0.02))
+    there = model_null(case, MODEL, TWINS)
+    measured = values_of(case.bank, there.keys)
+    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.02})
+    size = size_of(there, measured, found.prediction.mean - there.mean)
+    loud, times = made_loud(case, MODEL, there, measured, found, "dead_time")
+    assert 1 < times <= FURTHEST and loud.parameters == found.parameters
+    which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
+    many = predict(case, found.model, found.base, there, TWINS, which)
+    few = predict(case, found.model, found.base, there, 2, which)
+    louder = quietened(there, predict(case, loud.model, loud.base, there, 2, which), times)
+    off = [float(np.sqrt(np.mean(((p.mean - many.mean) / there.noise) ** 2))) for p in (few, louder)]
+    print(f"shows by {size:.1f}; two twins are {off[0]:.2f} noises off, {times:.2f} times as loud {off[1]:.2f}")
+    assert off[1] < 0.7 * off[0]
+    draws = np.mean([d.values for d in louder.draws], axis=0) - np.mean([d.values for d in there.draws[-2:]], axis=0)
+    np.testing.assert_allclose(louder.mean - there.mean, np.nan_to_num(draws), atol=1e-9)
+
+
+def test_a_strong_effect_a_pattern_and_events_are_simulated_as_they_are():
+    assert as_loud("dead_time", {"tau_us": 0.2}, 200.0) == ({"tau_us": 0.2}, 1.0)
+    assert as_loud("vignetting", {"falloff": 0.1}, 20.0)[1] == 1.0
+    for name, parameters in (("dead_pixels", {"fraction": 0.01}), ("missed_spikes", {"probability": 1e-6})):
+        assert as_loud(name, parameters, 5.0) == (parameters, 1.0)
+    assert as_loud("supply_ripple", {"ripple": 1e-4}, 15.0) == ({"ripple": pytest.approx(2e-4)}, pytest.approx(4.0))
 
 
 def test_a_wrong_effect_leaves_more_than_the_right_one():

@@ -93,7 +93,7 @@ def test_variance_and_covariance_are_about_the_pixels_own_mean(stream):
 
 def test_short_long_and_odd_intervals_are_counted_where_they_end(stream):
     o = seen(stream)
-    odd, late, timed = np.zeros((3, len(stream)))
+    odd, late, scatter, timed = np.zeros((4, len(stream)))
     for p, t in enumerate(times_of_pixels(stream)):
         if t.size < 4:
             assert o.short[p] == o.long[p] == 0
@@ -104,9 +104,11 @@ def test_short_long_and_odd_intervals_are_counted_where_they_end(stream):
         np.add.at(odd, t[1:], short | long)
         if not np.any(short | long):
             np.add.at(late, t[1:], d - mean)
+            np.add.at(scatter, t[1:], d.var())
             np.add.at(timed, t[1:], 1)
     assert np.array_equal(o.odd, odd) and np.array_equal(o.timed, timed)
     assert np.allclose(o.late, late, atol=1e-9 * len(stream))
+    assert np.allclose(o.scatter, scatter, atol=1e-9 * len(stream))
 
 
 def test_intervals_are_counted_by_length_one_frame_first(stream):

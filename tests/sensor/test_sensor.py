@@ -9,6 +9,8 @@ import pytest
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
+from spikecam_env.sensor.kernels import block, fast
+from spikecam_env.sensor.kernels.threads import together
 
 ENGINES = ("reference", "fast")
 SHAPE = (9, 13)
@@ -139,6 +141,21 @@ def test_bad_arguments_are_named() -> None:
     for frame, radiance in (([1, 0], np.ones((2, 2, 2))), ([0], np.ones((2, 2))), ([0, np.nan], np.ones((2, 2, 2)))):
         with pytest.raises(InputError, match="Keyframes"):
             Keyframes(np.array(frame), radiance)
+
+
+@pytest.mark.parametrize("effects", [(), ("comparator_delay",)], ids=["pixels alone", "frame by frame"])
+def test_a_camera_takes_as_many_threads_as_it_is_given(effects: tuple[str, ...], monkeypatch) -> None:
+    model, taken = SensorModel.preset("scsim"), []
+    for name in effects:
+        model = model.with_effect(CATALOGUE[name]())
+    for module in (fast, block):
+        monkeypatch.setattr(module, "together", lambda parts, **k: (taken.append(len(parts)), together(parts, **k)))
+    light = np.full((200, 200), 0.3, np.float32)
+    one, three = (SpikeSensor(model, light.shape, 1, threads=n).step(light, 128) for n in (1, 3))
+    assert set(taken) == {1, 3}
+    np.testing.assert_array_equal(one, three)
+    with pytest.raises(InputError, match="threads = 0"):
+        SpikeSensor(model, SHAPE, threads=0)
 
 
 def test_frames_can_be_written_to_given_memory() -> None:
