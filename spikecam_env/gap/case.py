@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.observe import Observation
-from spikecam_env.gap.refit import BaseFit, measured_base, within
+from spikecam_env.gap.refit import BaseFit, measured_base
 from spikecam_env.gap.scene import simulate_seen
 from spikecam_env.gap.statistics import Key, bank, pattern_bank
 from spikecam_env.gap.statistics.moving import Film, films
@@ -20,10 +20,6 @@ from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-HIDDEN = 0.5
-"""Share of a refit's s^2 that is the unit's own, below which it stays: beside so much noise of an effect, the refit of
-twins does not tell it (`polish` does, by all statistics)."""
 
 
 @dataclass(frozen=True)
@@ -106,29 +102,3 @@ def rests_on(case: Case) -> set[int]:
     """Recordings that the base refit rests on: of use fit and of known light, or where none is, of unknown scenes."""
     known = {i for i, c in enumerate(case.conditions) if c.kind in KNOWN and c.use == "fit"}
     return known or {i for i, c in enumerate(case.conditions) if c.kind == "unknown"}
-
-
-def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
-    """Indirect inference: shift the unit `used` so that its twins, refitted as `simulated`, are refitted as `wanted`.
-
-    The shift of a pixel is a smooth function of its own response and dark level: pixel by pixel it would be tuned to
-    the noise of these very twins.  Where an effect is so strong that most pixels of the twins fall silent, it stays.
-    """
-    live = wanted.live & (wanted.gain > 0) & np.all([s.gain > 0 for s in simulated], axis=0)
-    if live.mean() < 0.5:
-        return used
-    ratio = np.log(wanted.gain[live] / np.mean([s.gain[live] for s in simulated], axis=0))
-    gain = used.gain * np.exp(_surface(used, live, ratio))
-    dark = used.dark + _surface(used, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))
-    white = used.white + wanted.white - float(np.mean([s.white for s in simulated]))
-    white = used.white if used.white < HIDDEN * wanted.white else max(white, 0.1 * used.white)
-    return within(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
-
-
-def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Array) -> Array:
-    """(P,) least-squares polynomial of second order through y, of the pixels `known`, over their gain and dark level;
-    outliers of y are cut."""
-    y = np.clip(y, *np.quantile(y, [0.02, 0.98]))
-    g, d = ((v - v[known].mean()) / max(float(v[known].std()), 1e-12) for v in (unit.gain, unit.dark))
-    over = np.stack([np.ones_like(g), g, d, g * g, g * d, d * d], axis=1)
-    return np.asarray(over @ np.linalg.lstsq(over[known], y)[0], np.float64)

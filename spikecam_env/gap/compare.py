@@ -153,6 +153,11 @@ def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
     return np.array([bank.get(k, np.nan) for k in keys])
 
 
+def size_of(null: Null, measured: Array, change: Array) -> float:
+    """Noises by which a change of the statistics (S,) shows at best, on those that were measured."""
+    return float(np.max(np.where(np.isfinite(measured), np.abs(change), 0.0) / null.noise))
+
+
 def deviates(null: Null, values: Array) -> Array:
     """(S,) normal deviates: Student's t of few twins, made normal; 0 where unknown."""
     return normal(null, np.nan_to_num((values - null.mean) / null.noise))

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate
 from spikecam_env.gap.compare import Null, Prediction, slope_of, step_of
-from spikecam_env.gap.fit import as_seen, bounded, with_effect
+from spikecam_env.gap.fit import as_seen
 from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

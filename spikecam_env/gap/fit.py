@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.case import HIDDEN, Case, rests_on, settled, twins
+from spikecam_env.gap.case import Case, rests_on, twins
 from spikecam_env.gap.compare import (
     Draw,
     Null,
@@ -24,17 +24,17 @@ from spikecam_env.gap.compare import (
     paired,
     scale_to,
     scaled,
+    size_of,
     values_of,
 )
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.units import drawn, drawn_banks
-from spikecam_env.sensor import CATALOGUE, SensorModel
-from spikecam_env.sensor.effects.base import build
+from spikecam_env.gap.settle import FURTHEST, settled, shifted
+from spikecam_env.gap.strength import LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
+from spikecam_env.gap.units import drawn_banks
+from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-NEEDED = 15.0
-"""Misfit by which an effect found earlier has to be missed, once another has been added, to be kept."""
 
 HOPE = 5.0
 """Misfit that a twin, scaled at best, has to remove for its fit to go on."""
@@ -42,18 +42,10 @@ HOPE = 5.0
 TURNS = 5
 """Most twins that the fit of one candidate's strength takes."""
 
-FURTHEST = 4.0
-"""Times as far that a unit is shifted at once for a stronger effect: a straight line leads nowhere."""
 
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
-LOUD = 60.0
-"""Noises that a weak effect is simulated to show at best, FURTHEST times as strong at most.  Scaled down, what twins
-scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
-
-AGAIN, FINAL = 2, 4
-"""Twins by which a candidate is confirmed, and what was chosen of them in the end."""
 
 WANDER, EVENTS = 6, 3
 """Twins of an effect that makes statistics scatter, and of one that is few events."""
@@ -136,23 +128,6 @@ def fit(
     return _fit_twins(case, model, null, measured, name, dict(start), expected, white)
 
 
-def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
-    """The model with a candidate added."""
-    return model.with_effect(build(CATALOGUE, name, dict(parameters)))
-
-
-def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
-    """Parameters within what their effect allows, whole where they must be."""
-    out = {}
-    for key, f in CATALOGUE[name].__dataclass_fields__.items():
-        if key not in parameters:
-            continue
-        low, high = f.metadata["bounds"] or (-np.inf, np.inf)
-        value = float(np.clip(parameters[key], low, high))
-        out[key] = round(value) if isinstance(f.default, int) and not isinstance(f.default, bool) else value
-    return out
-
-
 def _fit_twins(
     case: Case,
     model: SensorModel,
@@ -190,7 +165,7 @@ def _fit_twins(
             factor, near = 1e-3, True
             break
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
-        if factor < 0 and not _may_be_negative(name):
+        if factor < 0 and not may_be_negative(name):
             factor = 0.1
         weak = abs(scale) * seen < VISIBLE or (is_linear(name) and 1 / FURTHEST < scale < 1 and scale * seen < LOUD)
         near = weak or 0.7 < factor < 1.4
@@ -234,58 +209,6 @@ def _fit_wander(
     return Fit(name, parameters, sds, predicted, base, rho, left, with_effect(model, name, parameters))
 
 
-def size_of(null: Null, measured: Array, change: Array) -> float:
-    """Noises by which a change of the statistics (S,) shows at best, on those that were measured."""
-    return float(np.max(np.where(np.isfinite(measured), np.abs(change), 0.0) / null.noise))
-
-
-def is_linear(name: str) -> bool:
-    """Whether statistics are in proportion to an effect's strength, or its square, so that it may be scaled."""
-    return not (is_pattern(name) or candidate(name).wanders or candidate(name).events)
-
-
-def as_loud(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
-    """(parameters, times as much) of an effect that shows by `size` noises, strong enough for LOUD where it is weak."""
-    strength, power = candidate(name).fitted[0], candidate(name).power
-    times = float(np.clip(LOUD / max(size, 1e-9), 1.0, FURTHEST)) if is_linear(name) and parameters[strength] else 1.0
-    louder = bounded(name, {**parameters, strength: parameters[strength] * times ** (1 / power)})
-    return louder, (louder[strength] / parameters[strength]) ** power if times > 1.0 else 1.0
-
-
-def made_loud(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, name: str) -> tuple[Fit, float]:
-    """(fit, times as strong) with the effect that it adds to `model`, and its unit, as `as_loud`."""
-    [effect] = [e for e in found.model.effects if e.name == name]
-    size = size_of(null, measured, found.prediction.mean - null.mean)
-    parameters, times = as_loud(name, effect.parameters(), size)
-    base = shifted(within(model, case.base), found.base, times)
-    return replace(found, model=with_effect(found.model, name, parameters), base=base), times
-
-
-def quietened(null: Null, loud: Prediction, times: float) -> Prediction:
-    """A prediction of an effect simulated `times` as strong, and its draws, brought down to its strength."""
-    without = {d.number: d for d in null.draws}
-    draws = tuple(
-        replace(
-            d,
-            values=w.values + (d.values - w.values) / times,
-            refit=shifted(w.refit, d.refit, 1 / times) if w.refit and d.refit else d.refit,
-        )
-        for d, w in ((d, without[d.number]) for d in loud.draws)
-    )
-    return replace(scaled(null, loud, 1 / times), draws=draws)
-
-
-def shifted(bare: BaseFit, settled: BaseFit, factor: float) -> BaseFit:
-    """The unit for an effect `factor` times as strong as the one under which `bare` became `settled`; no further than
-    FURTHEST times as far, for it will settle anew."""
-    factor = min(factor, FURTHEST)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(bare.gain > 0, settled.gain / bare.gain, 1.0)
-    dark = np.maximum(bare.dark + factor * (settled.dark - bare.dark), 0.0)
-    white = bare.white * (settled.white / bare.white) ** factor if bare.white > 0 else settled.white
-    return replace(settled, gain=bare.gain * ratio**factor, dark=dark, white=white)
-
-
 def concerned(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int]:
     """Recordings of use fit on which effects show, or something has to be explained, by index; all where none does.
 
@@ -310,66 +233,6 @@ def with_held_out(case: Case, only: Sequence[int]) -> list[int]:
     if not rests_on(case) <= {*only, *held}:
         held = {i for i in held if case.conditions[i].moves}
     return sorted({*only, *held})
-
-
-def _may_be_negative(name: str) -> bool:
-    strength = CATALOGUE[name].strength
-    bounds = CATALOGUE[name].__dataclass_fields__[strength].metadata["bounds"]
-    return bool(bounds and bounds[0] < 0)
-
-
-def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, count: int = AGAIN) -> Fit:
-    """The fit simulated with more draws, on the recordings held out as well."""
-    added = [e.name for e in found.model.effects if e not in model.effects]
-    predicted = null.prediction
-    if not (added and all(is_pattern(name) for name in added)):
-        only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
-        count = max(count, *(WANDER if candidate(name).wanders else twins_of(name) for name in added), 1)
-        there = with_held_out(case, only)
-        loud, times = found, 1.0
-        severe = found.base.white < HIDDEN * case.base.white
-        if len(added) == 1 and not severe:
-            loud, times = made_loud(case, model, null, measured, found, added[0])
-        predicted = predict(case, loud.model, within(loud.model, loud.base), null, count, there)
-        predicted = quietened(null, predicted, times) if times > 1.0 else predicted
-        if severe:
-            bare = predict(case, model, within(model, found.base), null, 1, there)
-            predicted = replace(predicted, own=predicted.mean - bare.mean)
-    if any(is_pattern(name) for name in added):
-        predicted = with_pattern(case, found.model, null, predicted)
-    rho, left = judged(null, measured, predicted)
-    return replace(found, prediction=predicted, rho=rho, misfit=left)
-
-
-def of_any_dark(case: Case, model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> Prediction:
-    """A prediction known no better than the dark levels of a fresh unit of the model would change it.
-
-    Slow pixels lock to a severe noise, or drown in it: a refit then does not show how they differ.
-    """
-    _, dark = drawn(model, base, case.shape, case.seed)
-    other = predict(case, model, within(model, replace(base, dark=dark)), null, 1)
-    here = next(d for d in predicted.draws if d.number == other.draws[-1].number)
-    change = np.nan_to_num(other.draws[-1].values - here.values)
-    return replace(predicted, error=np.hypot(predicted.error, change))
-
-
-def resettled(case: Case, null: Null, found: Fit, model: SensorModel) -> Fit:
-    """The fit with another model, and its unit settled under it."""
-    base = within(model, found.base)
-    return replace(found, model=model, base=as_seen(model, base, null, predict(case, model, base, null, 1)))
-
-
-def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Sequence[str]) -> Fit:
-    """All effects found so far together; one that is no longer needed is left out again.
-
-    model, null: as given, before any was added.
-    """
-    both = confirmed(case, model, null, measured, resettled(case, null, found, found.model))
-    for name in [n for n in earlier if n in {e.name for e in both.model.effects}]:
-        fewer = confirmed(case, model, null, measured, resettled(case, null, both, both.model.without(name)))
-        if fewer.misfit < both.misfit + NEEDED:
-            both = fewer
-    return both
 
 
 def _fit_pattern(

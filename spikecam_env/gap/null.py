@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.case import Case, settled, twins
+from spikecam_env.gap.case import Case, twins
 from spikecam_env.gap.compare import Null, null_of
 from spikecam_env.gap.fit import UNITS
 from spikecam_env.gap.refit import within
+from spikecam_env.gap.settle import settled
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.gap.world import Shown

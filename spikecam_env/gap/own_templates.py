@@ -10,9 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from spikecam_env.gap.candidates import is_pattern
-from spikecam_env.gap.case import Case, settled, twins
+from spikecam_env.gap.case import Case, twins
 from spikecam_env.gap.compare import Null
 from spikecam_env.gap.refit import within
+from spikecam_env.gap.settle import settled
 from spikecam_env.gap.templates import Templates, simulated, starts
 from spikecam_env.sensor import SensorModel
 

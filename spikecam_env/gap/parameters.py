@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.fit import bounded, with_effect
 from spikecam_env.gap.refit import NOISE, BaseFit
+from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.units import SPREADS, spread_factor, width
 from spikecam_env.sensor import CATALOGUE, SensorModel
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern, of_motion
 from spikecam_env.gap.compare import TOLERANCE, Null, misfit, of_a_pair, pooled, scale_of
-from spikecam_env.gap.fit import bounded
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.strength import bounded, may_be_negative
 from spikecam_env.gap.templates import Template, Templates
 from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import CATALOGUE
@@ -80,7 +80,7 @@ def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Scree
     """A template scaled to the measured distances `d`, in noise; None where only a wrong sign would do."""
     own2 = of_a_pair(null.keys) ** 2 * (shift != 0)
     scale, _ = scale_of(d, shift, np.ones_like(d), own2, 2 * TOLERANCE)
-    if scale <= 0 and not _signed(entry.name):
+    if scale <= 0 and not may_be_negative(entry.name):
         return None
     strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
     rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
@@ -130,11 +130,6 @@ def bounds(
             unit = CATALOGUE[entry.name].__dataclass_fields__[key].metadata["unit"]
             found[entry.name] = Bound(entry.name, key, unit, float(below))
     return [found[name] for name in sorted(found)]
-
-
-def _signed(name: str) -> bool:
-    f = CATALOGUE[name].__dataclass_fields__[CATALOGUE[name].strength]
-    return bool(f.metadata["bounds"] and f.metadata["bounds"][0] < 0)
 
 
 def _places(templates: Templates, conditions: Sequence[Shown], keys: Sequence[Key]) -> NDArray[np.int64]:

@@ -28,7 +28,8 @@ from spikecam_env.gap.compare import (
     own_variance,
     residual,
 )
-from spikecam_env.gap.fit import Fit, confirmed, fit, of_any_dark, rejoined, resettled
+from spikecam_env.gap.confirm import confirmed, of_any_dark, rejoined, resettled
+from spikecam_env.gap.fit import Fit, fit
 from spikecam_env.gap.polish import Errors, polished
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.rivals import LEAST, is_rival

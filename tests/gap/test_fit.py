@@ -1,35 +1,17 @@
-"""Scaling an effect to a measurement, its bounds, and which recordings it concerns."""
+"""Scaling an effect to a measurement, which recordings it concerns, and what is a candidate."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from small import MODEL, TWINS, effect, null, recorded, unit
+from small import MODEL, effect, null, recorded
 
 from spikecam_env.gap import fit as fit_module
 from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_pattern
 from spikecam_env.gap.candidates import testable as split_testable
-from spikecam_env.gap.case import settled
 from spikecam_env.gap.compare import judged, misfit, scale_of, values_of
-from spikecam_env.gap.fit import (
-    FURTHEST,
-    as_loud,
-    bounded,
-    concerned,
-    fit,
-    made_loud,
-    of_any_dark,
-    predict,
-    quietened,
-    shifted,
-    size_of,
-    with_effect,
-    with_held_out,
-)
-from spikecam_env.gap.null import model_null
-from spikecam_env.gap.refit import within
+from spikecam_env.gap.fit import concerned, fit, predict, with_held_out
+from spikecam_env.gap.strength import with_effect
 from spikecam_env.gap.units import spread_factor
 from spikecam_env.sensor import CATALOGUE
 
@@ -59,19 +41,6 @@ def test_a_few_statistics_that_another_effect_moves_do_not_move_the_scale_much()
     scale, _ = scale_of(measured, change, ONE, NONE)
     print(f"{scale:.3f}")
     assert scale == pytest.approx(1.0, abs=0.05)
-
-
-def test_parameters_are_kept_within_their_bounds_and_whole_where_they_count():
-    assert bounded("photodiode_lag", {"fraction": 3.0, "tau_us": 10.0})["fraction"] <= 1.0
-    assert bounded("afterpulsing", {"delay_frames": 2.7})["delay_frames"] == 3
-    assert "nothing" not in bounded("dead_time", {"nothing": 1.0})
-
-
-def test_with_effect_adds_or_replaces_one_effect():
-    once = with_effect(MODEL, "dead_time", {"tau_us": 0.05})
-    twice = with_effect(once, "dead_time", {"tau_us": 0.2})
-    assert len(once.effects) == len(twice.effects) == len(MODEL.effects) + 1
-    assert [e.tau_us for e in twice.effects if e.name == "dead_time"] == [0.2]
 
 
 def test_an_effect_of_moving_light_concerns_the_moving_recordings_only():
@@ -119,34 +88,6 @@ def test_fit_of_the_true_effect_finds_its_strength_from_half_or_twice_of_it(star
     assert found.model.effects[-1].name == "photodiode_lag" or "photodiode_lag" in {e.name for e in found.model.effects}
 
 
-def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
-    """A dead time that shows by some noises: two twins of it some times as strong, or all twelve of it as it is."""
-    case = recorded(effect("dead_time", tau_us=0.02))
-    there = model_null(case, MODEL, TWINS)
-    measured = values_of(case.bank, there.keys)
-    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.02})
-    size = size_of(there, measured, found.prediction.mean - there.mean)
-    loud, times = made_loud(case, MODEL, there, measured, found, "dead_time")
-    assert 1 < times <= FURTHEST and loud.parameters == found.parameters
-    which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
-    many = predict(case, found.model, found.base, there, TWINS, which)
-    few = predict(case, found.model, found.base, there, 2, which)
-    louder = quietened(there, predict(case, loud.model, loud.base, there, 2, which), times)
-    off = [float(np.sqrt(np.mean(((p.mean - many.mean) / there.noise) ** 2))) for p in (few, louder)]
-    print(f"shows by {size:.1f}; two twins are {off[0]:.2f} noises off, {times:.2f} times as loud {off[1]:.2f}")
-    assert off[1] < 0.7 * off[0]
-    draws = np.mean([d.values for d in louder.draws], axis=0) - np.mean([d.values for d in there.draws[-2:]], axis=0)
-    np.testing.assert_allclose(louder.mean - there.mean, np.nan_to_num(draws), atol=1e-9)
-
-
-def test_a_strong_effect_a_pattern_and_events_are_simulated_as_they_are():
-    assert as_loud("dead_time", {"tau_us": 0.2}, 200.0) == ({"tau_us": 0.2}, 1.0)
-    assert as_loud("vignetting", {"falloff": 0.1}, 20.0)[1] == 1.0
-    for name, parameters in (("dead_pixels", {"fraction": 0.01}), ("missed_spikes", {"probability": 1e-6})):
-        assert as_loud(name, parameters, 5.0) == (parameters, 1.0)
-    assert as_loud("supply_ripple", {"ripple": 1e-4}, 15.0) == ({"ripple": pytest.approx(2e-4)}, pytest.approx(4.0))
-
-
 def test_a_wrong_effect_leaves_more_than_the_right_one():
     case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
     measured = values_of(case.bank, null().keys)
@@ -189,36 +130,7 @@ def test_what_needs_motion_is_not_testable_in_steady_light():
     assert kept == ["dead_time"] and [n for n, _ in lacking] == ["readout_skew", "optical_blur"]
 
 
-# ---- the unit under an effect
-
-
-def test_a_unit_is_settled_along_a_line_and_not_to_the_noise_of_each_pixel():
-    """Refits 1 % low at the dimmest pixel to 3 % at the brightest, each with 0.5 % of noise of its own: what is left of
-    the noise is that of a line through 1024 pixels, at its ends some 4 sigma / sqrt(n)."""
-    base = unit()
-    x = (base.gain - base.gain.min()) / np.ptp(base.gain)
-    noise = 0.005 * np.random.default_rng(0).standard_normal(x.size)
-    seen = replace(base, gain=base.gain * np.exp(-(0.01 + 0.02 * x) + noise))
-    ratio = np.log(settled(MODEL, base, base, [seen]).gain / base.gain)
-    off = ratio - (0.01 + 0.02 * x)
-    print(f"off by {np.abs(off).max():.2g} at most, noise {noise.std():.2g}")
-    assert np.abs(off).max() < 4.5 * 4 * 0.005 / np.sqrt(x.size)
-
-
-def test_a_unit_stays_where_an_effect_silences_its_twins():
-    base = unit()
-    silent = replace(base, gain=np.zeros_like(base.gain))
-    assert settled(MODEL, base, base, [silent]) is base
-
-
-@pytest.mark.parametrize("factor", [0.5, 3.0, 1e3, 1e6])
-def test_a_unit_is_shifted_in_proportion_but_never_out_of_the_world(factor):
-    base = unit()
-    there = replace(base, gain=1.01 * base.gain, dark=0.9 * base.dark, white=3.0 * base.white)
-    found = shifted(base, there, factor)
-    reach = min(factor, FURTHEST)
-    assert np.allclose(found.gain, base.gain * 1.01**reach) and found.white == pytest.approx(base.white * 3.0**reach)
-    assert np.allclose(found.dark, np.maximum(base.dark * (1 - 0.1 * reach), 0.0))
+# ---- twins
 
 
 def test_a_fit_without_hope_ends_with_its_first_twin(monkeypatch):
@@ -240,21 +152,6 @@ def test_held_out_flats_are_simulated_only_where_a_refit_can_judge_them():
     held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
     assert set(with_held_out(case, moving)) == set(moving)
     assert set(with_held_out(case, sorted(still))) == still | held
-
-
-def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_known():
-    """Dark levels all alike, as of pixels that have locked to the noise, against those of a fresh unit; bright light
-    does not depend on them."""
-    case, there = recorded(), null()
-    loud = with_effect(MODEL, "common_threshold_noise", {"sigma_mV": 20.0})
-    alike = within(loud, replace(case.base, dark=np.full_like(case.base.dark, np.median(case.base.dark))))
-    made = predict(case, loud, alike, there, 2)
-    wider = of_any_dark(case, loud, alike, there, made)
-    more = dict(zip(there.keys, np.sqrt(wider.error**2 - made.error**2) / there.noise, strict=True))
-    slopes = {k.recording: more[k] for k in there.keys if k.name == "slope"}
-    print(slopes)
-    np.testing.assert_array_equal(wider.mean, made.mean)
-    assert slopes["flat-0.03"] > 3 and slopes["flat-0.65"] < 3
 
 
 def test_pixels_that_do_not_respond_are_none_of_the_spread():

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate
 from spikecam_env.gap.compare import HEAVY, Null, Prediction, alarmed, misfit, residual, values_of
-from spikecam_env.gap.fit import bounded, with_effect
 from spikecam_env.gap.maps.bank import Maps, bank, of_use, unit_maps
 from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.units import SPREADS as OF_A_UNIT
 from spikecam_env.gap.units import WITHIN
 from spikecam_env.sensor import CATALOGUE, SensorModel

@@ -1,0 +1,52 @@
+"""A candidate in a model: its parameters within bounds, and strong enough to be seen by few twins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from spikecam_env.gap.candidates import candidate, is_pattern
+from spikecam_env.gap.settle import FURTHEST
+from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.sensor.effects.base import build
+
+LOUD = 60.0
+"""Noises that a weak effect is simulated to show at best, FURTHEST times as strong at most.  Scaled down, what twins
+scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
+
+
+def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
+    """The model with a candidate added."""
+    return model.with_effect(build(CATALOGUE, name, dict(parameters)))
+
+
+def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
+    """Parameters within what their effect allows, whole where they must be."""
+    out = {}
+    for key, f in CATALOGUE[name].__dataclass_fields__.items():
+        if key not in parameters:
+            continue
+        low, high = f.metadata["bounds"] or (-np.inf, np.inf)
+        value = float(np.clip(parameters[key], low, high))
+        out[key] = round(value) if isinstance(f.default, int) and not isinstance(f.default, bool) else value
+    return out
+
+
+def may_be_negative(name: str) -> bool:
+    strength = CATALOGUE[name].strength
+    bounds = CATALOGUE[name].__dataclass_fields__[strength].metadata["bounds"]
+    return bool(bounds and bounds[0] < 0)
+
+
+def is_linear(name: str) -> bool:
+    """Whether statistics are in proportion to an effect's strength, or its square, so that it may be scaled."""
+    return not (is_pattern(name) or candidate(name).wanders or candidate(name).events)
+
+
+def as_loud(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
+    """(parameters, times as much) of an effect that shows by `size` noises, strong enough for LOUD where it is weak."""
+    strength, power = candidate(name).fitted[0], candidate(name).power
+    times = float(np.clip(LOUD / max(size, 1e-9), 1.0, FURTHEST)) if is_linear(name) and parameters[strength] else 1.0
+    louder = bounded(name, {**parameters, strength: parameters[strength] * times ** (1 / power)})
+    return louder, (louder[strength] / parameters[strength]) ** power if times > 1.0 else 1.0

@@ -1,0 +1,51 @@
+"""More twins of a fit, of a weak effect louder ones, and what severe noise leaves open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from small import MODEL, TWINS, effect, null, recorded
+
+from spikecam_env.gap.compare import size_of, values_of
+from spikecam_env.gap.confirm import made_loud, of_any_dark, quietened
+from spikecam_env.gap.fit import fit, predict
+from spikecam_env.gap.null import model_null
+from spikecam_env.gap.refit import within
+from spikecam_env.gap.settle import FURTHEST
+from spikecam_env.gap.strength import with_effect
+
+
+def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
+    """A dead time that shows by some noises: two twins of it some times as strong, or all twelve of it as it is."""
+    case = recorded(effect("dead_time", tau_us=0.02))
+    there = model_null(case, MODEL, TWINS)
+    measured = values_of(case.bank, there.keys)
+    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.02})
+    size = size_of(there, measured, found.prediction.mean - there.mean)
+    loud, times = made_loud(case, MODEL, there, measured, found, "dead_time")
+    assert 1 < times <= FURTHEST and loud.parameters == found.parameters
+    which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
+    many = predict(case, found.model, found.base, there, TWINS, which)
+    few = predict(case, found.model, found.base, there, 2, which)
+    louder = quietened(there, predict(case, loud.model, loud.base, there, 2, which), times)
+    off = [float(np.sqrt(np.mean(((p.mean - many.mean) / there.noise) ** 2))) for p in (few, louder)]
+    print(f"shows by {size:.1f}; two twins are {off[0]:.2f} noises off, {times:.2f} times as loud {off[1]:.2f}")
+    assert off[1] < 0.7 * off[0]
+    draws = np.mean([d.values for d in louder.draws], axis=0) - np.mean([d.values for d in there.draws[-2:]], axis=0)
+    np.testing.assert_allclose(louder.mean - there.mean, np.nan_to_num(draws), atol=1e-9)
+
+
+def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_known():
+    """Dark levels all alike, as of pixels that have locked to the noise, against those of a fresh unit; bright light
+    does not depend on them."""
+    case, there = recorded(), null()
+    loud = with_effect(MODEL, "common_threshold_noise", {"sigma_mV": 20.0})
+    alike = within(loud, replace(case.base, dark=np.full_like(case.base.dark, np.median(case.base.dark))))
+    made = predict(case, loud, alike, there, 2)
+    wider = of_any_dark(case, loud, alike, there, made)
+    more = dict(zip(there.keys, np.sqrt(wider.error**2 - made.error**2) / there.noise, strict=True))
+    slopes = {k.recording: more[k] for k in there.keys if k.name == "slope"}
+    print(slopes)
+    np.testing.assert_array_equal(wider.mean, made.mean)
+    assert slopes["flat-0.03"] > 3 and slopes["flat-0.65"] < 3
