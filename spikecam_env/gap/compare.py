@@ -20,6 +20,9 @@ TOLERANCE = 0.05
 OPEN = 5e-4
 """Damping of what errors are told from: a step may be held back, an error must not be."""
 
+ENOUGH = 4
+"""Twins of an effect that tell by how much its own chance leads parameters astray."""
+
 HEAVY = 8.0
 """Degrees of freedom of the loss: statistics far off count by their logarithm."""
 
@@ -250,7 +253,8 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
     What is far off is judged by how far off most is that moves: it would be outliers all, and hardly be heard.
 
     Statistics are not independent: the covariance is of how far the null's own draws would have led the step astray,
-    with the floors and TOLERANCE of the effect, all of one sign, on top.
+    and, where ENOUGH of them tell, those of the effect (other pixels have its traps), with the floors and TOLERANCE of
+    the effect, all of one sign, on top.
     """
     noise2 = variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
@@ -260,22 +264,38 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
     normal = jacobian.T @ (w[:, None] * jacobian)
     scale = np.diag(normal) + 1e-12
     step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
-    solve = np.linalg.solve(normal + OPEN * np.diag(scale), jacobian.T * w)
-    own = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
-    alone = (solve * (null.floor**2 + own)) @ solve.T
-    astray = np.array([solve @ np.nan_to_num(d.values - null.mean) for d in null.draws])
-    known = len(astray) > 1
-    drawn = np.cov(astray.T) * (1 + 1 / len(astray)) if known else (solve * null.sd**2) @ solve.T
+    solve = np.asarray(np.linalg.solve(normal + OPEN * np.diag(scale), jacobian.T * w), np.float64)
+    drawn = [d.values - null.mean for d in null.draws]
+    chance = astray(solve, drawn) if len(drawn) > 1 else (solve * null.sd**2) @ solve.T
     off = solve @ law(null, predicted)
-    return np.asarray(step, np.float64), np.atleast_2d(drawn) + alone + np.outer(off, off)
+    total = chance + own_astray(null, predicted, solve) + (solve * null.floor**2) @ solve.T + np.outer(off, off)
+    return np.asarray(step, np.float64), np.atleast_2d(total)
 
 
-def slope_of(null: Null, there: Prediction, here: Prediction, step: float) -> Array:
+def astray(solve: Array, draws: Sequence[Array] | Array) -> Array:
+    """(n, n) covariance of where campaigns such as these (S,), and not their mean, lead a step (n,) = solve @ values."""
+    return np.atleast_2d(np.cov((np.nan_to_num(draws) @ solve.T).T)) * (1 + 1 / len(draws))
+
+
+def own_astray(null: Null, predicted: Prediction, solve: Array) -> Array:
+    """(n, n) covariance of a step by the effect's own chance: as its draws tell where ENOUGH of them move a statistic,
+    elsewhere as of independent ones."""
+    variances = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
+    without = {d.number: d.values for d in null.draws}
+    change = np.array([d.values - without[d.number] for d in predicted.draws if len(predicted.draws) >= ENOUGH])
+    told = np.any(np.nan_to_num(change) != 0, axis=0)
+    alone = np.asarray((solve * np.where(told, 0.0, variances)) @ solve.T)
+    return alone + astray(solve, change) if told.any() else alone
+
+
+def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, step: float) -> Array:
     """(S,) change of predictions over `step`, 0 where it is not clear of the twins' own noise: hundreds of statistics
-    that do not move would drown those that do (regression dilution)."""
-    change = there.mean - here.mean
-    own2 = np.maximum(own_variance(null, there), own_variance(null, here))
-    return np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0) / step
+    that do not move would drown those that do (regression dilution).  What was not measured (NaN), and may move more,
+    is a matter of its own."""
+    change, known = there.mean - here.mean, np.isfinite(measured)
+    own2 = np.maximum(np.maximum(own_variance(null, there), own_variance(null, here)), 1e-300)
+    clear = is_clear(np.where(known, change, 0.0), own2) | is_clear(np.where(known, 0.0, change), own2)
+    return np.where(clear, change, 0.0) / step
 
 
 def scale_of(

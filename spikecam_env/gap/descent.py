@@ -62,7 +62,7 @@ def descend(
 ) -> Descent:
     """From a model and its unit down to the parameters `free` that suit (S,) `measured` best.  jobs: threads."""
     at = probe(model, base)
-    columns = derivatives(probe, null, model, base, at, free, jobs)
+    columns = derivatives(probe, null, measured, model, base, at, free, jobs)
     for turn in range(TURNS):
         step, covariance = step_of(null, measured, at, columns)
         step = np.clip(step, -LONGEST, LONGEST)
@@ -74,7 +74,7 @@ def descend(
         if np.abs(step).max() < FAR:
             columns = broyden(columns, step, after.mean - at.mean)
         else:
-            columns = derivatives(probe, null, model, base, after, free, jobs)
+            columns = derivatives(probe, null, measured, model, base, after, free, jobs)
         at = after
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
 
@@ -96,7 +96,14 @@ def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[S
 
 
 def derivatives(
-    probe: Probe, null: Null, model: SensorModel, base: BaseFit, at: Prediction, free: Free, jobs: int = 1
+    probe: Probe,
+    null: Null,
+    measured: Array,
+    model: SensorModel,
+    base: BaseFit,
+    at: Prediction,
+    free: Free,
+    jobs: int = 1,
 ) -> Array:
     """(S, n) change of the statistics for one more of each parameter's logarithm; at: what the model gives."""
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
@@ -104,7 +111,7 @@ def derivatives(
     def column(name: str, key: str) -> Array:
         strength = (name, key) != WHITE and key == candidate(name).fitted[0]
         nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if strength else -0.2
-        return slope_of(null, probe(*moved(model, base, [(name, key)], np.array([nudge]))), at, nudge)
+        return slope_of(null, measured, probe(*moved(model, base, [(name, key)], np.array([nudge]))), at, nudge)
 
     with ThreadPoolExecutor(jobs) as pool:
         return np.stack(list(pool.map(lambda what: column(*what), free)), axis=1)

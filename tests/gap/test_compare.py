@@ -233,6 +233,35 @@ def test_a_slope_is_told_by_what_clearly_moves():
     moves = np.where(np.arange(500) < 5, 20.0, 0.0)
     sharp = np.sqrt(null.sd**2 / null.twins + 1.0)
     here, there = (Prediction(m + 0.5 * rng.standard_normal(500), sharp, null.sd) for m in (0 * moves, moves))
-    slope = slope_of(null, there, here, 0.1)
+    slope = slope_of(null, 0 * moves, there, here, 0.1)
     print(np.flatnonzero(slope), slope[:5])
     assert list(np.flatnonzero(slope)) == [0, 1, 2, 3, 4] and slope[:5] == pytest.approx(np.full(5, 200.0), rel=0.2)
+
+
+def test_a_slope_of_what_was_measured_is_told_beside_far_louder_ones_that_were_not():
+    """A blur that moves bars by 8 noises and the disk, held out, by 200: of the fit it has a slope, and an error."""
+    null = made_up(count=20)
+    moves = np.where(np.arange(20) < 2, 200.0, np.where(np.arange(20) < 6, 8.0, 0.0))
+    measured = np.where(np.arange(20) < 2, np.nan, moves)
+    sharp = np.sqrt(null.sd**2 / null.twins + 1.0)
+    here, there = (Prediction(m, sharp, null.sd) for m in (0 * moves, moves))
+    slope = slope_of(null, measured, there, here, 1.0)
+    _, covariance = step_of(null, measured, there, slope[:, None])
+    print(slope, covariance)
+    assert list(slope) == list(moves) and 0.03 < np.sqrt(covariance[0, 0]) < 0.3
+
+
+def test_errors_know_that_an_effect_falls_on_other_pixels_each_time():
+    """Twins whose statistics move by 20 % together: so unsure is the strength, however many statistics there are."""
+    rng = np.random.default_rng(0)
+    null = made_up(count=50)
+    null = replace(null, draws=tuple(Draw(n, rng.standard_normal(50), None) for n in range(12)))
+    luck = 1.0 + 0.2 * np.array([1.0, -1.0, 0.5, -0.5])
+    draws = tuple(Draw(8 + i, null.draws[8 + i].values + 100.0 * f, None) for i, f in enumerate(luck))
+    there = replace(exactly(np.full(50, 100.0)), draws=draws)
+    errors = [
+        float(np.sqrt(step_of(null, there.mean, p, np.full((50, 1), 100.0))[1][0, 0]))
+        for p in (there, replace(there, draws=draws[:3]))
+    ]
+    print(errors)
+    assert errors[0] == pytest.approx(0.2 * np.sqrt(2.5 / 3 * 1.25), abs=0.06) and errors[1] < 0.1
