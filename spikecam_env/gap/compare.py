@@ -273,7 +273,7 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
 
 
 def astray(solve: Array, draws: Sequence[Array] | Array) -> Array:
-    """(n, n) covariance of where campaigns such as these (S,), and not their mean, lead a step (n,) = solve @ values."""
+    """(n, n) covariance of where campaigns such as these (S,), not their mean, lead a step (n,) = solve @ values."""
     return np.atleast_2d(np.cov((np.nan_to_num(draws) @ solve.T).T)) * (1 + 1 / len(draws))
 
 

@@ -40,13 +40,14 @@ def may_be_negative(name: str) -> bool:
 
 
 def is_linear(name: str) -> bool:
-    """Whether statistics are in proportion to an effect's strength, or its square, so that it may be scaled."""
-    return not (is_pattern(name) or candidate(name).wanders or candidate(name).events)
+    """Whether statistics are in proportion to an effect's strength for long: noise goes by its square, and its bands and
+    lateness are logarithms, which are not."""
+    return candidate(name).power == 1.0 and not is_pattern(name) and not candidate(name).wanders
 
 
 def as_loud(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
     """(parameters, times as much) of an effect that shows by `size` noises, strong enough for LOUD where it is weak."""
-    strength, power = candidate(name).fitted[0], candidate(name).power
+    strength = candidate(name).fitted[0]
     times = float(np.clip(LOUD / max(size, 1e-9), 1.0, FURTHEST)) if is_linear(name) and parameters[strength] else 1.0
-    louder = bounded(name, {**parameters, strength: parameters[strength] * times ** (1 / power)})
-    return louder, (louder[strength] / parameters[strength]) ** power if times > 1.0 else 1.0
+    louder = bounded(name, {**parameters, strength: parameters[strength] * times})
+    return louder, louder[strength] / parameters[strength] if times > 1.0 else 1.0

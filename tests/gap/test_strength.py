@@ -26,4 +26,5 @@ def test_a_strong_effect_a_pattern_and_events_are_simulated_as_they_are():
     assert as_loud("vignetting", {"falloff": 0.1}, 20.0)[1] == 1.0
     for name, parameters in (("dead_pixels", {"fraction": 0.01}), ("missed_spikes", {"probability": 1e-6})):
         assert as_loud(name, parameters, 5.0) == (parameters, 1.0)
-    assert as_loud("supply_ripple", {"ripple": 1e-4}, 15.0) == ({"ripple": pytest.approx(2e-4)}, pytest.approx(4.0))
+    assert as_loud("common_threshold_noise", {"sigma_mV": 1.0}, 10.0) == ({"sigma_mV": 1.0}, 1.0)
+    assert as_loud("dead_time", {"tau_us": 0.02}, 30.0) == ({"tau_us": pytest.approx(0.04)}, pytest.approx(2.0))
