@@ -40,7 +40,7 @@ def may_be_negative(name: str) -> bool:
 
 
 def is_linear(name: str) -> bool:
-    """Whether statistics are in proportion to an effect's strength for long: noise goes by its square, and its bands and
+    """Whether statistics go in proportion to an effect's strength for long: noise goes by its square, and its bands and
     lateness are logarithms, which are not."""
     return candidate(name).power == 1.0 and not is_pattern(name) and not candidate(name).wanders
 
