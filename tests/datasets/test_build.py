@@ -100,7 +100,7 @@ def start_in_another_process(plan, folder: Path) -> subprocess.Popen:
 
 
 def wait_until(condition, run: subprocess.Popen | None) -> None:
-    until = time.monotonic() + 60
+    until = time.monotonic() + 300  # compiled code is new in a fresh checkout, and the machine may be busy
     while not condition():
         assert time.monotonic() < until and (run is None or run.poll() is None)
         time.sleep(0.005)
@@ -109,7 +109,15 @@ def wait_until(condition, run: subprocess.Popen | None) -> None:
 def children_of(pid: int) -> list[int]:
     """Python workers of a process."""
     pids = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    return [int(p) for p in pids if b"spawn_main" in Path(f"/proc/{p}/cmdline").read_bytes()]
+    return [int(p) for p in pids if b"spawn_main" in command_of(p)]
+
+
+def command_of(pid: str) -> bytes:
+    """Its command line; nothing of a process that has ended since it was listed."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except (FileNotFoundError, ProcessLookupError):
+        return b""
 
 
 def is_alive(pid: int) -> bool:
