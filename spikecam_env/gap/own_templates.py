@@ -26,7 +26,7 @@ def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[st
     base = settled(
         model, base, case.base, [t.base for t in twins(case, model, base, range(50, 50 + _SETTLED)) if t.base]
     )
-    unit = replace(case, base=base, jobs=1)
+    unit = replace(case, base=base)
     todo = [(n, p) for n in names if not is_pattern(n) for p in starts(n)]
     with ThreadPoolExecutor(case.jobs) as pool:
         entries = tuple(pool.map(lambda what: simulated(unit, model, null, *what), todo))
