@@ -282,7 +282,8 @@ def own_astray(null: Null, predicted: Prediction, solve: Array) -> Array:
     elsewhere as of independent ones."""
     variances = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
     without = {d.number: d.values for d in null.draws}
-    change = np.array([d.values - without[d.number] for d in predicted.draws if len(predicted.draws) >= ENOUGH])
+    draws = predicted.draws if len(predicted.draws) >= ENOUGH else ()
+    change = np.array([d.values - without[d.number] for d in draws])
     told = np.any(np.nan_to_num(change) != 0, axis=0)
     alone = np.asarray((solve * np.where(told, 0.0, variances)) @ solve.T)
     return alone + astray(solve, change) if told.any() else alone

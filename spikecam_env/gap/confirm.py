@@ -11,16 +11,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, judged, scaled, size_of
-from spikecam_env.gap.fit import (
-    WANDER,
-    Fit,
-    as_seen,
-    concerned,
-    predict,
-    twins_of,
-    with_held_out,
-    with_pattern,
-)
+from spikecam_env.gap.fit import WANDER, Fit, as_seen, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.settle import HIDDEN, shifted
 from spikecam_env.gap.strength import as_loud, with_effect

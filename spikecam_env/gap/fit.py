@@ -29,12 +29,11 @@ from spikecam_env.gap.compare import (
 )
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.settle import FURTHEST, settled, shifted
-from spikecam_env.gap.strength import LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
+from spikecam_env.gap.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
 
 HOPE = 5.0
 """Misfit that a twin, scaled at best, has to remove for its fit to go on."""
@@ -42,10 +41,8 @@ HOPE = 5.0
 TURNS = 5
 """Most twins that the fit of one candidate's strength takes."""
 
-
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
-
 
 WANDER, EVENTS = 6, 3
 """Twins of an effect that makes statistics scatter, and of one that is few events."""
@@ -167,7 +164,7 @@ def _fit_twins(
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
         if factor < 0 and not may_be_negative(name):
             factor = 0.1
-        weak = abs(scale) * seen < VISIBLE or (is_linear(name) and 1 / FURTHEST < scale < 1 and scale * seen < LOUD)
+        weak = abs(scale) * seen < VISIBLE or (is_linear(name) and 1 / FURTHEST < scale < 1 and scale * seen < AS_LOUD)
         near = weak or 0.7 < factor < 1.4
         if (near and turn) or turn == TURNS - 1:
             break

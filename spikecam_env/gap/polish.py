@@ -13,14 +13,7 @@ from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, step_of
 from spikecam_env.gap.confirm import FINAL, confirmed
 from spikecam_env.gap.descent import WHITE, Probe, descend
-from spikecam_env.gap.fit import (
-    Fit,
-    concerned,
-    predict,
-    twins_of,
-    with_held_out,
-    with_pattern,
-)
+from spikecam_env.gap.fit import Fit, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.settle import HIDDEN
 from spikecam_env.sensor import SensorModel

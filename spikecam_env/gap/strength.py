@@ -11,7 +11,7 @@ from spikecam_env.gap.settle import FURTHEST
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import build
 
-LOUD = 60.0
+AS_LOUD = 60.0
 """Noises that a weak effect is simulated to show at best, FURTHEST times as strong at most.  Scaled down, what twins
 scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
 
@@ -46,8 +46,9 @@ def is_linear(name: str) -> bool:
 
 
 def as_loud(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
-    """(parameters, times as much) of an effect that shows by `size` noises, strong enough for LOUD where it is weak."""
+    """(parameters, times as much) of an effect that shows by `size` noises: a weak one is made to show by AS_LOUD."""
     strength = candidate(name).fitted[0]
-    times = float(np.clip(LOUD / max(size, 1e-9), 1.0, FURTHEST)) if is_linear(name) and parameters[strength] else 1.0
+    linear = is_linear(name) and parameters[strength] != 0
+    times = float(np.clip(AS_LOUD / max(size, 1e-9), 1.0, FURTHEST)) if linear else 1.0
     louder = bounded(name, {**parameters, strength: parameters[strength] * times})
     return louder, louder[strength] / parameters[strength] if times > 1.0 else 1.0

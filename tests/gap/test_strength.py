@@ -15,7 +15,7 @@ def test_parameters_are_kept_within_their_bounds_and_whole_where_they_count():
 
 
 def test_with_effect_adds_or_replaces_one_effect():
-    once = with_effect(MODEL, "dead_time", {"tau_us": 0.05})
+    once = with_effect(MODEL, "dead_time", {"tau_us": 0.1})
     twice = with_effect(once, "dead_time", {"tau_us": 0.2})
     assert len(once.effects) == len(twice.effects) == len(MODEL.effects) + 1
     assert [e.tau_us for e in twice.effects if e.name == "dead_time"] == [0.2]
