@@ -94,11 +94,22 @@ def resettled(case: Case, null: Null, found: Fit, model: SensorModel) -> Fit:
 def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Sequence[str]) -> Fit:
     """All effects found so far together; one that is no longer needed is left out again.
 
-    model, null: as given, before any was added.
+    model, null: as given, before any was added.  Two twins may scatter little where the many that `found` stands on
+    have shown that campaigns do not.
     """
     both = confirmed(case, model, null, measured, resettled(case, null, found, found.model))
+    both = as_wide(null, measured, both, found.prediction)
     for name in [n for n in earlier if n in {e.name for e in both.model.effects}]:
         fewer = confirmed(case, model, null, measured, resettled(case, null, both, both.model.without(name)))
         if fewer.misfit < both.misfit + NEEDED:
             both = fewer
     return both
+
+
+def as_wide(null: Null, measured: Array, found: Fit, known: Prediction) -> Fit:
+    """The fit known no better, and its campaigns scattering no less, than a prediction of the same effects."""
+    here = found.prediction
+    spread, error = np.maximum(here.spread, known.spread), np.maximum(here.error, known.error)
+    wide = replace(here, spread=spread, error=error)
+    rho, left = judged(null, measured, wide)
+    return replace(found, prediction=wide, rho=rho, misfit=left)

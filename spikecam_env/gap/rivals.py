@@ -23,15 +23,21 @@ DOUBT = 0.01
 LEAST = 6.0
 """Lead that tells nothing, whatever the draws say: a likelihood ratio of 20."""
 
+CLOSE = 2 * LEAST
+"""Lead by which one may lose on some recordings to win on all: noise beside another effect is known from few twins."""
+
 
 def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Prediction, other: Prediction) -> bool:
-    """Whether `measured` may as well be of `other`; null: what both were added to.  draws: of the model as given."""
+    """Whether `measured` may as well be of `other`; null: what both were added to.  draws: of the model as given, whose
+    noise is made as large as that of `null`."""
     observed = lead(null, measured, best, other)
     if observed < LEAST:
         return True
     noise = np.array([d.values for d in draws])
-    own = np.sqrt(own_variance(null, other))
-    noise = noise - noise.mean(axis=0) + own * np.random.default_rng(len(noise)).standard_normal(noise.shape)
+    noise = noise - noise.mean(axis=0)
+    scatter = noise.std(axis=0, ddof=1)
+    noise *= np.maximum(null.sd / np.where(scatter > 0, scatter, np.inf), 1.0)
+    noise += np.sqrt(own_variance(null, other)) * np.random.default_rng(len(noise)).standard_normal(noise.shape)
     known = np.isfinite(measured)
     middle = rescaled(null, measured, other).mean
     by_chance = [lead(null, np.where(known, middle + n, np.nan), best, other) for n in noise]

@@ -32,7 +32,7 @@ from spikecam_env.gap.confirm import confirmed, of_any_dark, rejoined, resettled
 from spikecam_env.gap.fit import Fit, fit
 from spikecam_env.gap.polish import Errors, polished
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.rivals import LEAST, is_rival
+from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.screen import Screened, screen
 from spikecam_env.gap.shapes import shaped, worth_shaping
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
@@ -221,11 +221,18 @@ def chosen_of(
     null: Null, here: Null, seen: Array, values: Array, sure: Sequence[Fit]
 ) -> tuple[list[Fit], tuple[str, ...]]:
     """(fits, the chosen one first; names of its rivals).  What may as well be true as the first, by the recordings to
-    fit (`seen`), is put in order by all recordings (`values`), and has to remain a rival by them.  A parameter more has
-    to explain more: what has one is chosen where it leaves LEAST less, and is a rival where it leaves less at all."""
+    fit (`seen`), or leaves hardly more, is put in order by all recordings (`values`), and has to be a rival by them.
+    A parameter more has to explain more: what has one is chosen where it leaves LEAST less, and is a rival where it
+    leaves less at all."""
     if not sure:
         return [], ()
-    close = [f for f in sure if f is sure[0] or is_rival(here, null.draws, seen, sure[0].prediction, f.prediction)]
+    close = [
+        f
+        for f in sure
+        if f is sure[0]
+        or lead(here, seen, sure[0].prediction, f.prediction) < CLOSE
+        or is_rival(here, null.draws, seen, sure[0].prediction, f.prediction)
+    ]
     misfits = {f.name: judged(here, values, f.prediction)[1] for f in close}
     free = {f.name: len(candidate(f.name).fitted) for f in close}
     close.sort(key=lambda f: misfits[f.name] + LEAST * free[f.name])

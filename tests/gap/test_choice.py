@@ -11,6 +11,7 @@ from small import MODEL, effect, recorded, unit
 from spikecam_env.gap import search
 from spikecam_env.gap.compare import Draw, Null, Prediction, judged
 from spikecam_env.gap.fit import Fit
+from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.search import PROMISE, Round, chosen_of, revisited, settle
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.verdict import explains
@@ -47,6 +48,18 @@ def test_recordings_held_out_decide_between_what_the_others_cannot_tell_apart():
     nudge = np.where(np.arange(COUNT) < 50, 0.1 * np.sign(values - n.mean - effect), 0.0)
     true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
     assert twin.misfit < true.misfit
+    fits, rivals = chosen_of(n, n, seen, values, [twin, true])
+    assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
+
+
+def test_what_loses_little_and_wins_all_recordings_is_chosen():
+    """The true one's lead on what is held out is a hundred times what it loses, by more than chance, on the others."""
+    n, effect, values, seen = campaign()
+    nudge = np.where(np.arange(COUNT) < 50, 0.18 * (values - n.mean - effect), 0.0)
+    true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
+    loss = lead(n, seen, twin.prediction, true.prediction)
+    print(f"loses {loss:.1f}")
+    assert LEAST < loss < CLOSE and not is_rival(n, n.draws, seen, twin.prediction, true.prediction)
     fits, rivals = chosen_of(n, n, seen, values, [twin, true])
     assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
 

@@ -8,7 +8,7 @@ import numpy as np
 from small import MODEL, TWINS, effect, null, recorded
 
 from spikecam_env.gap.compare import size_of, values_of
-from spikecam_env.gap.confirm import made_loud, of_any_dark, quietened
+from spikecam_env.gap.confirm import as_wide, made_loud, of_any_dark, quietened
 from spikecam_env.gap.fit import fit, predict
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import within
@@ -49,3 +49,15 @@ def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_kno
     print(slopes)
     np.testing.assert_array_equal(wider.mean, made.mean)
     assert slopes["flat-0.03"] > 3 and slopes["flat-0.65"] < 3
+
+
+def test_two_twins_of_all_together_do_not_make_noise_seen_before_small():
+    """A prediction of two twins that happen to agree, where many have scattered by ten noises."""
+    case, there = recorded(effect("dead_time", tau_us=0.02)), null()
+    measured = values_of(case.bank, there.keys)
+    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.02})
+    noisy = replace(found.prediction, spread=10.0 * there.sd, error=5.0 * there.sd)
+    wide = as_wide(there, measured, found, noisy)
+    np.testing.assert_array_equal(wide.prediction.mean, found.prediction.mean)
+    assert np.all(wide.prediction.spread >= noisy.spread) and np.all(wide.prediction.error >= noisy.error)
+    assert np.abs(wide.rho).max() < np.abs(found.rho).max()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from spikecam_env.gap.compare import Draw, Null, Prediction
@@ -40,6 +42,23 @@ def test_the_true_effect_is_nearly_always_a_rival_of_a_wrong_one():
     share = share_of_rivals(apart=1.0)
     print(f"{share:.3f}")
     assert share > 57 / 60
+
+
+def test_noise_of_what_was_found_before_makes_leads_chance():
+    """A lead a little above LEAST, between two that are some noises apart: had the null's own draws not been made as
+    noisy as the null says statistics are beside an earlier effect, no lead at all would be chance."""
+    rivals = 0
+    for seed in range(20):
+        calm = null(seed)
+        n = replace(calm, sd=10.0 * calm.sd)
+        common = np.where(np.arange(COUNT) < 100, 30.0, 0.0)
+        apart = np.where(np.arange(COUNT) >= 190, 8.0, 0.0)
+        one, other = shown(n, common), shown(n, common + apart)
+        between = [n.mean + common + x * apart for x in np.linspace(1.0, -1.0, 201)]
+        measured = next(m for m in between if lead(n, m, one, other) > LEAST)
+        rivals += is_rival(n, n.draws, measured, one, other)
+    print(f"rivals in {rivals} of 20 campaigns")
+    assert rivals > 5
 
 
 def test_a_wrong_effect_is_no_rival_of_the_true_one_when_it_is_far():
