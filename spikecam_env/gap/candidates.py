@@ -21,6 +21,7 @@ class Candidate:
     only_contrast: it changes nothing in light that is steady and uniform.
     wanders: its course in time is drawn anew every time, so that statistics scatter, each way alike.
     events: it is single events, few enough for one twin to have many more or less of them than another.
+    strikes: it is in some pixels for good, others in every twin, and their mean level is part of the pattern.
     needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
     """
 
@@ -32,6 +33,7 @@ class Candidate:
     only_contrast: bool = False
     wanders: bool = False
     events: bool = False
+    strikes: bool = False
     experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 
     @property
@@ -103,7 +105,12 @@ CANDIDATES: dict[str, Candidate] = {
     "reset_noise": Candidate("noise", ("sigma_mV",), square=True, needs=_steady, experiment=_SECOND),
     "shot_noise": Candidate("noise", ("quanta",), needs=_steady, experiment=_SECOND),
     "random_telegraph_noise": Candidate(
-        "dark", ("amplitude_pA", "fraction", "dwell_ms"), {"dwell_ms": (0.5, 3.0, 20.0)}, square=True, needs=_steady
+        "dark",
+        ("amplitude_pA", "fraction", "dwell_ms"),
+        {"dwell_ms": (0.5, 3.0, 20.0)},
+        square=True,
+        strikes=True,
+        needs=_steady,
     ),
     "dark_current_drift": Candidate("dark", ("rise", "tau_ms"), {"tau_ms": (10.0, 50.0, 200.0)}, needs=_dark),
     "dark_current": Candidate("dark", ("mean_pA",), needs=_dark),

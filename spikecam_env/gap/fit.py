@@ -44,8 +44,8 @@ TURNS = 5
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
-WANDER, EVENTS = 6, 3
-"""Twins of an effect that makes statistics scatter, and of one that is few events."""
+WANDER, FEW = 6, 3
+"""Twins of an effect that makes statistics scatter, and of one that is few events, or in few pixels."""
 
 UNITS = 24
 """Units drawn for the pattern statistics of one model."""
@@ -76,12 +76,14 @@ def predict(
     numbers = [d.number for d in null.draws[-count:]]
     made = twins(case, model, base, numbers, only)
     draws = [Draw(n, values_of(t.bank, null.keys), t.base) for n, t in zip(numbers, made, strict=True)]
-    return paired(null, draws)
+    predicted = paired(null, draws)
+    strikes = any(candidate(e.name).strikes for e in model.effects)
+    return with_pattern(case, model, null, predicted) if strikes else predicted
 
 
 def twins_of(name: str) -> int:
     """How many twins say what an effect does."""
-    return EVENTS if candidate(name).events else 1
+    return FEW if candidate(name).events or candidate(name).strikes else 1
 
 
 def as_seen(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> BaseFit:

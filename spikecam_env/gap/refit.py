@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from spikecam_env.calibration.jitter import fit_jitter
 from spikecam_env.calibration.response import fit_lines, rates_from_times, together
 from spikecam_env.gap.observe import STEPS, Observation
+from spikecam_env.gap.traps import less_traps
 from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.unit import PixelArray, Unit, firing_law
@@ -142,7 +143,8 @@ def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
     kappa = np.sqrt(max(base.white - inverse, 0.0))
     electrons = np.full_like(law.electrons, 1.0 / inverse) if inverse > 0 else law.electrons
     swing = law.swing_V * _swings(model, base.gain)
-    return replace(law, gain=base.gain, dark=base.dark, electrons=electrons, kappa=np.full_like(law.kappa, kappa),
+    dark = less_traps(model, law, base.dark)
+    return replace(law, gain=base.gain, dark=dark, electrons=electrons, kappa=np.full_like(law.kappa, kappa),
                    swing_V=swing, shot=inverse > 0)  # fmt: skip
 
 

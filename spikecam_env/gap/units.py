@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.refit import BaseFit, responds
 from spikecam_env.gap.statistics import Key, pattern
+from spikecam_env.gap.traps import drawn_traps, level_of
 from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import SensorModel
 
@@ -85,12 +86,13 @@ def _bank(
     model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], seed: int
 ) -> dict[Key, float]:
     gain, dark = drawn(model, base, shape, seed)
+    charge = drawn_traps(model, shape, seed)
     rng = np.random.default_rng([seed, 1])
     found = {}
     for c in shown:
         if c.kind not in ("dark", "flat") or c.light is None:
             continue
-        rate = gain * c.picture + dark
+        rate = gain * c.picture + dark + level_of(model, charge, c.frames, rng)
         spikes = np.maximum(rate * c.frames, 1.0)
         noise = np.sqrt(base.white / spikes + 1.0 / (6.0 * c.frames**2))  # first and last spike, each read to a frame
         rate = np.clip(rate * (1.0 + noise * rng.standard_normal(rate.size)), 0.0, 1.0)

@@ -1,0 +1,61 @@
+"""Traps of random telegraph noise: what they add to the mean level of their pixels, which is part of the pattern.
+
+A refit finds it in the pixels where the camera has its traps.  Twins have theirs elsewhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor.effects.random_telegraph_noise import RandomTelegraphNoise
+from spikecam_env.sensor.unit import Unit
+
+Array = NDArray[np.float64]
+
+
+def traps_of(model: SensorModel) -> RandomTelegraphNoise | None:
+    """The model's telegraph noise."""
+    return next((e for e in model.effects if isinstance(e, RandomTelegraphNoise)), None)
+
+
+def charge_of(traps: RandomTelegraphNoise, unit: Unit, frame_rate_hz: float) -> Array:
+    """(P,) charge that a trap brings in its upper state [thresholds/frame]."""
+    return np.asarray(traps.amplitude_pA * 1e3 / frame_rate_hz / unit.threshold_fC, np.float64)
+
+
+def less_traps(model: SensorModel, unit: Unit, dark: Array) -> Array:
+    """(P,) dark levels of a refit without what traps added to it; left there, twice as many pixels would have it.
+
+    The pixels of the highest levels are taken for those with a trap; none of them falls below the median.
+    """
+    traps = traps_of(model)
+    if traps is None:
+        return dark
+    highest = np.argsort(dark)[dark.size - round(traps.fraction * dark.size) :]
+    less = dark[highest] - charge_of(traps, unit, model.frame_rate_hz)[highest] / 2
+    out = dark.copy()
+    out[highest] = np.maximum(less, np.median(dark))
+    return out
+
+
+def drawn_traps(model: SensorModel, shape: tuple[int, int], seed: int) -> Array:
+    """(P,) `charge_of` the traps of a fresh unit of the model; 0 for pixels without one."""
+    traps = traps_of(model)
+    if traps is None:
+        return np.zeros(shape[0] * shape[1])
+    has = np.random.default_rng([seed, 2]).random(shape[0] * shape[1]) < traps.fraction
+    return np.where(has, charge_of(traps, model.draw_unit(shape, seed), model.frame_rate_hz), 0.0)
+
+
+def level_of(model: SensorModel, charge: Array, frames: int, rng: np.random.Generator) -> Array:
+    """(P,) what traps of so much charge add to the mean level of one recording [thresholds/frame]: the upper state's
+    share of the time is of a beta distribution, with mean 1/2 and the variance of the effect's law."""
+    traps = traps_of(model)
+    if traps is None:
+        return charge
+    d, window = traps.dwell_ms / 2, 1e3 * frames / model.frame_rate_hz
+    variance = 0.5 * (d * window + d**2 * np.expm1(-window / d)) / window**2
+    even = max((0.25 / variance - 1.0) / 2, 1e-2)
+    return charge * rng.beta(even, even, size=charge.size)
