@@ -87,12 +87,13 @@ def _scan(words, first_word, last_word, ks, ends, square, terms):  # type: ignor
                     terms[pixel, i] = n - 2 * k
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"reassoc"})
 def second_differences(t, n, k):  # type: ignore[no-untyped-def]
-    """Sum of (t_(i+2k) - 2 t_(i+k) + t_i)^2 over the n spike times at the start of t."""
+    """Sum of (t_(i+2k) - 2 t_(i+k) + t_i)^2 over the n spike times at the start of t: of whole numbers, in any
+    order."""
     first, middle, last = t[: n - 2 * k], t[k : n - k], t[2 * k : n]  # views: indices that cannot wrap vectorise
-    total = np.int64(0)
+    total = 0.0
     for i in range(n - 2 * k):
-        d = np.int64(last[i]) - 2 * np.int64(middle[i]) + np.int64(first[i])
+        d = np.float64(np.int32(last[i] - np.int32(2) * middle[i] + first[i]))
         total += d * d
-    return np.float64(total)
+    return total

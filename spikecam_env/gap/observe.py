@@ -33,6 +33,9 @@ LENGTHS = 64
 FEW = 0.3
 """Share of pixels below which those with odd intervals are left out where noise of all pixels is asked for."""
 
+SPARSE = 0.05
+"""Spikes a frame below which a pixel's are gone through one by one."""
+
 LAGS = 3
 """Lags 0 .. LAGS - 1 [frames] of neighbours' coincidences."""
 
@@ -158,6 +161,7 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late, scatter,
     block = (frames + BLOCKS - 1) // BLOCKS
     for column in range(words.shape[1]):
         by_pixel(words, column, bits)
+        known, means, variances = np.uint64(0), np.zeros(64), np.zeros(64)
         for within in range(64):
             p = 64 * column + within
             if p >= ends.shape[0]:
@@ -179,35 +183,84 @@ def _pixels(words, ends, square, terms, moments, blocks, lengths, late, scatter,
                     terms[p, j] = n - 2 * k
             if n < 2:
                 continue
+            least, most = np.int32(frames), np.int32(0)
             for i in range(n - 1):
                 d[i] = t[i + 1] - t[i]
-            for i in range(n - 1):
-                lengths[min(d[i], LENGTHS)] += 1
+                least, most = min(least, d[i]), max(most, d[i])
+            _count(d[: n - 1], least, most, lengths)
             if n < 4:
                 continue
             mean = (t[n - 1] - t[0]) / (n - 1)
-            squares, products, short, long = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
-            least, most = np.int32(np.ceil(0.6 * mean - 1.0)), np.int32(np.floor(1.5 * mean + 1.0))
+            squares, products = np.int64(0), np.int64(0)
             for i in range(n - 1):
                 squares += np.int64(d[i]) * d[i]
-                short += d[i] < least
-                long += d[i] > most
+            for i in range(n - 2):
+                products += np.int64(d[i]) * d[i + 1]
             variance = squares / (n - 1) - mean * mean
-            if short + long:
+            # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2
+            inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
+            moments[p, 0], moments[p, 1] = variance, (products - mean * inner) / (n - 2) + mean * mean
+            below, above = np.int32(np.ceil(0.6 * mean - 1.0)), np.int32(np.floor(1.5 * mean + 1.0))
+            moments[p, 2], moments[p, 3] = 0.0, 0.0
+            if least < below or most > above:
                 for i in range(n - 1):
-                    odd[t[i + 1]] += d[i] < least or d[i] > most
-            else:
+                    moments[p, 2] += d[i] < below
+                    moments[p, 3] += d[i] > above
+                    odd[t[i + 1]] += d[i] < below or d[i] > above
+            elif n < SPARSE * frames:
                 for i in range(n - 1):
                     late[t[i + 1]] += d[i] - mean
                     scatter[t[i + 1]] += variance
                     timed[t[i + 1]] += 1
-            for i in range(n - 2):
-                products += np.int64(d[i]) * d[i + 1]
-            # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2
-            moments[p, 0] = variance
-            inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
-            moments[p, 1] = (products - mean * inner) / (n - 2) + mean * mean
-            moments[p, 2], moments[p, 3] = short, long
+            else:
+                for i in range(n - 1):
+                    late[t[i + 1]] += d[i]
+                known |= np.uint64(1) << np.uint64(within)
+                means[within], variances[within] = mean, variance
+                late[t[0]] += mean  # no interval ends with the first spike
+                scatter[t[0]] -= variance
+                timed[t[0]] -= 1
+        if known:
+            _add_to_spikes(words[:, column].copy(), known, means, variances, late, scatter, timed)
+    for f in range(frames):
+        if timed[f] == 0:
+            late[f], scatter[f] = 0.0, 0.0  # but for rounding
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _count(d, least, most, lengths):  # type: ignore[no-untyped-def]
+    """Add the intervals d, of least to most, to those of their length: length by length where these are few."""
+    if most - least < 8:
+        for length in range(least, most + 1):
+            count = 0
+            for i in range(d.size):
+                count += d[i] == length
+            lengths[min(length, LENGTHS)] += count
+    else:
+        for i in range(d.size):
+            lengths[min(d[i], LENGTHS)] += 1
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _add_to_spikes(words, known, mean, variance, late, scatter, timed):  # type: ignore[no-untyped-def]
+    """Take a mean and add a variance (64,) for the spikes (F,) of each of 64 pixels, bit by bit those `known`; eight
+    pixels at a time, from sums over all that may fire together."""
+    means, variances = np.zeros((8, 256)), np.zeros((8, 256))
+    for octet in range(8):
+        for i in range(8):
+            for j in range(1 << i):
+                means[octet, j + (1 << i)] = means[octet, j] + mean[8 * octet + i]
+                variances[octet, j + (1 << i)] = variances[octet, j] + variance[8 * octet + i]
+    for f in range(words.size):
+        fired = words[f] & known
+        usual, own = 0.0, 0.0
+        for octet in range(8):
+            at = (fired >> np.uint64(8 * octet)) & np.uint64(255)
+            usual += means[octet, at]
+            own += variances[octet, at]
+        late[f] -= usual
+        scatter[f] += own
+        timed[f] += ones(fired)
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
@@ -226,26 +279,25 @@ def _neighbours(words, rows, row, coincidences):  # type: ignore[no-untyped-def]
     """words: (F, rows * n) uint64, each row of pixels n whole words, padded with zeros."""
     frames = words.shape[0]
     each = words.shape[1] // rows
-    one = np.uint64(1)
-    top = np.uint64(63)
+    right = words >> np.uint64(1)  # every pixel's neighbour to the right in its place
     for f in range(frames):
-        for r in range(rows):
-            fired = np.uint64(0)
-            for w in range(each):
-                fired += ones(words[f, r * each + w])
-            row[f, r] = fired
-        for lag in range(min(LAGS, f + 1)):
-            across, down = np.uint64(0), np.uint64(0)
-            for r in range(rows):
-                for w in range(each):
-                    at = r * each + w
-                    now, then = words[f, at], words[f - lag, at]
-                    right_now, right_then = now >> one, then >> one
-                    if w + 1 < each:
-                        right_now |= words[f, at + 1] << top
-                        right_then |= words[f - lag, at + 1] << top
-                    across += ones(now & right_then) + ones(right_now & then)
-                    if r:
-                        down += ones(now & words[f - lag, at - each]) + ones(words[f, at - each] & then)
-            coincidences[lag, 0] += across
-            coincidences[lag, 1] += down
+        for at in range(words.shape[1]):
+            if (at + 1) % each:
+                right[f, at] |= words[f, at + 1] << np.uint64(63)
+            row[f, at // each] += ones(words[f, at])
+    for lag in range(LAGS):
+        across, down = np.uint64(0), np.uint64(0)
+        for f in range(lag, frames):
+            now, then = words[f], words[f - lag]
+            across += _common(now, right[f - lag]) + _common(right[f], then)
+            down += _common(now[each:], then[:-each]) + _common(now[:-each], then[each:])
+        coincidences[lag] = across, down
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _common(a, b):  # type: ignore[no-untyped-def]
+    """Number of bits that two rows of words (n,) have in common."""
+    total = np.uint64(0)
+    for i in range(a.size):
+        total += ones(a[i] & b[i])
+    return total
