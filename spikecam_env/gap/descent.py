@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate
-from spikecam_env.gap.compare import Null, Prediction, slope_of, step_of
+from spikecam_env.gap.compare import Null, Prediction, judged, slope_of, step_of
 from spikecam_env.gap.fit import as_seen
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.strength import bounded, with_effect
@@ -32,6 +32,9 @@ FAR = 0.5
 
 LONGEST = 0.7
 """Largest step of a logarithm at once."""
+
+WORSE = 3.0
+"""Misfit by which a step may seem worse, by chance of the draws."""
 
 WHITE = ("the unit", "white")
 """The unit's own s^2, among parameters by effect and name, where an effect hides it."""
@@ -60,11 +63,17 @@ class Descent:
 def descend(
     probe: Probe, null: Null, measured: Array, model: SensorModel, base: BaseFit, free: Free, jobs: int = 1
 ) -> Descent:
-    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best.  jobs: threads."""
+    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best; a step that turns out to
+    leave more ends it where it was taken.  jobs: threads."""
     at = probe(model, base)
     columns = derivatives(probe, null, measured, model, base, at, free, jobs)
+    best = (np.inf, Descent(model, base, at, columns, np.zeros((len(free), len(free)))))
     for turn in range(TURNS):
         step, covariance = step_of(null, measured, at, columns)
+        left = judged(null, measured, at)[1]
+        if left > best[0] + WORSE:
+            return best[1]
+        best = min(best, (left, Descent(model, base, at, columns, covariance)), key=lambda b: b[0])
         step = np.clip(step, -LONGEST, LONGEST)
         there = as_seen(model, within(model, base), null, at)
         model, base = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)

@@ -12,16 +12,13 @@ from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, step_of
 from spikecam_env.gap.confirm import FINAL, confirmed
-from spikecam_env.gap.descent import WHITE, Probe, descend
+from spikecam_env.gap.descent import WHITE, WORSE, Probe, descend
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.settle import HIDDEN
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-WORSE = 3.0
-"""Misfit by which a step may seem worse, by chance of the draws."""
 
 AGREE = 3.0
 """Errors by which a parameter may move when held-out recordings are fitted as well, for them to agree."""
