@@ -1,0 +1,80 @@
+"""Gauss-Newton on made-up statistics whose laws are known: it finds the parameters, and takes a bad step back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from small import MODEL, unit
+
+from spikecam_env.gap.compare import Draw, Null, Prediction
+from spikecam_env.gap.descent import Probe, descend
+from spikecam_env.gap.refit import BaseFit
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.strength import with_effect
+from spikecam_env.sensor import SensorModel
+
+COUNT, TWINS = 60, 12
+NAME = "incomplete_reset"
+TRUE = {"fraction": 0.02, "tau_us": 300.0}
+FREE = [(NAME, key) for key in TRUE]
+
+
+def null() -> Null:
+    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
+    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
+    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, draws=draws)
+
+
+def law(fraction: float, tau_us: float) -> np.ndarray:
+    """Thirty statistics in proportion to the fraction, as many to its product with a power of the time constant."""
+    strength = 20.0 * fraction / TRUE["fraction"]
+    return strength * np.where(np.arange(COUNT) < 30, 1.0, (tau_us / TRUE["tau_us"]) ** 0.5)
+
+
+def probe_of(n: Null, change: Callable[..., np.ndarray]) -> Probe:
+    def probe(model: SensorModel, base: BaseFit) -> Prediction:
+        [effect] = [e for e in model.effects if e.name == NAME]
+        values = n.mean + change(**{k: effect.parameters()[k] for k in TRUE})
+        return Prediction(values, n.sd / np.sqrt(TWINS), n.sd, (Draw(TWINS - 1, values, None),))
+
+    return probe
+
+
+def start(**times: float) -> SensorModel:
+    return with_effect(MODEL, NAME, {k: v * times[k] for k, v in TRUE.items()})
+
+
+def parameters_of(model: SensorModel) -> dict[str, float]:
+    [effect] = [e for e in model.effects if e.name == NAME]
+    return {k: effect.parameters()[k] for k in TRUE}
+
+
+def test_both_parameters_are_found_within_their_errors():
+    n = null()
+    measured = n.mean + law(**TRUE) + n.sd * np.random.default_rng(1).standard_normal(COUNT)
+    end = descend(probe_of(n, law), n, measured, start(fraction=0.6, tau_us=2.0), unit(), FREE)
+    found = parameters_of(end.model)
+    errors = np.sqrt(np.diag(end.covariance))
+    print({k: f"{v:.4g} of {TRUE[k]:g}" for k, v in found.items()}, errors)
+    for (_, key), error in zip(FREE, errors, strict=True):
+        assert 0.001 < error < 0.1
+        assert abs(np.log(found[key] / TRUE[key])) < 4 * error
+
+
+def test_a_step_that_leaves_more_is_taken_back():
+    """A law that promises more of the fraction, and turns round where the step leads."""
+    n = null()
+    here = 0.5 * TRUE["fraction"]
+
+    def broken(fraction: float, tau_us: float) -> np.ndarray:
+        return law(fraction, tau_us) * (-1.0 if abs(np.log(fraction / here)) > 0.63 else 1.0)
+
+    measured = n.mean + law(**TRUE)
+    first = start(fraction=0.5, tau_us=1.0)
+    end = descend(probe_of(n, broken), n, measured, first, unit(), FREE)
+    kept = descend(probe_of(n, law), n, measured, first, unit(), FREE)
+    print(parameters_of(end.model), parameters_of(kept.model))
+    assert parameters_of(end.model) == parameters_of(first)
+    assert abs(np.log(parameters_of(kept.model)["fraction"] / TRUE["fraction"])) < 0.05
