@@ -32,7 +32,9 @@ class BlindTrial:
     part: Literal["tune", "report"] = "tune"
     """Disjoint seeds and outside mechanisms: one to work on, one to judge by."""
     jobs: int = 1
-    """Processes."""
+    """Cases at once, each in a process of its own."""
+    threads: int = 1
+    """Threads of each diagnosis."""
     only: list[str] = field(default_factory=list)
     """Groups: none, strong, weak, base, outside, left_out, pair, tricky, severe; default all."""
     limit: int | None = None
@@ -42,20 +44,26 @@ class BlindTrial:
     world: Path = WORLD
     """Folder of the hidden world, in the package's checkout."""
     diagnose: str = "spikecam_env.cli.blind_trial:diagnosed"
-    """module:function that is tried: (campaign, model, out, seed, exclude) -> what diagnosis.json holds."""
+    """module:function that is tried: (campaign, model, out, seed, exclude, threads) -> what diagnosis.json holds."""
 
     def run(self) -> None:
         from tqdm import tqdm
 
-        if self.jobs < 1:
-            raise InputError(f"jobs = {self.jobs}; it must be at least 1")
-        if self.limit is not None and self.limit < 1:
-            raise InputError(f"limit = {self.limit}; it must be at least 1")
+        for name in ("jobs", "threads", "limit"):
+            if getattr(self, name) is not None and getattr(self, name) < 1:
+                raise InputError(f"{name} = {getattr(self, name)}; it must be at least 1")
         trial = hidden_world(self.world)
         try:
             picked = trial.chosen(self.set, self.part, self.only, self.limit)
             steps = trial.run_trial(
-                self.out, self.set, self.part, self.diagnose, picked=picked, jobs=self.jobs, keep=self.keep
+                self.out,
+                self.set,
+                self.part,
+                self.diagnose,
+                picked=picked,
+                jobs=self.jobs,
+                threads=self.threads,
+                keep=self.keep,
             )
             with tqdm(total=len(picked), unit="case") as bar:
                 for done, _ in steps:
@@ -66,14 +74,14 @@ class BlindTrial:
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
 
 
-def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str]) -> dict[str, Any]:
-    """`spikecam diagnose` as a trial wants it, on one thread, its report included."""
+def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str], threads: int) -> dict[str, Any]:
+    """`spikecam diagnose` as a trial wants it, its report included."""
     try:
         from spikecam_env.gap.diagnose import diagnose
         from spikecam_env.gap.report import write_report
     except ImportError as error:
         raise ImportError(f"this checkout has no spikecam_env.gap.diagnose to be tried ({error})") from error
-    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=1, progress=False)
+    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, progress=False)
     found.write(out)
     write_report(found, out / "report.html")
     return json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))

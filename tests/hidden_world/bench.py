@@ -69,18 +69,20 @@ def walk_of_spikes(bits: NDArray[np.uint8], k: int) -> float:
     return float(np.concatenate(squares).mean())
 
 
-def says_dead_time(campaign: Path, model: str, out: Path, seed: int, exclude: tuple[str, ...]) -> dict[str, Any]:
+def says_dead_time(
+    campaign: Path, model: str, out: Path, seed: int, exclude: tuple[str, ...], threads: int
+) -> dict[str, Any]:
     """A diagnosis that always says the same, and keeps a list of what it was given."""
     log = campaign.parents[1] / "asked.txt"
     files = " ".join(sorted({p.suffix for p in campaign.iterdir()}))
     with log.open("a", encoding="utf-8") as file:
-        file.write(f"{campaign.name} {model} {files}\n")
+        file.write(f"{campaign.name} {model} {threads} {files}\n")
     return {
         "verdict": "named",
         "effects": [{"name": "dead_time", "parameters": {"tau_us": {"value": 0.1, "sd": 0.01}}}],
     }
 
 
-def fails(campaign: Path, model: str, out: Path, seed: int, exclude: tuple[str, ...]) -> dict[str, Any]:
+def fails(campaign: Path, model: str, out: Path, seed: int, exclude: tuple[str, ...], threads: int) -> dict[str, Any]:
     """A diagnosis that breaks."""
     raise RuntimeError("no light in here")

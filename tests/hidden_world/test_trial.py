@@ -193,6 +193,7 @@ def test_gap_and_parameters_of_right_names():
     assert value["parameters within 15 % or twice their sd"].value == pytest.approx(2 / 3)
     assert value["90 % intervals cover"].value == pytest.approx(1 / 3)
     assert not value["90 % intervals cover"].met and not value["slowest diagnosis [s]"].met
+    assert value["diagnoses within 120 s, threads: 1"].value == 0.0
 
 
 def test_confusion_counts_true_against_answered():
@@ -217,10 +218,11 @@ def test_a_run_goes_on_where_it_stopped(tmp_path):
     assert [next(steps) for _ in range(3)] == [(0, 4), (1, 4), (2, 4)]
     steps.close()
     assert sum(is_done(tmp_path, c.id) for c in picked) == 2
-    assert list(run_trial(tmp_path, "full", "tune", said, picked=picked))[-1] == (4, 4)
+    assert list(run_trial(tmp_path, "full", "tune", said, picked=picked, threads=2))[-1] == (4, 4)
     asked = (tmp_path / "asked.txt").read_text().splitlines()
+    assert [line.split()[2] for line in asked] == ["1", "1", "2", "2"]
     assert sorted(line.split()[0] for line in asked) == sorted(c.id for c in picked)
-    assert all(line.split()[2:] == [".dat", ".json", ".npz"] for line in asked)
+    assert all(line.split()[3:] == [".dat", ".json", ".npz"] for line in asked)
     assert not any((tmp_path / "campaigns").iterdir())
     trial = score_trial(tmp_path, picked)
     assert trial["cases"] == 4 and trial["errors"] == 0
@@ -243,6 +245,8 @@ def test_command_says_where_the_world_is_not(tmp_path):
         hidden_world(tmp_path)
     with pytest.raises(InputError, match="jobs = 0"):
         BlindTrial(tmp_path, jobs=0).run()
+    with pytest.raises(InputError, match="threads = 0"):
+        BlindTrial(tmp_path, threads=0).run()
     with pytest.raises(InputError, match="no group"):
         BlindTrial(tmp_path, only=["all"]).run()
 

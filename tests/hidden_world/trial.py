@@ -26,8 +26,8 @@ from tests.hidden_world.keys import open_key, seal, write_whole
 from tests.hidden_world.score import Figure, Scored, by_effect, confusion, figures, score_case
 from tests.hidden_world.world import write_campaign
 
-Diagnose = Callable[[Path, str, Path, int, "tuple[str, ...]"], "dict[str, Any]"]
-"""(campaign folder, model, folder for its results, seed, names withheld) -> diagnosis.json as a dictionary."""
+Diagnose = Callable[[Path, str, Path, int, "tuple[str, ...]", int], "dict[str, Any]"]
+"""(campaign folder, model, folder for its results, seed, names withheld, threads) -> diagnosis.json as a dictionary."""
 
 
 def chosen(which: str, part: str, only: Sequence[str] = (), limit: int | None = None) -> list[Case]:
@@ -45,9 +45,19 @@ def chosen(which: str, part: str, only: Sequence[str] = (), limit: int | None = 
 
 
 def run_trial(
-    out: Path, which: str, part: str, diagnose: str, *, picked: Sequence[Case], jobs: int = 1, keep: bool = False
+    out: Path,
+    which: str,
+    part: str,
+    diagnose: str,
+    *,
+    picked: Sequence[Case],
+    jobs: int = 1,
+    threads: int = 1,
+    keep: bool = False,
 ) -> Iterator[tuple[int, int]]:
     """Do what is not done yet; yields (done, all) as it goes on.  diagnose: `module:function`, see `Diagnose`.
+
+    jobs: cases at once.  threads: of each diagnosis.
 
     Keys are sealed and their hashes published before the first diagnosis.
     """
@@ -58,12 +68,12 @@ def run_trial(
     yield done, len(picked)
     if jobs == 1:
         for case in waiting:
-            run_case(case, out, diagnose, keep)
+            run_case(case, out, diagnose, threads, keep)
             done += 1
             yield done, len(picked)
         return
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        futures = [pool.submit(run_case, case, out, diagnose, keep) for case in waiting]
+        futures = [pool.submit(run_case, case, out, diagnose, threads, keep) for case in waiting]
         try:
             for future in as_completed(futures):
                 future.result()
@@ -79,16 +89,16 @@ def is_done(out: Path, case_id: str) -> bool:
     return path.exists() and "diagnosis" in json.loads(path.read_text(encoding="utf-8"))
 
 
-def run_case(case: Case, out: Path, diagnose: str, keep: bool) -> None:
+def run_case(case: Case, out: Path, diagnose: str, threads: int, keep: bool) -> None:
     """Generate one campaign, have it diagnosed, and write down what was said; an exception is a result too."""
     campaign, work = out / "campaigns" / case.id, out / "diagnoses" / case.id
     began = time.perf_counter()
     write_campaign(case.recipe, campaign)
-    result: dict[str, Any] = {"id": case.id, "generate_s": round(time.perf_counter() - began, 2)}
+    result: dict[str, Any] = {"id": case.id, "threads": threads, "generate_s": round(time.perf_counter() - began, 2)}
     began = time.perf_counter()
     try:
         function: Diagnose = _named(diagnose)
-        result["diagnosis"] = function(campaign, case.model, work, 1, case.exclude)
+        result["diagnosis"] = function(campaign, case.model, work, 1, case.exclude, threads)
     except ImportError:
         raise
     except Exception:
