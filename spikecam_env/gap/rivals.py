@@ -7,6 +7,7 @@ top of what the other predicts, makes campaigns in which it is true: they say wh
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +48,11 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
 
 
 def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
-    """Misfit by which `best` is better than `other`, each at the strength that suits `seen`."""
-    left = [judged(null, seen, rescaled(null, seen, p))[1] for p in (other, best)]
+    """Misfit by which `best` is better than `other`, each at the strength that suits `seen`, in the noise of both: two
+    twins of each do not tell whose campaigns scatter more, and the price of noise would decide."""
+    both = [rescaled(null, seen, p) for p in (other, best)]
+    spread = np.sqrt(np.mean([p.spread**2 for p in both], axis=0))
+    left = [judged(null, seen, replace(p, spread=spread))[1] for p in both]
     return left[0] - left[1]
 
 

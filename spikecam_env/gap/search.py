@@ -226,22 +226,23 @@ def chosen_of(
     leaves less at all."""
     if not sure:
         return [], ()
+    first = sure[0].prediction
     close = [
         f
         for f in sure
         if f is sure[0]
-        or lead(here, seen, sure[0].prediction, f.prediction) < CLOSE
-        or is_rival(here, null.draws, seen, sure[0].prediction, f.prediction)
+        or lead(here, seen, first, f.prediction) < CLOSE
+        or is_rival(here, null.draws, seen, first, f.prediction)
     ]
-    misfits = {f.name: judged(here, values, f.prediction)[1] for f in close}
+    behind = {f.name: lead(here, values, first, f.prediction) for f in close}
     free = {f.name: len(candidate(f.name).fitted) for f in close}
-    close.sort(key=lambda f: misfits[f.name] + LEAST * free[f.name])
+    close.sort(key=lambda f: behind[f.name] + LEAST * free[f.name])
     best = close[0]
     left = residual(here, values, best.prediction)
     rivals = [
         f.name
         for f in close[1:]
-        if (free[f.name] <= free[best.name] or misfits[f.name] < misfits[best.name])
+        if (free[f.name] <= free[best.name] or behind[f.name] < behind[best.name])
         and is_rival(here, null.draws, values, best.prediction, f.prediction)
         and (alarmed(here, left) or not alarmed(here, residual(here, values, f.prediction)))
     ]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from spikecam_env.gap.compare import Draw, Null, Prediction
+from spikecam_env.gap.compare import Draw, Null, Prediction, judged
 from spikecam_env.gap.rivals import LEAST, is_rival, lead
 from spikecam_env.gap.statistics import Key
 
@@ -77,3 +77,14 @@ def test_two_that_predict_the_same_are_rivals_whichever_leads():
     one, two = shown(n, change), shown(n, 1.001 * change)
     assert abs(lead(n, measured, one, two)) < LEAST
     assert is_rival(n, n.draws, measured, one, two) and is_rival(n, n.draws, measured, two, one)
+
+
+def test_two_twins_do_not_say_whose_campaigns_scatter_more():
+    """The same prediction twice, once of twins that happened to agree: neither leads."""
+    n = null(0)
+    one = shown(n, np.where(np.arange(COUNT) < 100, 3.0, 0.0))
+    calm = replace(one, spread=0.8 * one.spread)
+    measured = one.mean + np.random.default_rng(1).standard_normal(COUNT)
+    price = judged(n, measured, calm)[1] - judged(n, measured, one)[1]
+    print(f"misfit {price:.0f} apart, lead {lead(n, measured, calm, one):.2f}")
+    assert abs(price) > LEAST and abs(lead(n, measured, calm, one)) < 1.0
