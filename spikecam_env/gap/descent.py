@@ -25,7 +25,11 @@ Array = NDArray[np.float64]
 TURNS = 4
 
 SETTLED = 0.05
-"""Largest step of a logarithm that needs no other; nor does half of its error."""
+"""Largest step of a logarithm that needs no other."""
+
+LITTLE = 1.0
+"""Misfit that a step has to promise for another: of two parameters that make up for each other either may be open by
+far, and both together leave much."""
 
 FAR = 0.5
 """Step of a logarithm beyond which derivatives are taken anew."""
@@ -63,29 +67,27 @@ class Descent:
 def descend(
     probe: Probe, null: Null, measured: Array, model: SensorModel, base: BaseFit, free: Free, jobs: int = 1
 ) -> Descent:
-    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best; a step that turns out to
-    leave more ends it where it was taken.  jobs: threads."""
+    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best.  A step that turns out to
+    leave more is taken back, but for what it has taught.  jobs: threads."""
     at = probe(model, base)
     columns = derivatives(probe, null, measured, model, base, at, free, jobs)
-    best = (np.inf, Descent(model, base, at, columns, np.zeros((len(free), len(free)))))
     for turn in range(TURNS):
         step, covariance = step_of(null, measured, at, columns)
-        left = judged(null, measured, at)[1]
-        if left > best[0] + WORSE:
-            return best[1]
-        best = min(best, (left, Descent(model, base, at, columns, covariance)), key=lambda b: b[0])
         step = np.clip(step, -LONGEST, LONGEST)
         there = as_seen(model, within(model, base), null, at)
-        model, base = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
-        if turn == TURNS - 1 or np.all(np.abs(step) < np.maximum(SETTLED, 0.5 * np.sqrt(np.diag(covariance)))):
+        further, unit = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
+        left, promised = (judged(null, measured, p)[1] for p in (at, replace(at, mean=at.mean + columns @ step)))
+        if turn == TURNS - 1 or left - promised < LITTLE or np.all(np.abs(step) < SETTLED):
             break
-        after = probe(model, base)
-        if np.abs(step).max() < FAR:
-            columns = broyden(columns, step, after.mean - at.mean)
+        after = probe(further, unit)
+        taken = judged(null, measured, after)[1] < left + WORSE
+        if taken and np.abs(step).max() > FAR:
+            columns = derivatives(probe, null, measured, further, unit, after, free, jobs)
         else:
-            columns = derivatives(probe, null, measured, model, base, after, free, jobs)
-        at = after
-    return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
+            columns = broyden(columns, step, after.mean - at.mean)
+        if taken:
+            model, base, at = further, unit, after
+    return Descent(further, unit, replace(at, mean=at.mean + columns @ step), columns, covariance)
 
 
 def broyden(columns: Array, step: Array, change: Array) -> Array:
