@@ -71,6 +71,7 @@ def descend(
     leave more is taken back, but for what it has taught.  jobs: threads."""
     at = probe(model, base)
     columns = derivatives(probe, null, measured, model, base, at, free, jobs)
+    taken = True
     for turn in range(TURNS):
         step, covariance = step_of(null, measured, at, columns)
         step = np.clip(step, -LONGEST, LONGEST)
@@ -87,6 +88,8 @@ def descend(
             columns = broyden(columns, step, after.mean - at.mean)
         if taken:
             model, base, at = further, unit, after
+    if not taken:
+        return Descent(model, base, at, columns, covariance)
     return Descent(further, unit, replace(at, mean=at.mean + columns @ step), columns, covariance)
 
 
