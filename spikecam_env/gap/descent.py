@@ -67,30 +67,30 @@ class Descent:
 def descend(
     probe: Probe, null: Null, measured: Array, model: SensorModel, base: BaseFit, free: Free, jobs: int = 1
 ) -> Descent:
-    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best.  A step that turns out to
-    leave more is taken back, but for what it has taught.  jobs: threads."""
+    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best; where steps have come to
+    leave more, the best of where they led.  jobs: threads."""
     at = probe(model, base)
     columns = derivatives(probe, null, measured, model, base, at, free, jobs)
-    taken = True
+    least, best = np.inf, None
     for turn in range(TURNS):
         step, covariance = step_of(null, measured, at, columns)
         step = np.clip(step, -LONGEST, LONGEST)
-        there = as_seen(model, within(model, base), null, at)
-        further, unit = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
         left, promised = (judged(null, measured, p)[1] for p in (at, replace(at, mean=at.mean + columns @ step)))
+        if left < least:
+            least, best = left, Descent(model, base, at, columns, covariance)
+        there = as_seen(model, within(model, base), null, at)
+        model, base = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
         if turn == TURNS - 1 or left - promised < LITTLE or np.all(np.abs(step) < SETTLED):
             break
-        after = probe(further, unit)
-        taken = judged(null, measured, after)[1] < left + WORSE
-        if taken and np.abs(step).max() > FAR:
-            columns = derivatives(probe, null, measured, further, unit, after, free, jobs)
-        else:
+        after = probe(model, base)
+        if np.abs(step).max() < FAR:
             columns = broyden(columns, step, after.mean - at.mean)
-        if taken:
-            model, base, at = further, unit, after
-    if not taken:
-        return Descent(model, base, at, columns, covariance)
-    return Descent(further, unit, replace(at, mean=at.mean + columns @ step), columns, covariance)
+        else:
+            columns = derivatives(probe, null, measured, model, base, after, free, jobs)
+        at = after
+    if best and left > least + WORSE:
+        return best
+    return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
 
 
 def broyden(columns: Array, step: Array, change: Array) -> Array:
