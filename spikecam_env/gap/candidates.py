@@ -21,7 +21,7 @@ class Candidate:
     only_contrast: it changes nothing in light that is steady and uniform.
     wanders: its course in time is drawn anew every time, so that statistics scatter, each way alike.
     events: it is single events, few enough for one twin to have many more or less of them than another.
-    strikes: it is in some pixels for good, others in every twin, and their mean level is part of the pattern.
+    strikes: it is in a few pixels, others in every twin: one takes where they lie for a sign of it.
     needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
     """
 

@@ -27,7 +27,7 @@ TURNS = 4
 SETTLED = 0.05
 """Largest step of a logarithm that needs no other."""
 
-LITTLE = 1.0
+WORTH = 1.0
 """Misfit that a step has to promise for another: of two parameters that make up for each other either may be open by
 far, and both together leave much."""
 
@@ -52,7 +52,7 @@ Free = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Descent:
-    """Where it ended.  prediction: of the last twins, the last step added in proportion.  columns: (S, n) derivatives.
+    """Where it ended.  prediction: of the twins there, the last step added in proportion.  columns: (S, n) derivatives.
 
     covariance: (n, n) of the logarithms.
     """
@@ -71,16 +71,15 @@ def descend(
     leave more, the best of where they led.  jobs: threads."""
     at = probe(model, base)
     columns = derivatives(probe, null, measured, model, base, at, free, jobs)
-    least, best = np.inf, None
+    tried = []
     for turn in range(TURNS):
         step, covariance = step_of(null, measured, at, columns)
         step = np.clip(step, -LONGEST, LONGEST)
         left, promised = (judged(null, measured, p)[1] for p in (at, replace(at, mean=at.mean + columns @ step)))
-        if left < least:
-            least, best = left, Descent(model, base, at, columns, covariance)
+        tried.append((left, Descent(model, base, at, columns, covariance)))
         there = as_seen(model, within(model, base), null, at)
         model, base = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
-        if turn == TURNS - 1 or left - promised < LITTLE or np.all(np.abs(step) < SETTLED):
+        if turn == TURNS - 1 or left - promised < WORTH or np.all(np.abs(step) < SETTLED):
             break
         after = probe(model, base)
         if np.abs(step).max() < FAR:
@@ -88,7 +87,8 @@ def descend(
         else:
             columns = derivatives(probe, null, measured, model, base, after, free, jobs)
         at = after
-    if best and left > least + WORSE:
+    least, best = min(tried, key=lambda t: t[0])
+    if left > least + WORSE:
         return best
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
 

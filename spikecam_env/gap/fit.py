@@ -30,6 +30,7 @@ from spikecam_env.gap.compare import (
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.settle import FURTHEST, settled, shifted
 from spikecam_env.gap.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
+from spikecam_env.gap.traps import traps_of
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SensorModel
 
@@ -44,7 +45,7 @@ TURNS = 5
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
-WANDER, FEW = 6, 3
+WANDER, SEVERAL = 6, 3
 """Twins of an effect that makes statistics scatter, and of one that is few events, or in few pixels."""
 
 UNITS = 24
@@ -77,13 +78,12 @@ def predict(
     made = twins(case, model, base, numbers, only)
     draws = [Draw(n, values_of(t.bank, null.keys), t.base) for n, t in zip(numbers, made, strict=True)]
     predicted = paired(null, draws)
-    strikes = any(candidate(e.name).strikes for e in model.effects)
-    return with_pattern(case, model, null, predicted) if strikes else predicted
+    return with_pattern(case, model, null, predicted) if traps_of(model) else predicted
 
 
 def twins_of(name: str) -> int:
     """How many twins say what an effect does."""
-    return FEW if candidate(name).events or candidate(name).strikes else 1
+    return SEVERAL if candidate(name).events or candidate(name).strikes else 1
 
 
 def as_seen(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> BaseFit:

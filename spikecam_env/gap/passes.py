@@ -11,7 +11,7 @@ from spikecam_env.streams.bits import by_pixel, ones, times_of
 SPARSE = 0.05
 """Spikes a frame below which a pixel's are gone through one by one."""
 
-CLOSE = 8
+ALIKE = 8
 """Lengths of intervals that are counted one after the other, where a pixel's are no more."""
 
 
@@ -93,7 +93,7 @@ def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, 
 @njit(cache=True, nogil=True, boundscheck=False)
 def _count(d, least, most, lengths):  # type: ignore[no-untyped-def]
     """Add the intervals d, of least to most, to those of their length: length by length where these are few."""
-    if most - least < CLOSE:
+    if most - least < ALIKE:
         for length in range(least, most + 1):
             count = 0
             for i in range(d.size):

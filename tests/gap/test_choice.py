@@ -53,7 +53,7 @@ def test_recordings_held_out_decide_between_what_the_others_cannot_tell_apart():
 
 
 def test_what_loses_little_and_wins_all_recordings_is_chosen():
-    """The true one's lead on what is held out is a hundred times what it loses, by more than chance, on the others."""
+    """The true one wins by far on what is held out, and loses by more than chance on the others."""
     n, effect, values, seen = campaign()
     nudge = np.where(np.arange(COUNT) < 50, 0.18 * (values - n.mean - effect), 0.0)
     true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)

@@ -1,4 +1,4 @@
-"""Gauss-Newton on made-up statistics whose laws are known: it finds the parameters, and takes a bad step back."""
+"""Gauss-Newton on made-up statistics whose laws are known: it finds the parameters, and keeps the best of its steps."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_both_parameters_are_found_within_their_errors():
         assert abs(np.log(found[key] / TRUE[key])) < 4 * error
 
 
-def test_a_step_that_leaves_more_is_taken_back():
+def test_where_steps_come_to_leave_more_the_best_is_kept():
     """A law that promises more of the fraction, and turns round where the step leads."""
     n = null()
     here = 0.5 * TRUE["fraction"]
