@@ -45,6 +45,11 @@ class Case:
         """fit or holdout."""
         return next((c.use for c in self.conditions if c.name == recording), "fit")
 
+    def held_out(self, keys: Sequence[Key]) -> NDArray[np.bool_]:
+        """(S,) which statistics the gap is the mean of: those of recordings held out, or all where none is."""
+        held = np.array([self.use(k.recording) == "holdout" for k in keys], bool)
+        return held if held.any() else np.ones(len(keys), bool)
+
     def of(self, conditions: Sequence[Shown], observations: Sequence[Observation]) -> Case:
         """Other recordings of the same camera, refitted anew."""
         return case_of(self.shape, conditions, observations, self.seed, self.jobs, self.frame_rate_hz)

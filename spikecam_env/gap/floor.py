@@ -1,5 +1,4 @@
-"""The floor of the gap: by how much two halves of the measurement differ, or two units in their pattern, on the scale
-that the gap is stated on."""
+"""The floor of the gap: by how much two halves of the measurement differ, on the scale that the gap is stated on."""
 
 from __future__ import annotations
 
@@ -22,33 +21,31 @@ LEAST_FRAMES = 1000
 
 
 def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: Null) -> float:
-    """Mean of (first - second half)^2 / 4 noise^2 over the statistics of held-out steady recordings (of all steady
-    ones where none is held out).
+    """Mean of (first - second half)^2 / 4 noise^2 over the statistics that the gap is the mean of.
 
-    A statistic of n frames has a variance in 1/n, so two halves differ by four times the whole's.  Both are of one
-    unit: where the gap has the measured pattern against those of fresh units, the floor is by how much these differ.
-    NaN where no recording is long enough.
+    A statistic of n frames has a variance in 1/n, so two halves differ by four times the whole's.  What halves cannot
+    tell is by how much twins differ: motion, of which each half shows other places, and the pattern, which the gap
+    compares with that of fresh units and halves share.  NaN where no steady recording is long enough.
     """
+    held = case.held_out(null.keys)
+    names = {k.recording for k, there in zip(null.keys, held, strict=True) if there}
     still = [
         (c, r)
         for c in case.conditions
         for r in recordings
-        if r.name == c.name and c.kind in ("dark", "flat") and c.frames >= LEAST_FRAMES
+        if r.name == c.name and c.name in names and c.kind in ("dark", "flat") and c.frames >= LEAST_FRAMES
     ]
-    held = [(c, r) for c, r in still if c.use == "holdout"] or still
-    if not held:
+    if not still:
         return float("nan")
     first: dict[Key, float] = {}
     second: dict[Key, float] = {}
-    for c, r in held:
+    for c, r in still:
         bits, half = r.packed(), c.frames // 2
         for found, part in ((first, bits[:half]), (second, bits[half : 2 * half])):
             found.update(_bank(case.base, replace(c, frames=half), observe(part, case.shape)))
-    keys = [k for k in null.keys if k in first and k in second]
-    at = [null.keys.index(k) for k in keys]
-    halves = ((values_of(first, keys) - values_of(second, keys)) / 2.0) ** 2
-    units = (null.noise**2 - null.floor**2)[at]
-    return float(np.mean(np.where([k.group == "pattern" for k in keys], units, halves) / null.noise[at] ** 2))
+    halves = (values_of(first, null.keys) - values_of(second, null.keys)) / 2.0
+    twins2 = null.noise**2 - null.floor**2
+    return float(np.mean((np.where(np.isfinite(halves), halves**2, twins2) / null.noise**2)[held]))
 
 
 def _bank(base: BaseFit, condition: Shown, seen: Observation) -> dict[Key, float]:

@@ -158,8 +158,7 @@ def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
 
 def gap_of(case: Case, null: Null, values: Array, given: Array, after: Prediction) -> Gap:
     """Mean square distance on held-out recordings, in the noise that each model predicts."""
-    use = np.array([case.use(k.recording) for k in null.keys])
-    held = use == "holdout" if np.any(use == "holdout") else np.ones(len(use), bool)
+    held = case.held_out(null.keys)
     wider = np.sqrt(np.maximum(after.spread**2 - null.sd**2, 0.0) + null.noise**2)
     b, a = (np.nan_to_num((values - mean) / sd) ** 2 for mean, sd in ((given, null.noise), (after.mean, wider)))
     by = {}

@@ -59,11 +59,12 @@ def run_trial(
 
     jobs: cases at once.  threads: of each diagnosis.
 
-    Keys are sealed and their hashes published before the first diagnosis.
+    Keys are sealed and their hashes published before the first diagnosis.  Cases go in the order of their ids, which is
+    that of no group: what a trial has done when it is cut short is a fair sample of it.
     """
     (out / "results").mkdir(parents=True, exist_ok=True)
     seal(cases(which, part), out, {"set": which, "part": part})
-    waiting = [case for case in picked if not is_done(out, case.id)]
+    waiting = sorted((case for case in picked if not is_done(out, case.id)), key=lambda case: case.id)
     done = len(picked) - len(waiting)
     yield done, len(picked)
     if jobs == 1:
