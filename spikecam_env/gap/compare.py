@@ -57,6 +57,7 @@ class Prediction:
 
     draws: the campaigns it was learnt from.  own: (S,) what its effects do to the very unit; where None, that is its
     distance from the null, whose unit has taken an effect's noise for its own where they are severe.
+    units: (U, S) of the drawn units that the pattern was learnt from, NaN elsewhere; of all models by the same draws.
     """
 
     mean: Array
@@ -64,6 +65,7 @@ class Prediction:
     spread: Array
     draws: tuple[Draw, ...] = ()
     own: Array | None = None
+    units: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -294,7 +296,11 @@ def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, s
     that do not move would drown those that do (regression dilution).  What was not measured (NaN), and may move more,
     is a matter of its own."""
     change, known = there.mean - here.mean, np.isfinite(measured)
-    own2 = np.maximum(np.maximum(own_variance(null, there), own_variance(null, here)), 1e-300)
+    own2 = np.maximum(own_variance(null, there), own_variance(null, here))
+    if there.units is not None and here.units is not None:
+        apart = there.units - here.units
+        own2 = np.where(np.isfinite(apart).all(axis=0), apart.var(axis=0, ddof=1) / len(apart), own2)
+    own2 = np.maximum(own2, 1e-300)
     clear = is_clear(np.where(known, change, 0.0), own2) | is_clear(np.where(known, 0.0, change), own2)
     return np.where(clear, change, 0.0) / step
 

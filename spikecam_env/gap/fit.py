@@ -102,7 +102,7 @@ def with_pattern(case: Case, model: SensorModel, null: Null, predicted: Predicti
     mean = np.where(known, values.mean(axis=0), predicted.mean)
     spread = np.where(known, np.maximum(values.std(axis=0, ddof=1), null.sd), predicted.spread)
     error = np.where(known, spread / np.sqrt(UNITS), predicted.error)
-    return replace(predicted, mean=mean, error=error, spread=spread)
+    return replace(predicted, mean=mean, error=error, spread=spread, units=np.where(known, values, np.nan))
 
 
 def fit(

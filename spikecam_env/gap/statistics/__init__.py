@@ -47,6 +47,7 @@ FLOORS: dict[tuple[str, str], float] = {
     ("moving", ""): 2e-4,
     ("moving", "left"): 5e-3,
     ("pattern", ""): 0.02,
+    ("pattern", "over"): 0.5,
     ("pattern", "silent"): 1.0,
     ("texture", ""): 0.02,
     ("texture", "field"): 2e-3,

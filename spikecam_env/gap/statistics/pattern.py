@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 NARROW = 5e-4
 """Relative spread below which there is no pattern, but the noise of rates read between whole frames."""
 
+FAR = (5, 10, 20, 40)
+"""Spreads above the median beyond which pixels are counted: no Gaussian reaches there."""
+
 BLOCKS = 8
 """Blocks along each side of the array."""
 
@@ -24,7 +27,8 @@ def statistics(rate: Array) -> dict[str, float]:
     """Of a rate map (H, W).
 
     width: log of the robust relative spread.  low / high tail: how much further the 0.5 % and 99.5 % quantiles lie
-    than those of a Gaussian, in spreads; top: the largest.  silent: pixels below a tenth of the median, counted.
+    than those of a Gaussian, in spreads; top: the largest.  over 5, 10, 20, 40: pixels so many spreads above the median,
+    counted; silent: those below a tenth of it.
     rows, columns: log variance of their means over a pixel's.  bowl, across, down: radial slope and gradients.
     near: correlation of neighbours.  patch: the mean of a block of pixels that is furthest off, in its standard errors.
     Of a map that is NARROW: its width, as if it were that, and silent.
@@ -53,6 +57,7 @@ def statistics(rate: Array) -> dict[str, float]:
         "low tail": float(-low / width),
         "high tail": log(max(high / width, 0.1)),
         "top": log(max(float(relative.max()) / width, 0.1)),
+        **{f"over {n}": root(float((relative > n * width).sum())) for n in FAR},
         "silent": silent,
         "rows": log(float(inside.mean(axis=1).var()) / variance * columns),
         "columns": log(float(inside.mean(axis=0).var()) / variance * rows),

@@ -18,9 +18,14 @@ BANDS = 8
 
 
 def spectrum(frame: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Periodogram of spikes a frame, relative to their mean; bin n is n cycles in the recording."""
+    """Periodogram of spikes a frame, relative to their mean; bin n is n cycles in the recording.
+
+    Tapered (Hann): spikes are noise of high frequency, which would leak to the lowest, by chance of how many of the
+    pixels' intervals the recording's two ends cut.
+    """
     relative = frame / max(float(frame.mean()), 1e-9) - 1.0
-    power: NDArray[np.float64] = np.abs(np.fft.rfft(relative)) ** 2 / len(frame)
+    taper = np.hanning(len(frame))
+    power: NDArray[np.float64] = np.abs(np.fft.rfft(taper * relative)) ** 2 / (taper @ taper)
     return power
 
 
