@@ -66,9 +66,10 @@ def started(model: SensorModel, engine: str, phase: Array) -> SpikeSensor:
     return sensor
 
 
-@pytest.mark.parametrize("name", ["dead_time", "crosstalk", "ir_drop", "row_temporal_noise", "random_telegraph_noise"])
+@pytest.mark.parametrize("name", ["dead_time", "crosstalk", "ir_drop", "row_temporal_noise", "readout_skew"])
 def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("spikecam_env.sensor.kernels.fast._WORTH_A_THREAD", 1)
+    monkeypatch.setattr(block, "_FEWEST", 1)
     model = with_effects("scsim", CATALOGUE[name]())
     unit = model.draw_unit((33, 50), 0)
     first = Exposure(0, model.frame_rate_hz, (33, 50), unit)
@@ -76,7 +77,8 @@ def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.
     light = np.random.default_rng(0).uniform(0, 1.2, (2, unit.gain.size)).astype(np.float32)
     streams = []
     for threads, longest in ((1, 1 << 18), (3, 1 << 18), (2, 1), (1, 5 * unit.gain.size)):
-        monkeypatch.setattr(block, "_BLOCK", longest)
+        for most in ("_BLOCK", "_MOVING"):
+            monkeypatch.setattr(block, most, longest)
         state = block.start(first, effects, generator(0, "phase").random(unit.gain.size), 7)
         rise, stay = Segment(*light, 64, 0, 40), Segment(light[1], light[1], 64, 0, 30)
         fall, again = Segment(light[1], light[0], 8, 0, 8), Segment(light[1].copy(), light[1].copy(), 64, 0, 30)

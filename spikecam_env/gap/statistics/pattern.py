@@ -27,8 +27,8 @@ def statistics(rate: Array) -> dict[str, float]:
     """Of a rate map (H, W).
 
     width: log of the robust relative spread.  low / high tail: how much further the 0.5 % and 99.5 % quantiles lie
-    than those of a Gaussian, in spreads; top: the largest.  over 5, 10, 20, 40: pixels so many spreads above the median,
-    counted; silent: those below a tenth of it.
+    than those of a Gaussian, in spreads; top: the largest.  over 5, 10, 20, 40: pixels so many spreads above the
+    median, counted; silent: those below a tenth of it.
     rows, columns: log variance of their means over a pixel's.  bowl, across, down: radial slope and gradients.
     near: correlation of neighbours.  patch: the mean of a block of pixels that is furthest off, in its standard errors.
     Of a map that is NARROW: its width, as if it were that, and silent.

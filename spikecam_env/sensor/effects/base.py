@@ -109,12 +109,16 @@ class Charge:
     @property
     def values(self) -> Array:
         """Multiplied out: (F, H, W), or (1, H, W) where all frames are alike."""
-        return self.pixels if isinstance(self.factor, float) and self.factor == 1.0 else self.pixels * self.factor
+        return self.pixels if self._whole else self.pixels * self.factor
 
     @property
     def rises(self) -> Array:
         """`rise`, multiplied out."""
-        return np.asarray(self.rise * self.factor)
+        return np.asarray(self.rise if self._whole else self.rise * self.factor)
+
+    @property
+    def _whole(self) -> bool:
+        return isinstance(self.factor, float) and self.factor == 1.0
 
 
 @dataclasses.dataclass(frozen=True)

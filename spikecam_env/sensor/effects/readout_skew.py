@@ -40,6 +40,17 @@ class ReadoutSkew(Effect):
         x, d = np.broadcast_to(x, (now.frames, *now.shape)), np.broadcast_to(d, (now.frames, *now.shape))
         rows = now.shape[0]
         early = self.span * (1.0 - np.arange(rows)[:, None] / max(rows - 1, 1))
-        before, before_d = np.concatenate([last[None], x[:-1]]), np.concatenate([last_d[None], d[:-1]])
-        read = x + early * (before - x) + 0.5 * early * (1.0 - early) * (before_d - d)
+        read, slant = _earlier(x, last), _earlier(d, last_d)
+        read *= early
+        read += x
+        slant *= 0.5 * early * (1.0 - early)
+        read += slant
         return Charge(read), dark, (x[-1].copy(), d[-1].copy())
+
+
+def _earlier(now: Array, last: Array) -> Array:
+    """(F, H, W) by how much more there was in the frame before; last: in that before the first."""
+    more = np.empty(now.shape)
+    np.subtract(last, now[0], out=more[0])
+    np.subtract(now[:-1], now[1:], out=more[1:])
+    return more

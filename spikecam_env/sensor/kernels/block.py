@@ -31,6 +31,12 @@ from spikecam_env.sensor.unit import Unit
 _BLOCK = 1 << 22
 """Pixel-steps of a block, at most: what differs from pixel to pixel and frame to frame then takes 32 megabytes."""
 
+_MOVING = 1 << 18
+"""Where light moves, since a dozen such arrays are then made of it: two megabytes each, which a cache holds."""
+
+_FEWEST = 8
+"""Frames of a block, even of a large array: what a block costs besides is shared by so many."""
+
 
 def missing(effects: Sequence[Effect]) -> list[str]:
     """Names of effects, or options of them, that this kernel does not carry."""
@@ -113,7 +119,7 @@ def run(
     first, effects: as given to `start`.  threads: default NUMBA_NUM_THREADS.
     """
     done = 0
-    for parts in _blocks(state.law, segments, max(1, _BLOCK // state.charge.size)):
+    for parts in _blocks(state.law, segments):
         mean = _mean(parts)
         rise = _rise(parts) if drive.wants_rise(effects) else 0.0
         count = sum(part.count for part in parts)
@@ -133,12 +139,12 @@ class _Part:
     count: int
 
 
-def _blocks(law: BlockLaw, segments: Iterable[Segment], most: int) -> Iterator[list[_Part]]:
-    """Parts that make a block of at most so many frames: light that moves, or the same light that stays."""
+def _blocks(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[list[_Part]]:
+    """Parts that make a block: light that moves, or the same light that stays."""
     block: list[_Part] = []
     frames = 0
-    for part in _parts(law, segments, most):
-        if block and (frames + part.count > most or not _alike(block[-1].light, part.light)):
+    for part in _parts(law, segments):
+        if block and (frames + part.count > _most(part.light) or not _alike(block[-1].light, part.light)):
             yield block
             block, frames = [], 0
         block.append(part)
@@ -147,12 +153,18 @@ def _blocks(law: BlockLaw, segments: Iterable[Segment], most: int) -> Iterator[l
         yield block
 
 
-def _parts(law: BlockLaw, segments: Iterable[Segment], most: int) -> Iterator[_Part]:
+def _most(light: Ramp) -> int:
+    """Frames of a block in such light, at most."""
+    return max(_FEWEST, (_BLOCK if light.steady else _MOVING) // light.level.size)
+
+
+def _parts(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[_Part]:
     last, light = None, None
     for s in segments:
         if last is None or light is None or s.length != last.length or not _same_light(s, last):
             light = ramp(s, law.gain, law.dark)
         last = s
+        most = _most(light)
         for done in range(0, s.count, most):
             yield _Part(light, s.first + done, min(most, s.count - done))
 
