@@ -20,7 +20,8 @@ WORLD = Path(spikecam_env.__file__).resolve().parents[1] / "tests" / "hidden_wor
 class BlindTrial:
     """Generate campaigns with hidden effects, diagnose them, open the keys and score.
 
-    What is done already in OUT is not done again.  The part `report` is for figures: do not tune on it.
+    What is done already in OUT is not done again; trial.md has the figures so far at any time, and cases are in the order
+    of their opaque ids, a fair sample.  The part `report` is for figures: do not tune on it.
 
     example:  spikecam blind-trial --set quick --part tune --jobs 2 --out trial
     """
@@ -68,9 +69,10 @@ class BlindTrial:
             with tqdm(total=len(picked), unit="case") as bar:
                 for done, _ in steps:
                     bar.update(done - bar.n)
+                    scored = trial.score_trial(self.out, picked)
         except (ValueError, ImportError) as error:
             raise InputError(str(error)) from error
-        print(trial.as_text(trial.score_trial(self.out, picked)))
+        print(trial.as_text(scored))
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
 
 
