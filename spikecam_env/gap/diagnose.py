@@ -42,7 +42,7 @@ from spikecam_env.gap.result import Diagnosis
 from spikecam_env.gap.screen import bounds
 from spikecam_env.gap.search import Round, of_fit, search
 from spikecam_env.gap.templates import Templates, load
-from spikecam_env.gap.verdict import concluded, grounded
+from spikecam_env.gap.verdict import concluded, grounded, harmless
 from spikecam_env.gap.words import sentence
 from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
@@ -111,7 +111,7 @@ def diagnose(
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
-            rounds = search(case, start, null, values, names, templates or load())
+            rounds = harmless(case, null, values, search(case, start, null, values, names, templates or load()))
     if rounds and not lacking:
         off = replace(off, parameters=off_nominal(case, assumed, rounds[-1].base).parameters)
     with timed("verdict"):

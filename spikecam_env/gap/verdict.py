@@ -53,6 +53,17 @@ def explains(null: Null, before: Array, rho: Array) -> bool:
     return not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet and not contradicted)
 
 
+def harmless(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
+    """The rounds; where what they found does not explain the data and makes recordings held out worse, they end with
+    the model that they began with: a stand-in has to be of use where nobody looked."""
+    last = rounds[-1]
+    rho = residual(null, values, last.prediction)
+    if explains(null, residual(null, values, null.prediction), rho):
+        return list(rounds)
+    gap = gap_of(case, null, values, null.mean, last.prediction)
+    return list(rounds) if gap.after < gap.before else [*rounds[:-1], replace(rounds[0], fits=())]
+
+
 def concluded(
     case: Case,
     model: SensorModel,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.search import PROMISE, Round, chosen_of, revisited, settle
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.verdict import explains
+from spikecam_env.gap.verdict import explains, harmless
 
 COUNT, TWINS = 200, 12
 FIT = np.arange(COUNT) < 150
@@ -155,3 +156,16 @@ def test_beside_a_later_effect_a_runner_up_may_take_the_earlier_ones_place(monke
     assert [f.name for f in then.fits] == ["comparator_delay", "dead_time"] and then.rivals == ()
     far = replace(turn, fits=(replace(first, misfit=300.0), replace(other, misfit=480.0)))
     assert revisited(recorded(), MODEL, n, seen, values, best, far) == (best, far), "it explained too little"
+
+
+def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
+    """It takes the effect up where it was fitted; on what was held out it does nothing, or the opposite."""
+    n, change, values, seen = campaign()
+    case = SimpleNamespace(held_out=lambda keys: ~FIT, conditions=())
+    start = Round(MODEL, unit(), n.prediction, change, 800.0)
+    patched = MODEL.with_effect(effect("optical_blur", sigma_pixels=0.1))
+    for held_out, kept in ((0.5, True), (-1.0, False)):
+        found = a_fit(n, "optical_blur", np.where(FIT, 0.9 * change, held_out * change), seen)
+        end = Round(patched, unit(), found.prediction, found.rho, found.misfit)
+        after = harmless(case, n, values, [replace(start, fits=(found,)), end])
+        assert (after[-1].model is patched) == kept and len(after) == 2
