@@ -20,7 +20,7 @@ WORLD = Path(spikecam_env.__file__).resolve().parents[1] / "tests" / "hidden_wor
 class BlindTrial:
     """Generate campaigns with hidden effects, diagnose them, open the keys and score.
 
-    What is done already in OUT is not done again; trial.md has the figures so far at any time, and cases are in the order
+    What is done already in OUT is not done again; trial.md has the figures so far at any time, of cases in the order
     of their opaque ids, a fair sample.  The part `report` is for figures: do not tune on it.
 
     example:  spikecam blind-trial --set quick --part tune --jobs 2 --out trial
