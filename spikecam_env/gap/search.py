@@ -2,8 +2,8 @@
 
     [screen -> fit -> shape -> confirm -> add -> revisit the earlier ones -> polish all]*
 
-Held-out recordings take no part but in the choice between what others cannot tell apart, and, within errors, in
-parameters that others leave open.
+Held-out recordings take no part but in the choice between what others cannot tell apart, within errors in parameters
+that others leave open, and in whether anything is left to look for.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def search(
     now, base, prediction = model, within(model, case.base), null.prediction
     while len(rounds) < MOST:
         rho = residual(null, seen, prediction)
-        if rounds and not alarmed(null, rho):
+        if rounds and not alarmed(null, rho) and not alarmed(null, residual(null, values, prediction)):
             break
         here = standing_on(null, prediction)
         left_over = judged(here, seen, here.prediction)[1]
