@@ -54,14 +54,13 @@ def explains(null: Null, before: Array, rho: Array) -> bool:
 
 
 def harmless(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
-    """The rounds; where what they found does not explain the data and makes recordings held out worse, they end with
-    the model that they began with: a stand-in has to be of use where nobody looked."""
-    last = rounds[-1]
-    rho = residual(null, values, last.prediction)
-    if explains(null, residual(null, values, null.prediction), rho):
+    """The rounds; where what they found does not explain the data, they end where they came nearest to recordings held
+    out: a stand-in has to be of use where nobody looked."""
+    *before, last = rounds
+    if explains(null, residual(null, values, null.prediction), residual(null, values, last.prediction)):
         return list(rounds)
-    gap = gap_of(case, null, values, null.mean, last.prediction)
-    return list(rounds) if gap.after < gap.before else [*rounds[:-1], replace(rounds[0], fits=())]
+    left = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
+    return [*before, replace(rounds[int(np.argmin(left))], fits=())]
 
 
 def concluded(

@@ -168,4 +168,4 @@ def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
         found = a_fit(n, "optical_blur", np.where(FIT, 0.9 * change, held_out * change), seen)
         end = Round(patched, unit(), found.prediction, found.rho, found.misfit)
         after = harmless(case, n, values, [replace(start, fits=(found,)), end])
-        assert (after[-1].model is patched) == kept and len(after) == 2
+        assert (after[-1].model is patched) == kept and len(after) == 2 and after[-1].fits == ()
