@@ -180,25 +180,26 @@ def test_gap_and_parameters_of_right_names():
     case = case_of("strong", "dead_time")
     true = case.recipe.hidden[0].parameters["tau_us"]
     made = []
-    for before, removed, error, sd in (
-        (9.0, 0.99, 0.0, 0.01),
-        (9.0, 0.9, 0.1, 0.05),
-        (9.0, 0.96, 0.5, 0.1),
-        (1.4, 0, 0, 1),
-    ):
+    for removed, error, sd in ((0.99, 0.0, 0.01), (0.9, 0.1, 0.05), (0.96, 0.5, 0.1)):
         stated = {"tau_us": {"value": true * (1 + error), "sd": true * sd}}
         diagnosis = {
             "verdict": "named",
             "effects": [{"name": "dead_time", "parameters": stated}],
-            "gap": {"before": before, "floor": 1.0, "removed": removed},
+            "gap": {"before": 9.0, "floor": 1.0, "removed": removed},
         }
         made.append(score_case(key_of(case), {"diagnosis": diagnosis, "seconds": 130.0}))
     value = {f.what: f for f in figures(made)}
     assert value["gap removed, right names with one held out: median"].value == 0.96
-    assert value["parameters within 15 % or twice their sd"].value == pytest.approx(3 / 4)
-    assert value["90 % intervals cover"].value == pytest.approx(2 / 4)
+    assert value["parameters within 15 % or twice their sd"].value == pytest.approx(2 / 3)
+    assert value["90 % intervals cover"].value == pytest.approx(1 / 3)
     assert not value["90 % intervals cover"].met and not value["slowest diagnosis [s]"].met
     assert value["diagnoses within 120 s, threads: 1"].value == 0.0
+
+
+def test_a_share_of_a_gap_that_is_hardly_above_its_floor_is_not_scored():
+    case = case_of("strong", "dead_time")
+    gaps = [{"before": before, "floor": 1.0, "removed": 0.3} for before in (1.4, 1.6)]
+    assert [answered(case, "named", "dead_time", gap=gap).removed for gap in gaps] == [None, 0.3]
 
 
 def test_confusion_counts_true_against_answered():

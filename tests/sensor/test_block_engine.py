@@ -66,7 +66,9 @@ def started(model: SensorModel, engine: str, phase: Array) -> SpikeSensor:
     return sensor
 
 
-@pytest.mark.parametrize("name", ["dead_time", "crosstalk", "ir_drop", "row_temporal_noise", "readout_skew"])
+@pytest.mark.parametrize(
+    "name", ["dead_time", "crosstalk", "ir_drop", "row_temporal_noise", "random_telegraph_noise", "readout_skew"]
+)
 def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("spikecam_env.sensor.kernels.fast._WORTH_A_THREAD", 1)
     monkeypatch.setattr(block, "_FEWEST", 1)
