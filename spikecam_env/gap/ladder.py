@@ -142,9 +142,7 @@ def ladder(
 
 def judged(case: Case, null: Null, values: Array, mean: Array, model: SensorModel, found: Missing | None) -> Rung:
     """A model as a rung.  mean: (S,) what it predicts."""
-    use = {c.name: c.use for c in case.conditions}
     square = np.nan_to_num((values - mean) / null.noise) ** 2
-    held = np.array([use[k.recording] == "holdout" for k in null.keys])
     group = np.array([k.group for k in null.keys])
     off = adjusted(np.sign(values - mean) * np.sqrt(square))
     return Rung(
@@ -152,7 +150,7 @@ def judged(case: Case, null: Null, values: Array, mean: Array, model: SensorMode
         found.effect if found else None,
         found.sd if found else np.nan,
         found.also if found else (),
-        float(square[held if held.any() else slice(None)].mean()),
+        float(square[case.held_out(null.keys)].mean()),
         {g: float(square[group == g].mean()) for g in dict.fromkeys(group.tolist())},
         int((off < 0.05).sum()),
     )
