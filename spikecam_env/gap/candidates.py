@@ -18,6 +18,7 @@ class Candidate:
 
     family: effects of one family act on the same thing.  fitted: parameters, the strength first.
     shapes: values of other parameters to start from.  square: statistics go with the square of the strength.
+    mixed: some statistics go with the strength, others with its square.
     only_contrast: it changes nothing in light that is steady and uniform.
     wanders: its course in time is drawn anew every time, so that statistics scatter, each way alike.
     events: it is single events, few enough for one twin to have many more or less of them than another.
@@ -29,6 +30,7 @@ class Candidate:
     fitted: tuple[str, ...]
     shapes: dict[str, tuple[float, ...]] = field(default_factory=dict)
     square: bool = False
+    mixed: bool = False
     needs: Needs = lambda shown: None
     only_contrast: bool = False
     wanders: bool = False
@@ -112,7 +114,9 @@ CANDIDATES: dict[str, Candidate] = {
         strikes=True,
         needs=_steady,
     ),
-    "dark_current_drift": Candidate("dark", ("rise", "tau_ms"), {"tau_ms": (10.0, 50.0, 200.0)}, needs=_dark),
+    "dark_current_drift": Candidate(
+        "dark", ("rise", "tau_ms"), {"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=_dark
+    ),
     "dark_current": Candidate("dark", ("mean_pA",), needs=_dark),
     "dark_current_spread": Candidate("dark", ("sigma_pA",), needs=_dark),
     "dark_current_tail": Candidate("dark", ("sigma",), needs=_dark),

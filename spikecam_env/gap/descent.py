@@ -65,10 +65,18 @@ class Descent:
 
 
 def descend(
-    probe: Probe, null: Null, measured: Array, model: SensorModel, base: BaseFit, free: Free, jobs: int = 1
+    probe: Probe,
+    null: Null,
+    measured: Array,
+    model: SensorModel,
+    base: BaseFit,
+    free: Free,
+    jobs: int = 1,
+    worth: float = WORTH,
 ) -> Descent:
     """From a model and its unit down to the parameters `free` that suit (S,) `measured` best; where steps have come to
-    leave more, the best of where they led.  jobs: threads."""
+    leave more, the best of where they led.  jobs: threads.  worth: misfit that a step has to promise, and the one
+    before it to have removed."""
     at = probe(model, base)
     columns = derivatives(probe, null, measured, model, base, at, free, jobs)
     tried = []
@@ -79,7 +87,8 @@ def descend(
         tried.append((left, Descent(model, base, at, columns, covariance)))
         there = as_seen(model, within(model, base), null, at)
         model, base = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
-        if turn == TURNS - 1 or left - promised < WORTH or np.all(np.abs(step) < SETTLED):
+        little = left - promised < worth or (turn > 0 and 0 <= tried[-2][0] - left < worth)
+        if turn == TURNS - 1 or little or np.all(np.abs(step) < SETTLED):
             break
         after = probe(model, base)
         if np.abs(step).max() < FAR:

@@ -15,13 +15,15 @@ from spikecam_env.gap.confirm import FINAL, confirmed
 from spikecam_env.gap.descent import WHITE, WORSE, Probe, descend
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.settle import HIDDEN
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
 AGREE = 3.0
 """Errors by which a parameter may move when held-out recordings are fitted as well, for them to agree."""
+
+SHARED = 0.9
+"""Share of a refit's s^2 that is the unit's own, below which it is fitted together with the noise of the effects."""
 
 Errors = dict[str, dict[str, float]]
 """Standard deviation of each parameter, by effect and name."""
@@ -55,7 +57,7 @@ def _refined(
     What wanders is left as it was fitted, since one twin has no direction of it.
     """
     free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
-    free += [WHITE] if 0 < found.base.white < HIDDEN * case.base.white else []
+    free += [WHITE] if 0 < found.base.white < SHARED * case.base.white else []
     now, base = found.model, found.base
     columns, covariance = np.zeros((len(measured), 0)), np.zeros((0, 0))
     if free:

@@ -63,7 +63,7 @@ PROMISE = 15.0
 SEEN = 2.0
 """Noises by which an effect has to change a statistic to be added: twins of nothing may be luckier than others."""
 
-RETRIED, NEAR = 4, 0.25
+RETRIED, NEAR = 4, 0.5
 """Runners-up of an effect that are tried anew beside a later one: so many at most, and of what it removed the share
 that they have to have removed."""
 

@@ -25,6 +25,10 @@ HALF = 0.5
 """Share of what the best fit removes that one has to remove for its shape to be worth fitting."""
 
 
+TELLS = 5.0
+"""Misfit for which a step is worth its twins here: less does not put candidates in another order."""
+
+
 def has_shapes(name: str) -> bool:
     """Whether more is fitted of a candidate, by simulation, than its strength."""
     return len(candidate(name).fitted) > 1 and not is_pattern(name) and not candidate(name).wanders
@@ -51,7 +55,7 @@ def shaped(case: Case, model: SensorModel, null: Null, measured: Array, found: F
 
     names = candidate(found.name).fitted
     free = [(found.name, key) for key in names]
-    end = descend(probe, null, measured, found.model, found.base, free, case.jobs)
+    end = descend(probe, null, measured, found.model, found.base, free, case.jobs, TELLS)
     rho, left = judged(null, measured, end.prediction)
     if left > found.misfit:
         return found

@@ -42,7 +42,8 @@ def may_be_negative(name: str) -> bool:
 def is_linear(name: str) -> bool:
     """Whether statistics go in proportion to an effect's strength for long: noise goes by its square, and its bands and
     lateness are logarithms, which are not."""
-    return candidate(name).power == 1.0 and not is_pattern(name) and not candidate(name).wanders
+    what = candidate(name)
+    return what.power == 1.0 and not (what.mixed or what.wanders or is_pattern(name))
 
 
 def as_loud(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:

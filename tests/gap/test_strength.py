@@ -27,4 +27,6 @@ def test_a_strong_effect_a_pattern_and_events_are_simulated_as_they_are():
     for name, parameters in (("dead_pixels", {"fraction": 0.01}), ("missed_spikes", {"probability": 1e-6})):
         assert as_loud(name, parameters, 5.0) == (parameters, 1.0)
     assert as_loud("common_threshold_noise", {"sigma_mV": 1.0}, 10.0) == ({"sigma_mV": 1.0}, 1.0)
+    drift = {"rise": 0.01, "tau_ms": 50.0}  # the rate climbs with it, the scatter of intervals with its square
+    assert as_loud("dark_current_drift", drift, 10.0) == (drift, 1.0)
     assert as_loud("dead_time", {"tau_us": 0.02}, 30.0) == ({"tau_us": pytest.approx(0.04)}, pytest.approx(2.0))
