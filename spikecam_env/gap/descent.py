@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate
-from spikecam_env.gap.compare import Null, Prediction, judged, slope_of, step_of
+from spikecam_env.gap.compare import Null, Prediction, judged, own_variance, slope_of, step_of
 from spikecam_env.gap.fit import as_seen
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.strength import bounded, with_effect
@@ -33,6 +33,9 @@ far, and both together leave much."""
 
 FAR = 0.5
 """Step of a logarithm beyond which derivatives are taken anew."""
+
+CLEAR = 3.0
+"""Noises by which a step has to surprise for derivatives to be corrected by it."""
 
 LONGEST = 0.7
 """Largest step of a logarithm at once."""
@@ -92,7 +95,8 @@ def descend(
             break
         after = probe(model, base)
         if np.abs(step).max() < FAR:
-            columns = broyden(columns, step, after.mean - at.mean)
+            noise = np.sqrt(own_variance(null, at) + own_variance(null, after))
+            columns = broyden(columns, step, after.mean - at.mean, noise)
         else:
             columns = derivatives(probe, null, measured, model, base, after, free, jobs)
         at = after
@@ -102,9 +106,12 @@ def descend(
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
 
 
-def broyden(columns: Array, step: Array, change: Array) -> Array:
-    """(S, n) derivatives that give the change (S,) that a step (n,) turned out to make, where there are any."""
-    return np.asarray(columns + (columns != 0) * np.outer(change - columns @ step, step) / (step @ step))
+def broyden(columns: Array, step: Array, change: Array, noise: Array | float = 0.0) -> Array:
+    """(S, n) derivatives that give the change (S,) that a step (n,) turned out to make, where there are any and it is
+    clear of its noise (S,): that of a short step, as a slope, would look like knowledge of the parameters."""
+    surprise = change - columns @ step
+    told = (columns != 0) & (np.abs(surprise) > CLEAR * noise)[:, None]
+    return np.asarray(columns + told * np.outer(surprise, step) / (step @ step))
 
 
 def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[SensorModel, BaseFit]:

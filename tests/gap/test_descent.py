@@ -78,3 +78,36 @@ def test_where_steps_come_to_leave_more_the_best_is_kept():
     print(parameters_of(end.model), parameters_of(kept.model))
     assert parameters_of(end.model) == parameters_of(first)
     assert abs(np.log(parameters_of(kept.model)["fraction"] / TRUE["fraction"])) < 0.05
+
+
+def test_steps_go_on_while_they_are_worth_their_twins():
+    """One look here and one for each derivative; then a step that promises too little is the last."""
+    n = null()
+    measured = n.mean + law(**TRUE)
+
+    def looks(worth: float) -> int:
+        seen = []
+
+        def probe(model: SensorModel, base: BaseFit) -> Prediction:
+            seen.append(parameters_of(model))
+            return probe_of(n, law)(model, base)
+
+        descend(probe, n, measured, start(fraction=0.6, tau_us=2.0), unit(), FREE, worth=worth)
+        return len(seen)
+
+    assert looks(1e6) == 1 + len(FREE) < looks(1.0)
+
+
+def test_a_step_that_removed_nothing_is_the_last_but_one():
+    """A camera that promises by its derivatives what it never gives."""
+    n = null()
+    measured, here, looks = n.mean + law(**TRUE), parameters_of(start(fraction=0.5, tau_us=1.0)), []
+
+    def probe(model: SensorModel, base: BaseFit) -> Prediction:
+        nudged = (None, "fraction", "tau_us")[len(looks) % 3]
+        looks.append(nudged)
+        there = {key: value * (1.3 if key == nudged else 1.0) for key, value in here.items()}
+        return probe_of(n, law)(with_effect(MODEL, NAME, there), base)
+
+    descend(probe, n, measured, start(fraction=0.5, tau_us=1.0), unit(), FREE)
+    assert len(looks) == 2 * (1 + len(FREE))

@@ -35,6 +35,13 @@ def test_derivatives_are_corrected_to_what_a_step_turned_out_to_change():
     assert np.allclose(broyden(columns, step, columns @ step), columns)
 
 
+def test_a_short_step_whose_surprise_is_noise_corrects_nothing():
+    columns, step = np.array([[1.0, 0.5], [2.0, 2.0]]), np.array([0.05, -0.05])
+    change = columns @ step + np.array([0.1, 1.0])
+    after = broyden(columns, step, change, noise=np.array([0.1, 0.1]))
+    assert np.array_equal(after[0], columns[0]) and (after @ step)[1] == pytest.approx(change[1])
+
+
 def test_more_parameters_are_not_fitted_where_fewer_leave_nothing():
     case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
     measured = values_of(case.bank, null().keys)

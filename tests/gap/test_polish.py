@@ -1,0 +1,24 @@
+"""The last touch: the unit's own noise, which an effect's has moved, is refined with it."""
+
+import numpy as np
+import pytest
+from small import MODEL, effect, null, recorded, unit
+
+from spikecam_env.gap.compare import values_of
+from spikecam_env.gap.fit import fit
+from spikecam_env.gap.polish import polished
+
+
+@pytest.mark.parametrize("seed", [1, 12])
+def test_noise_of_the_unit_is_found_beside_common_noise(seed):
+    """3 mV in common take a fifth of what the refit holds for the unit's own."""
+    name = "common_threshold_noise"
+    case = recorded(effect(name, sigma_mV=3.0), seed=seed)
+    values = values_of(case.bank, null().keys)
+    seen = np.where([case.use(k.recording) == "fit" for k in null().keys], values, np.nan)
+    first = fit(case, MODEL, null(), seen, name, {"sigma_mV": 4.0})
+    best, errors, _ = polished(case, MODEL, null(), seen, values, first, [name])
+    own, before = best.base.white / unit().white, first.base.white / unit().white
+    print(best.parameters, errors, f"s^2 {before:.2f}, then {own:.2f} of the unit's; of the refit {case.base.white:.2e}")
+    assert own == pytest.approx(1.0, abs=0.1) and abs(own - 1.0) < abs(before - 1.0)
+    assert best.parameters["sigma_mV"] == pytest.approx(3.0, abs=3 * errors[name]["sigma_mV"])
