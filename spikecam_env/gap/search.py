@@ -50,6 +50,9 @@ FEWEST, TRIED = 3, 5
 MOST = 3
 """Effects that one diagnosis names together."""
 
+ALIKE = 0.8
+"""Share of what the best removes, that it has to remove with another of its shapes for the other end of a valley."""
+
 GAIN = 12.0
 """Misfit that an effect has to remove to be added."""
 
@@ -142,7 +145,7 @@ def compared(
     confirm = partial(confirmed, unit, turn.model, here, seen)
     sure, rest = settle(fitted(tried), confirm)
     again = other_shapes(sure[0].name, shapes, turn.misfit) if sure else []
-    anew = settle(fitted(again), confirm)[0]
+    anew = settle(other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again), confirm)[0] if again else []
     if anew and anew[0].misfit < sure[0].misfit:
         sure[0] = anew[0]
     sure, rivals = chosen_of(null, here, seen, values, sure)
@@ -158,6 +161,16 @@ def fits_of(
         worth = worth_shaping(null, before, fits)
         better = list(pool.map(partial(shaped, case, model, null, seen), worth))
     return [*better, *(f for f in fits if f not in worth)]
+
+
+def other_ends(
+    case: Case, model: SensorModel, null: Null, seen: Array, before: float, best: Fit, starts: Sequence[Screened]
+) -> list[Fit]:
+    """The best candidate from its other shapes, where it removes ALIKE of what it does before they are fitted too."""
+    with ThreadPoolExecutor(case.jobs) as pool:
+        fits = pool.map(lambda s: fit(case, model, null, seen, s.name, s.start, s.expected, s.white), starts)
+        alike = [f for f in fits if before - f.misfit > ALIKE * (before - best.misfit)]
+        return list(pool.map(partial(shaped, case, model, null, seen), alike))
 
 
 def is_little(turn: Round, left: float, chance: float, later: bool) -> bool:

@@ -19,6 +19,6 @@ def test_noise_of_the_unit_is_found_beside_common_noise(seed):
     first = fit(case, MODEL, null(), seen, name, {"sigma_mV": 4.0})
     best, errors, _ = polished(case, MODEL, null(), seen, values, first, [name])
     own, before = best.base.white / unit().white, first.base.white / unit().white
-    print(best.parameters, errors, f"s^2 {before:.2f}, then {own:.2f} of the unit's; of the refit {case.base.white:.2e}")
+    print(best.parameters, errors, f"s^2 {before:.2f}, then {own:.2f} of the unit's")
     assert own == pytest.approx(1.0, abs=0.1) and abs(own - 1.0) < abs(before - 1.0)
     assert best.parameters["sigma_mV"] == pytest.approx(3.0, abs=3 * errors[name]["sigma_mV"])
