@@ -141,9 +141,8 @@ def compared(
     distance = np.nan_to_num((seen - here.mean) / here.noise)
     tried = worth_fitting(best_of_each(shapes), misfit(distance, here.weight), loud(here, distance))
     unit = replace(case, base=turn.base)
-    fitted = partial(fits_of, unit, turn.model, here, seen, turn.misfit)
     confirm = partial(confirmed, unit, turn.model, here, seen)
-    sure, rest = settle(fitted(tried), confirm)
+    sure, rest = settle(fits_of(unit, turn.model, here, seen, turn.misfit, tried), confirm)
     again = other_shapes(sure[0].name, shapes, turn.misfit) if sure else []
     anew = settle(other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again), confirm)[0] if again else []
     if anew and anew[0].misfit < sure[0].misfit:

@@ -1,0 +1,51 @@
+"""Whether statistics go with the strength of an effect as far as `gap.strength.AS_LOUD` takes them to.
+
+    python -m benchmarks.in_proportion
+
+Each effect as strong as its clearest statistic is PEAK noises off, and FURTHEST times as strong, TWINS of the same
+draws each.  of the effect: correlation of what both do to all statistics.  worst: the statistic that the stronger,
+scaled down, has most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Last, marked `mixed`,
+those that are not scaled.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spikecam_env.gap.candidates import CANDIDATES, candidate, is_pattern
+from spikecam_env.gap.compare import TOLERANCE
+from spikecam_env.gap.fit import predict
+from spikecam_env.gap.refit import within
+from spikecam_env.gap.settle import FURTHEST
+from spikecam_env.gap.strength import bounded, is_linear, with_effect
+from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.sensor import CATALOGUE
+
+PEAK, TWINS = 15.0, 4
+
+if __name__ == "__main__":
+    case, model, null = standard_case(count=12)
+    base = within(model, case.base)
+    has = {e.name for e in model.effects}
+    names = [n for n in CANDIDATES if candidate(n).power == 1.0 and not (candidate(n).wanders or is_pattern(n))]
+    for name in sorted((n for n in names if n not in has), key=lambda n: not is_linear(n)):
+        entries = [e for e in load().entries if e.name == name]
+        if not entries:
+            continue
+        entry = entries[len(entries) // 2]
+        key = CATALOGUE[name].strength
+        one = entry.parameters[key] * PEAK / np.abs(entry.shift).max()
+        change = []
+        for strength in (one, FURTHEST * one):
+            there = with_effect(model, name, bounded(name, {**entry.parameters, key: strength}))
+            made = predict(case, there, within(there, base), null, TWINS)
+            change.append((made.mean - null.mean) / null.noise * one / strength)
+        weak, scaled = change
+        wrong = np.maximum(np.abs(scaled - weak) - TOLERANCE * np.abs(weak), 0.0)
+        at = int(np.argmax(wrong))
+        k = null.keys[at]
+        print(
+            f"{name:28s} of the effect {np.corrcoef(weak, scaled)[0, 1]:.3f}   worst {wrong[at]:5.1f}: {weak[at]:.1f} "
+            f"taken for {scaled[at]:.1f} ({k.group} {k.recording} {k.name}){'' if is_linear(name) else '   mixed'}",
+            flush=True,
+        )
