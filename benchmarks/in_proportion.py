@@ -3,9 +3,8 @@
     python -m benchmarks.in_proportion
 
 Each effect as strong as its clearest statistic is PEAK noises off, and FURTHEST times as strong, TWINS of the same
-draws each.  of the effect: correlation of what both do to all statistics.  worst: the statistic that the stronger,
-scaled down, has most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Last, marked `mixed`,
-those that are not scaled.
+draws each.  of the effect: correlation of what both do to all statistics.  worst: what the stronger, scaled down, has
+most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Those marked `mixed` are not scaled.
 """
 
 from __future__ import annotations

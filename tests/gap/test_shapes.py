@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded
 
-from spikecam_env.gap.compare import values_of
+from spikecam_env.gap.compare import judged, values_of
 from spikecam_env.gap.descent import broyden
 from spikecam_env.gap.fit import fit
+from spikecam_env.gap.screen import Screened
+from spikecam_env.gap.search import other_ends
 from spikecam_env.gap.shapes import has_shapes, shaped, worth_shaping
 
 
@@ -57,3 +59,16 @@ def test_more_parameters_are_not_fitted_where_fewer_leave_nothing():
     assert worth_shaping(null(), before, [lag, replace(enough, misfit=lag.misfit + 1.0)]) == [lag], "worse"
     poor = replace(lag, misfit=before - 10.0)
     assert worth_shaping(null(), before, [poor, replace(enough, rho=loud)]) == [], "removes next to nothing"
+
+
+def test_of_other_shapes_those_are_fitted_whole_that_remove_nearly_as_much():
+    """Lag of 1 ms from 0.6 and from 8 ms, where its strength alone removes most of what it does at 1 ms, or some."""
+    case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
+    measured = values_of(case.bank, null().keys)
+    before = judged(null(), measured, null().prediction)[1]
+    best = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
+    tried = [{"fraction": 0.08, "tau_us": tau_us} for tau_us in (600.0, 8000.0)]
+    starts = [Screened("photodiode_lag", there, best.misfit, np.full(len(measured), np.inf)) for there in tried]
+    found = other_ends(case, MODEL, null(), measured, before, best, starts)
+    print(f"{before:.0f}, of the best {best.misfit:.0f}", [(f.parameters, round(f.misfit)) for f in found])
+    assert [f.parameters["tau_us"] for f in found] == [pytest.approx(1000.0, rel=0.2)]
