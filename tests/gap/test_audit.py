@@ -141,6 +141,11 @@ def test_a_gap_that_makes_intervals_odd_is_found(name, count):
     assert found(case_from(spikes)) == [("dropped", (name,))]
 
 
+def test_a_quick_drift_of_the_dark_is_no_gap_in_time():
+    """All pixels of a dim flat are behind their time at its beginning, and for long after."""
+    assert found(recorded(effect("dark_current_drift", rise=0.3, tau_ms=5.0))) == []
+
+
 def test_a_lit_recording_without_spikes_is_named():
     spikes = spikes_of()
     spikes["flat-0.2"][:] = 0
