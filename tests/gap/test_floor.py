@@ -12,7 +12,9 @@ from spikecam_env.gap.compare import values_of
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import unit_of
+from spikecam_env.gap.result import Gap
 from spikecam_env.gap.twin import expose
+from spikecam_env.gap.verdict import grounded
 from spikecam_env.streams import unpack_frames
 
 
@@ -30,3 +32,11 @@ def test_where_nothing_is_wrong_the_gap_is_its_floor_pattern_and_all():
         floors.append(floor_of_halves(case, files, null))
     print(gaps, floors)
     assert np.mean(floors) == pytest.approx(np.mean(gaps), rel=0.35)
+
+
+@pytest.mark.parametrize("halves, floor", [(0.4, 0.4), (np.nan, 1.0), (190.0, 1.0)])
+def test_halves_that_differ_by_more_than_chance_are_no_floor(halves, floor):
+    """A dark level that climbs makes them differ by what the model lacks."""
+    gap = grounded(Gap(87.0, 0.5, 1.0, 0.0, {"dark": {"before": 87.0, "after": 0.5, "floor": 1.0}}), halves)
+    assert gap.floor == gap.by_recording["dark"]["floor"] == floor
+    assert gap.removed == pytest.approx(86.5 / (87.0 - floor))
