@@ -156,10 +156,15 @@ def fits_of(
 ) -> list[Fit]:
     """Candidates fitted from where their templates say; before: misfit of none."""
     with ThreadPoolExecutor(case.jobs) as pool:
-        fits = list(pool.map(lambda s: fit(case, model, null, seen, s.name, s.start, s.expected, s.white), starts))
+        fits = list(pool.map(partial(fit_from, case, model, null, seen), starts))
         worth = worth_shaping(null, before, fits)
         better = list(pool.map(partial(shaped, case, model, null, seen), worth))
     return [*better, *(f for f in fits if f not in worth)]
+
+
+def fit_from(case: Case, model: SensorModel, null: Null, seen: Array, start: Screened) -> Fit:
+    """A candidate's strength, fitted from where its template says."""
+    return fit(case, model, null, seen, start.name, start.start, start.expected, start.white)
 
 
 def other_ends(
@@ -167,7 +172,7 @@ def other_ends(
 ) -> list[Fit]:
     """The best candidate from its other shapes, where it removes ALIKE of what it does before they are fitted too."""
     with ThreadPoolExecutor(case.jobs) as pool:
-        fits = pool.map(lambda s: fit(case, model, null, seen, s.name, s.start, s.expected, s.white), starts)
+        fits = pool.map(partial(fit_from, case, model, null, seen), starts)
         alike = [f for f in fits if before - f.misfit > ALIKE * (before - best.misfit)]
         return list(pool.map(partial(shaped, case, model, null, seen), alike))
 

@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 HALF = 0.5
 """Share of what the best fit removes that one has to remove for its shape to be worth fitting."""
 
-
 TELLS = 5.0
 """Misfit for which a step is worth its twins here: less does not put candidates in another order."""
 
