@@ -100,6 +100,7 @@ def advance(  # type: ignore[no-untyped-def]
     draw = np.empty(most, np.float32)
     rate, over, shift, stands = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
     electrons, noise, jitter = np.empty(most), np.empty(most), np.empty(most)
+    around = np.empty(columns, np.uint8)
     stood = np.empty((5, rows), np.float64)
     limit[:] = np.inf
     for i in range(rows):
@@ -183,7 +184,9 @@ def advance(  # type: ignore[no-untyped-def]
                 held[h], phi[h], limit[h] = over[i], stands[i], now
 
             if kick != 0.0:
-                kick_neighbours(kick, hit, pitch, columns, held[:used])
+                for r in range(top, bottom):
+                    count_neighbours(bits, r, columns, around)
+                    couple(kick, around, held[(r - top) * pitch : (r - top) * pitch + columns])
             if left != 0.0:
                 for i in range(n):
                     h, p = _Q(at[i]), _Q(pixel[i])
@@ -271,19 +274,26 @@ def needed(electrons, per_electron, kappa_squared, draw):  # type: ignore[no-unt
 
 
 @njit(inline="always")
-def kick_neighbours(kick, hit, pitch, columns, charge):  # type: ignore[no-untyped-def]
-    """Charge [grains] with what the neighbours that fired couple in; hit and charge are of whole rows of `pitch`."""
-    rows = charge.size // pitch
-    for r in range(rows):
-        for x in range(columns):
-            j = r * pitch + x
-            around = 0
-            if r > 0:
-                around += hit[j - pitch]
-            if r < rows - 1:
-                around += hit[j + pitch]
-            if x > 0:
-                around += hit[j - 1]
-            if x < columns - 1:
-                around += hit[j + 1]
-            charge[j] = (charge[j] / _G + kick * around) * _G
+def count_neighbours(bits, row, columns, around):  # type: ignore[no-untyped-def]
+    """How many of the four neighbours of each pixel of a row fired: around (columns,), overwritten."""
+    here = bits[row * columns : (row + 1) * columns]
+    around[:] = 0
+    add(here[:-1], around[1:])
+    add(here[1:], around[:-1])
+    if row > 0:
+        add(bits[(row - 1) * columns : row * columns], around)
+    if (row + 1) * columns < bits.size:
+        add(bits[(row + 1) * columns : (row + 2) * columns], around)
+
+
+@njit(inline="always")
+def add(values, out):  # type: ignore[no-untyped-def]
+    for j in range(values.size):
+        out[j] += values[j]
+
+
+@njit(inline="always")
+def couple(kick, around, charge):  # type: ignore[no-untyped-def]
+    """Charge [grains] with what the neighbours that fired couple in."""
+    for j in range(around.size):
+        charge[j] = (charge[j] / _G + kick * around[j]) * _G
