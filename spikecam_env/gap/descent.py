@@ -139,9 +139,18 @@ def derivatives(
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
 
     def column(name: str, key: str) -> Array:
-        strength = (name, key) != WHITE and key == candidate(name).fitted[0]
-        nudge = float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if strength else -0.2
+        nudge = nudge_of(name, key, peak)
         return slope_of(null, measured, probe(*moved(model, base, [(name, key)], np.array([nudge]))), at, nudge)
 
     with ThreadPoolExecutor(jobs) as pool:
         return np.stack(list(pool.map(lambda what: column(*what), free)), axis=1)
+
+
+def nudge_of(name: str, key: str, peak: float) -> float:
+    """Step of a logarithm to take a derivative by, long enough to show above the twins' own noise.
+
+    peak: noises by which the effect shows.
+    """
+    if (name, key) == WHITE:
+        return -0.2
+    return float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if key == candidate(name).fitted[0] else -0.5

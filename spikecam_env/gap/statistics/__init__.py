@@ -39,6 +39,7 @@ FLOORS: dict[tuple[str, str], float] = {
     ("noise", "tail"): 0.02,
     ("drift", ""): 2e-5,
     ("drift", "wander"): 0.2,
+    ("drift", "late"): drift.EVEN,
     ("drift", "pixel"): 0.02,
     ("spectrum", ""): 0.1,
     ("rows", ""): 0.02,
