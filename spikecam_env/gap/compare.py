@@ -256,7 +256,7 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
 
     Statistics are not independent: the covariance is of how far the null's own draws would have led the step astray,
     and, where ENOUGH of them tell, those of the effect (other pixels have its traps), with the floors and TOLERANCE of
-    the effect, all of one sign, on top.
+    the effect, all of one sign, on top.  Of the fixed pattern, drawn units tell: all recordings show the same one.
     """
     noise2 = variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
@@ -268,7 +268,8 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
     step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
     solve = np.asarray(np.linalg.solve(normal + OPEN * np.diag(scale), jacobian.T * w), np.float64)
     drawn = [d.values - null.mean for d in null.draws]
-    chance = astray(solve, drawn) if len(drawn) > 1 else (solve * null.sd**2) @ solve.T
+    alike = solve * ~patterned(null, predicted)
+    chance = astray(alike, drawn) if len(drawn) > 1 else (alike * null.sd**2) @ alike.T
     off = solve @ law(null, predicted)
     total = chance + own_astray(null, predicted, solve) + (solve * null.floor**2) @ solve.T + np.outer(off, off)
     return np.asarray(step, np.float64), np.atleast_2d(total)
@@ -281,14 +282,23 @@ def astray(solve: Array, draws: Sequence[Array] | Array) -> Array:
 
 def own_astray(null: Null, predicted: Prediction, solve: Array) -> Array:
     """(n, n) covariance of a step by the effect's own chance: as its draws tell where ENOUGH of them move a statistic,
-    elsewhere as of independent ones."""
+    as drawn units do where they show it, elsewhere as of independent ones."""
     variances = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
     without = {d.number: d.values for d in null.draws}
     draws = predicted.draws if len(predicted.draws) >= ENOUGH else ()
     change = np.array([d.values - without[d.number] for d in draws])
-    told = np.any(np.nan_to_num(change) != 0, axis=0)
-    alone = np.asarray((solve * np.where(told, 0.0, variances)) @ solve.T)
-    return alone + astray(solve, change) if told.any() else alone
+    shown = patterned(null, predicted)
+    told = np.any(np.nan_to_num(change) != 0, axis=0) & ~shown
+    total = np.asarray((solve * np.where(told | shown, 0.0, variances)) @ solve.T)
+    total = total + astray(solve * told, change) if told.any() else total
+    return total + astray(solve * shown, predicted.units) if predicted.units is not None else total
+
+
+def patterned(null: Null, predicted: Prediction) -> NDArray[np.bool_]:
+    """(S,) which statistics drawn units tell."""
+    if predicted.units is None:
+        return np.zeros(len(null.keys), np.bool_)
+    return np.asarray(np.isfinite(predicted.units).all(axis=0), np.bool_)
 
 
 def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, step: float) -> Array:
