@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 
 NEEDED = 15.0
 """Misfit by which an effect found earlier has to be missed, once another has been added, to be kept."""
+
+PLAINLY = 10 * NEEDED
+"""Misfit by which it is missed beyond what a unit refitted without it could make up for."""
 
 AGAIN, FINAL = 2, 4
 """Twins by which a candidate is confirmed, and what was chosen of them in the end."""
@@ -91,19 +94,30 @@ def resettled(case: Case, null: Null, found: Fit, model: SensorModel) -> Fit:
     return replace(found, model=model, base=as_seen(model, base, null, predict(case, model, base, null, 1)))
 
 
-def rejoined(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Sequence[str]) -> Fit:
+def rejoined(
+    case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, earlier: Mapping[str, Array]
+) -> Fit:
     """All effects found so far together; one that is no longer needed is left out again.
 
-    model, null: as given, before any was added.  Two twins may scatter little where the many that `found` stands on
-    have shown that campaigns do not.
+    model, null: as given, before any was added.  earlier: (S,) what each effect changed when it was added, by name; one
+    whose change is plainly missed is not simulated without.  Two twins may scatter little where the many that `found`
+    stands on have shown that campaigns do not.
     """
     both = confirmed(case, model, null, measured, resettled(case, null, found, found.model))
     both = as_wide(null, measured, both, found.prediction)
-    for name in [n for n in earlier if n in {e.name for e in both.model.effects}]:
+    for name, change in earlier.items():
+        if name not in {e.name for e in both.model.effects} or is_missed(null, measured, both, change):
+            continue
         fewer = confirmed(case, model, null, measured, resettled(case, null, both, both.model.without(name)))
         if fewer.misfit < both.misfit + NEEDED:
             both = fewer
     return both
+
+
+def is_missed(null: Null, measured: Array, found: Fit, change: Array) -> bool:
+    """Whether a prediction less a change of its statistics leaves PLAINLY more: twins without it would say the same."""
+    without = replace(found.prediction, mean=found.prediction.mean - change)
+    return judged(null, measured, without)[1] > found.misfit + PLAINLY
 
 
 def as_wide(null: Null, measured: Array, found: Fit, known: Prediction) -> Fit:

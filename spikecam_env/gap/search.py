@@ -190,7 +190,8 @@ def joined(
     *before, last = rounds
     best = last.fits[0]
     if before:
-        best = rejoined(case, model, null, seen, best, [r.fits[0].name for r in before])
+        earlier = {r.fits[0].name: r.fits[0].prediction.mean - r.prediction.mean for r in before}
+        best = rejoined(case, model, null, seen, best, earlier)
         for i, turn in enumerate(before):
             if turn.fits[0].name in {e.name for e in best.model.effects}:
                 best, before[i] = revisited(case, model, null, seen, values, best, turn)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from small import MODEL, TWINS, effect, null, recorded
 
-from spikecam_env.gap.compare import size_of, values_of
-from spikecam_env.gap.confirm import as_wide, made_loud, of_any_dark, quietened
+from spikecam_env.gap.compare import judged, size_of, values_of
+from spikecam_env.gap.confirm import as_wide, is_missed, made_loud, of_any_dark, quietened
 from spikecam_env.gap.fit import fit, predict
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import within
@@ -61,3 +61,17 @@ def test_two_twins_of_all_together_do_not_make_noise_seen_before_small():
     np.testing.assert_array_equal(wide.prediction.mean, found.prediction.mean)
     assert np.all(wide.prediction.spread >= noisy.spread) and np.all(wide.prediction.error >= noisy.error)
     assert np.abs(wide.rho).max() < np.abs(found.rho).max()
+
+
+def test_what_is_plainly_missed_need_not_be_simulated_without():
+    """A dead time that is there, and one that another effect has come to stand for, so that both are too much."""
+    case, there = recorded(effect("dead_time", tau_us=0.5)), null()
+    measured = values_of(case.bank, there.keys)
+    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.5})
+    change = found.prediction.mean - there.mean
+    twice = replace(found.prediction, mean=found.prediction.mean + change)
+    both = replace(found, prediction=twice, misfit=judged(there, measured, twice)[1])
+    print(found.misfit, both.misfit)
+    assert is_missed(there, measured, found, change)
+    assert not is_missed(there, measured, found, 0.1 * change)
+    assert not is_missed(there, measured, both, change)
