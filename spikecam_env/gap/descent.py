@@ -78,8 +78,8 @@ def descend(
     worth: float = WORTH,
 ) -> Descent:
     """From a model and its unit down to the parameters `free` that suit (S,) `measured` best; where steps have come to
-    leave more, the best of where they led.  jobs: threads.  worth: misfit that a step has to promise, and the one
-    before it to have removed."""
+    leave more, the best of where they led, of those alike the first.  jobs: threads.  worth: misfit that a step has to
+    promise, and the one before it to have removed."""
     at = probe(model, base)
     columns = derivatives(probe, null, measured, model, base, at, free, jobs)
     tried = []
@@ -100,9 +100,9 @@ def descend(
         else:
             columns = derivatives(probe, null, measured, model, base, after, free, jobs)
         at = after
-    least, best = min(tried, key=lambda t: t[0])
+    least = min(t[0] for t in tried)
     if left > least + WORSE:
-        return best
+        return next(where for there, where in tried if there < least + WORTH)
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
 
 
