@@ -23,6 +23,8 @@ class Candidate:
     wanders: its course in time is drawn anew every time, so that statistics scatter, each way alike.
     events: it is single events, few enough for one twin to have many more or less of them than another.
     strikes: it is in a few pixels, others in every twin: one takes where they lie for a sign of it.
+    nudge: step of a shape's logarithm to take a derivative by: a time constant needs a long one, to show above what
+    twins scatter; a level of light from which something begins leads elsewhere by it.
     needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
     """
 
@@ -36,6 +38,7 @@ class Candidate:
     wanders: bool = False
     events: bool = False
     strikes: bool = False
+    nudge: float = -0.5
     experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 
     @property
@@ -130,7 +133,7 @@ CANDIDATES: dict[str, Candidate] = {
     "vignetting": Candidate("optics", ("falloff",), needs=_even),
     "optical_blur": Candidate("optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
     "crosstalk": Candidate("coupling", ("kick",), needs=_steady),
-    "blooming": Candidate("coupling", ("share", "full"), {"full": (0.75, 1.0)}, needs=_bright),
+    "blooming": Candidate("coupling", ("share", "full"), {"full": (0.75, 0.85, 1.0)}, needs=_bright, nudge=-0.1),
     "readout_skew": Candidate("readout", ("span",), needs=_moving, only_contrast=True),
     "missed_spikes": Candidate("readout", ("probability",), needs=_steady, events=True),
     "spurious_spikes": Candidate("readout", ("probability",), needs=_steady, events=True),

@@ -18,7 +18,7 @@ TOLERANCE = 0.05
 """Share of an effect's own size by which its simulation may be off: laws are first order, and simulated with noise."""
 
 OPEN = 5e-4
-"""Damping of what errors are told from: a step may be held back, an error must not be."""
+"""Damping of what errors are told from: a step may be held back, an error must not be.  What it holds back is open."""
 
 ENOUGH = 4
 """Twins of an effect that tell by how much its own chance leads parameters astray."""
@@ -249,14 +249,25 @@ def halved(null: Null, variances: Array) -> Array:
     return 0.5 * variances + 0.5 * known * pooled(null.keys, variances) / pooled(null.keys, known)
 
 
-def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array) -> tuple[Array, Array]:
-    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n).
+def step_of(
+    null: Null,
+    measured: Array,
+    predicted: Prediction,
+    jacobian: Array,
+    doubt: Array | float = 0.0,
+    before: Array | float = 1.0,
+) -> tuple[Array, Array]:
+    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n), known to `doubt`.
+
+    before: (n,) standard deviation of what nothing tells.
 
     What is far off is judged by how far off most is that moves: it would be outliers all, and hardly be heard.
 
     Statistics are not independent: the covariance is of how far the null's own draws would have led the step astray,
     and, where ENOUGH of them tell, those of the effect (other pixels have its traps), with the floors and TOLERANCE of
     the effect, all of one sign, on top.  Of the fixed pattern, drawn units tell: all recordings show the same one.
+    Where two parameters do nearly the same, what twins scattered would seem to tell them apart: as many squares of it
+    as can be expected in the normal matrix are no knowledge (errors in variables).
     """
     noise2 = variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
@@ -266,13 +277,38 @@ def step_of(null: Null, measured: Array, predicted: Prediction, jacobian: Array)
     normal = jacobian.T @ (w[:, None] * jacobian)
     scale = np.diag(normal) + 1e-12
     step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
-    solve = np.asarray(np.linalg.solve(normal + OPEN * np.diag(scale), jacobian.T * w), np.float64)
+    values, basis = along(normal - by_chance(w, jacobian, doubt), np.sqrt(scale))
+    back = np.linalg.inv(basis)
+    solve = (back / values) @ back.T @ (jacobian.T * w)
     drawn = [d.values - null.mean for d in null.draws]
     alike = solve * ~patterned(null, predicted)
     chance = astray(alike, drawn) if len(drawn) > 1 else (alike * null.sd**2) @ alike.T
     off = solve @ law(null, predicted)
     total = chance + own_astray(null, predicted, solve) + (solve * null.floor**2) @ solve.T + np.outer(off, off)
+    prior = np.diag(np.square(before * np.ones(len(scale))))
+    held = (back * (OPEN / values)) @ basis
+    total = back @ no_wider(basis @ (total + held @ prior @ held.T) @ basis.T, basis @ prior @ basis.T) @ back.T
     return np.asarray(step, np.float64), np.atleast_2d(total)
+
+
+def by_chance(w: Array, jacobian: Array, doubt: Array | float) -> Array:
+    """(n, n) of a normal matrix with weights (S,), that the noise of its jacobian makes: each column is a twin less one
+    that they share.  doubt: (S, n) of both, with the sign of the step between them."""
+    there = doubt * (jacobian != 0)
+    shared = there.T @ (w[:, None] * there) / 2
+    return np.asarray(shared + np.diag(np.diag(shared)))
+
+
+def along(normal: Array, scale: Array) -> tuple[Array, Array]:
+    """((n,) what is known, OPEN at least, (n, n) directions in units of 1 / `scale` (n,), one a row)."""
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    return np.maximum(values, 0.0) + OPEN, vectors.T * scale
+
+
+def no_wider(covariance: Array, prior: Array) -> Array:
+    """A covariance (n, n) with no variance above that of a prior: noise does not make a measurement worse than none."""
+    shrink = np.sqrt(np.minimum(np.diag(prior) / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return np.asarray(covariance * np.outer(shrink, shrink))
 
 
 def astray(solve: Array, draws: Sequence[Array] | Array) -> Array:
@@ -303,8 +339,16 @@ def patterned(null: Null, predicted: Prediction) -> NDArray[np.bool_]:
 
 def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, step: float) -> Array:
     """(S,) change of predictions over `step`, 0 where it is not clear of the twins' own noise: hundreds of statistics
-    that do not move would drown those that do (regression dilution).  What was not measured (NaN), and may move more,
-    is a matter of its own."""
+    that do not move would drown those that do (regression dilution)."""
+    change, _, clear = change_of(null, measured, there, here)
+    return np.where(clear, change, 0.0) / step
+
+
+def change_of(
+    null: Null, measured: Array, there: Prediction, here: Prediction
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """((S,) change from one prediction to another, (S,) its noise, (S,) where it is clear of that).  What was not
+    measured (NaN), and may move more, is a matter of its own."""
     change, known = there.mean - here.mean, np.isfinite(measured)
     own2 = np.maximum(own_variance(null, there), own_variance(null, here))
     if there.units is not None and here.units is not None:
@@ -312,7 +356,7 @@ def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, s
         own2 = np.where(np.isfinite(apart).all(axis=0), apart.var(axis=0, ddof=1) / len(apart), own2)
     own2 = np.maximum(own2, 1e-300)
     clear = is_clear(np.where(known, change, 0.0), own2) | is_clear(np.where(known, 0.0, change), own2)
-    return np.where(clear, change, 0.0) / step
+    return change, np.sqrt(own2), clear
 
 
 def scale_of(

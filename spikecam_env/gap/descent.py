@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate
-from spikecam_env.gap.compare import Null, Prediction, judged, own_variance, slope_of, step_of
+from spikecam_env.gap.compare import Null, Prediction, change_of, judged, own_variance, step_of
 from spikecam_env.gap.fit import as_seen
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.strength import bounded, with_effect
@@ -55,15 +55,15 @@ Free = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Descent:
-    """Where it ended.  prediction: of the twins there, the last step added in proportion.  columns: (S, n) derivatives.
-
-    covariance: (n, n) of the logarithms.
+    """Where it ended.  prediction: of the twins there, the last step added in proportion.  columns: (S, n) derivatives;
+    doubt: (S, n) their noise.  covariance: (n, n) of the logarithms.
     """
 
     model: SensorModel
     base: BaseFit
     prediction: Prediction
     columns: Array
+    doubt: Array
     covariance: Array
 
 
@@ -81,13 +81,13 @@ def descend(
     leave more, the best of where they led, of those alike the first.  jobs: threads.  worth: misfit that a step has to
     promise, and the one before it to have removed."""
     at = probe(model, base)
-    columns = derivatives(probe, null, measured, model, base, at, free, jobs)
+    columns, doubt = derivatives(probe, null, measured, model, base, at, free, jobs)
     tried = []
     for turn in range(TURNS):
-        step, covariance = step_of(null, measured, at, columns)
+        step, covariance = step_of(null, measured, at, columns, doubt, spans(free))
         step = np.clip(step, -LONGEST, LONGEST)
         left, promised = (judged(null, measured, p)[1] for p in (at, replace(at, mean=at.mean + columns @ step)))
-        tried.append((left, Descent(model, base, at, columns, covariance)))
+        tried.append((left, Descent(model, base, at, columns, doubt, covariance)))
         there = as_seen(model, within(model, base), null, at)
         model, base = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
         little = left - promised < worth or (turn > 0 and 0 <= tried[-2][0] - left < worth)
@@ -98,12 +98,12 @@ def descend(
             noise = np.sqrt(own_variance(null, at) + own_variance(null, after))
             columns = broyden(columns, step, after.mean - at.mean, noise)
         else:
-            columns = derivatives(probe, null, measured, model, base, after, free, jobs)
+            columns, doubt = derivatives(probe, null, measured, model, base, after, free, jobs)
         at = after
     least = min(t[0] for t in tried)
     if left > least + WORSE:
         return next(where for there, where in tried if there < least + WORTH)
-    return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, covariance)
+    return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, doubt, covariance)
 
 
 def broyden(columns: Array, step: Array, change: Array, noise: Array | float = 0.0) -> Array:
@@ -134,16 +134,26 @@ def derivatives(
     at: Prediction,
     free: Free,
     jobs: int = 1,
-) -> Array:
-    """(S, n) change of the statistics for one more of each parameter's logarithm; at: what the model gives."""
+) -> tuple[Array, Array]:
+    """(S, n) change of the statistics for one more of each parameter's logarithm, and its noise; at: what the model
+    gives.  What one parameter of an effect clearly moves says of its others that they do not, or how far."""
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
-
-    def column(name: str, key: str) -> Array:
-        nudge = nudge_of(name, key, peak)
-        return slope_of(null, measured, probe(*moved(model, base, [(name, key)], np.array([nudge]))), at, nudge)
-
+    nudges = np.array([nudge_of(name, key, peak) for name, key in free])
     with ThreadPoolExecutor(jobs) as pool:
-        return np.stack(list(pool.map(lambda what: column(*what), free)), axis=1)
+        steps = [moved(model, base, [what], np.array([nudge])) for what, nudge in zip(free, nudges, strict=True)]
+        there = list(pool.map(lambda step: probe(*step), steps))
+    changes, doubt, clear = (
+        np.stack(v, axis=1) for v in zip(*(change_of(null, measured, t, at) for t in there), strict=True)
+    )
+    alike = np.array([[name == other for name, _ in free] for other, _ in free])
+    return np.where(clear @ alike, changes, 0.0) / nudges, doubt / nudges
+
+
+def spans(free: Free) -> Array:
+    """(n,) logarithms by which parameters may differ, standard deviations, before anything is measured: a factor of e,
+    of a shape twice the step that its derivative takes."""
+    fitted = [name != WHITE[0] and key != candidate(name).fitted[0] for name, key in free]
+    return np.array([2 * abs(candidate(f[0]).nudge) if shape else 1.0 for f, shape in zip(free, fitted, strict=True)])
 
 
 def nudge_of(name: str, key: str, peak: float) -> float:
@@ -153,4 +163,6 @@ def nudge_of(name: str, key: str, peak: float) -> float:
     """
     if (name, key) == WHITE:
         return -0.2
-    return float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0)) if key == candidate(name).fitted[0] else -0.5
+    if key != candidate(name).fitted[0]:
+        return candidate(name).nudge
+    return float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0))

@@ -25,6 +25,8 @@ from spikecam_env.gap.compare import (
     scale_to,
     scaled,
     size_of,
+    slope_of,
+    step_of,
     values_of,
 )
 from spikecam_env.gap.refit import BaseFit, within
@@ -47,6 +49,9 @@ VISIBLE = 4.0
 
 WANDER, SEVERAL = 6, 3
 """Twins of an effect that makes statistics scatter, and of one that is few events, or in few pixels."""
+
+APART = 0.05
+"""Least step of a logarithm between two twins for a slope."""
 
 UNITS = 24
 """Units drawn for the pattern statistics of one model."""
@@ -148,6 +153,8 @@ def _fit_twins(
     base = replace(bare, white=white**louder * bare.white)
     before = judged(null, measured, null.prediction)[1]
     only = concerned(case, [name], null, measured, expected * louder)
+    last: tuple[float, Prediction] | None = None
+    slope: Array | None = None
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
         predicted = predict(case, tried, base, null, twins_of(name), only)
@@ -164,6 +171,10 @@ def _fit_twins(
             factor, near = 1e-3, True
             break
         factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
+        slope = slope_between(null, measured, last, (parameters[strength], predicted)) if power == 2.0 else None
+        if slope is not None:
+            factor = float(np.exp(np.clip(step_of(null, measured, predicted, slope[:, None])[0][0], -1.0, 1.0)))
+        last = parameters[strength], predicted
         if factor < 0 and not may_be_negative(name):
             factor = 0.1
         weak = abs(scale) * seen < VISIBLE or (is_linear(name) and 1 / FURTHEST < scale < 1 and scale * seen < AS_LOUD)
@@ -177,11 +188,26 @@ def _fit_twins(
         only = concerned(case, [name], null, measured, (predicted.mean - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
-    predicted = scaled(null, predicted, moved)
+    if near and slope is not None:
+        predicted = replace(predicted, mean=predicted.mean + slope * np.log(moved) / power)
+    else:
+        predicted = scaled(null, predicted, moved)
     rho, left = judged(null, measured, predicted)
     relative = sd / max(abs(scale), 1e-9) / power
     sds, there = {strength: abs(final[strength]) * relative}, with_effect(model, name, final)
     return Fit(name, final, sds, predicted, shifted(bare, base, moved), rho, left, there)
+
+
+def slope_between(
+    null: Null, measured: Array, one: tuple[float, Prediction] | None, other: tuple[float, Prediction]
+) -> Array | None:
+    """(S,) change of the statistics for one more of a strength's logarithm, by twins at two of them; None where these
+    are not two.  What goes with the square of a strength saturates where other noise is, or is a logarithm of both."""
+    if one is None or not one[0] * other[0] > 0 or abs(step := float(np.log(other[0] / one[0]))) < APART:
+        return None
+    both = (one[1].mean != null.mean) & (other[1].mean != null.mean)
+    slope = slope_of(null, measured, other[1], one[1], step) * both
+    return slope if slope.any() else None
 
 
 def _fit_wander(

@@ -12,7 +12,7 @@ from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, step_of
 from spikecam_env.gap.confirm import FINAL, confirmed
-from spikecam_env.gap.descent import WHITE, WORSE, Probe, descend
+from spikecam_env.gap.descent import LONGEST, WHITE, WORSE, Free, Probe, descend, moved, spans
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
@@ -52,14 +52,15 @@ def polished(
 def _refined(
     case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, names: Sequence[str]
 ) -> tuple[Fit, Errors, Array]:
-    """The fit, its errors, and (S,) by what variance statistics are unknown for them.
+    """The fit, its errors, and (S,) by what variance statistics are unknown for them: where derivatives are in doubt,
+    two parameters may be open that make up for each other, but not what both do.
 
     What wanders is left as it was fitted, since one twin has no direction of it.
     """
     free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
     free += [WHITE] if 0 < found.base.white < SHARED * case.base.white else []
     now, base = found.model, found.base
-    columns, covariance = np.zeros((len(measured), 0)), np.zeros((0, 0))
+    columns, covariance, told = np.zeros((len(measured), 0)), np.zeros((0, 0)), np.zeros((0, 0))
     if free:
         end = descend(_probe(case, null, measured, found, names), null, measured, now, base, free, case.jobs)
         now, base, columns = end.model, end.base, end.columns
@@ -67,7 +68,9 @@ def _refined(
     if best.misfit > judged(null, measured, found.prediction)[1] + WORSE:
         best = found
     if free:
-        covariance = step_of(null, measured, best.prediction, columns)[1]  # FINAL twins know by how much they scatter
+        covariance = step_of(null, measured, best.prediction, columns, end.doubt, spans(free))[1]
+        step, told = step_of(null, measured, best.prediction, columns, before=spans(free))
+        best = _stepped(null, measured, best, free, columns, step)
     values = {e.name: e.parameters() for e in best.model.effects}
     errors: Errors = {name: dict(found.sd) if name == found.name else {} for name in names}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
@@ -75,7 +78,18 @@ def _refined(
             errors[name][key] = float(abs(values[name][key]) * e)
     own: Mapping[str, float] = values[found.name]
     best = replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name])
-    return best, errors, np.einsum("sn,nm,sm->s", columns, covariance, columns)
+    return best, errors, np.einsum("sn,nm,sm->s", columns, told, columns)
+
+
+def _stepped(null: Null, measured: Array, best: Fit, free: Free, columns: Array, step: Array) -> Fit:
+    """The fit moved by a last step (n,), told by its own twins, which are more than the descent's: what one happened to
+    scatter is in the parameters that it led to."""
+    predicted = replace(best.prediction, mean=best.prediction.mean + columns @ step)
+    rho, left = judged(null, measured, predicted)
+    if np.abs(step).max() > LONGEST or left > best.misfit:
+        return best
+    model, base = moved(best.model, best.base, free, step)
+    return replace(best, model=model, base=base, prediction=predicted, rho=rho, misfit=left)
 
 
 def leaves_nothing(null: Null, values: Array, predicted: Prediction) -> bool:

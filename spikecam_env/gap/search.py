@@ -200,7 +200,23 @@ def joined(
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
     last = replace(last, fits=(best, *last.fits[1:]), lent=lent)
+    if before and alarmed(null, best.rho):
+        for other in instead_of(last, names):
+            tried, known, all_told = polished(case, model, null, seen, values, other, [*names[:-1], other.name])
+            if tried.misfit < best.misfit - LEAST:
+                rest = [f for f in last.fits if f.name != other.name]
+                last, errors = replace(last, fits=(tried, *rest), rivals=(), lent=all_told), known
     return [with_errors(r, errors) for r in (*before, last)]
+
+
+def instead_of(turn: Round, names: Sequence[str]) -> list[Fit]:
+    """The runner-up of a round beside the same effects, where it removed ALIKE of what the best did: those before it
+    may have had its share when the two were compared.  names: of all effects found, the round's last."""
+    best, *others = turn.fits
+    least = turn.misfit - ALIKE * (turn.misfit - best.misfit)
+    there = [f for f in others if len(f.prediction.draws) > 1 and f.misfit < least and f.name not in names]
+    beside = [f for f in there if {e.name for e in f.model.effects} - {f.name} >= set(names[:-1])]
+    return sorted(beside, key=lambda f: f.misfit)[:1]
 
 
 def other_shapes(name: str, screened: Sequence[Screened], before: float) -> list[Screened]:

@@ -118,8 +118,8 @@ def bare(effect: str, parameter: str) -> str:
 
 
 def sentence(d: Diagnosis) -> str:
-    """The verdict in one sentence, from the rest of a diagnosis."""
-    return _SENTENCES[d.verdict](d)
+    """The verdict in one sentence, from the rest of a diagnosis; in two, where beside effects parameters are off."""
+    return _SENTENCES[d.verdict](d) + (_beside(d) if d.verdict in ("named", "class") and d.parameters else "")
 
 
 def _none(d: Diagnosis) -> str:
@@ -144,8 +144,15 @@ def _unknown(d: Diagnosis) -> str:
 
 
 def _parameter(d: Diagnosis) -> str:
-    off = [_off(effect, row) for effect, row in d.parameters.items()]
-    return f"No effect is missing, but parameters of the model {d.model_name} are off: {_joined(off, 'and')}."
+    return f"No effect is missing, but parameters of the model {d.model_name} are off: {_all_off(d)}."
+
+
+def _beside(d: Diagnosis) -> str:
+    return f" Parameters of the model {d.model_name} are off as well: {_all_off(d)}."
+
+
+def _all_off(d: Diagnosis) -> str:
+    return _joined([_off(effect, row) for effect, row in d.parameters.items()], "and")
 
 
 def _off(effect: str, row: dict[str, float]) -> str:

@@ -60,6 +60,14 @@ def test_a_gap_on_recordings_that_told_parameters_is_not_called_a_check() -> Non
     assert sentence(lent).endswith("removes 97 % of the gap on the recordings held out, which told parameters too.")
 
 
+def test_parameters_that_are_off_beside_an_effect_are_said() -> None:
+    off = {"reset_noise": {"measured": 19.9, "nominal": 0.976, "ratio": 20.4}}
+    said = sentence(replace(made_up.named(), parameters=off))
+    assert said.endswith(
+        "not used. Parameters of the model scsim are off as well: reset noise is 19.9 mV, not 0.976 mV."
+    )
+
+
 def test_two_effects_are_named_together() -> None:
     d = made_up.named()
     both = replace(d, effects=(*d.effects, *made_up.named("dead_time").effects))

@@ -2,7 +2,7 @@
 
 Rules
 - The names of a diagnosis are those of its `effects`; of a `class`, also its members (`class.members`, or where there
-  is no such list the alternatives); of a `parameter`, also the keys of `parameters`.
+  is no such list the alternatives); and, unless it is `none` or `unknown`, the keys of `parameters` that are off.
 - A single effect has its right name when the verdict is `named` (or `parameter`, see EQUIVALENT) and exactly
   that effect is named, or when the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
 - Its family is right when one effect of its family (FAMILIES) is named and none of another.
@@ -97,13 +97,13 @@ def family_of(name: str) -> str:
 
 
 def names_of(diagnosis: Json) -> tuple[str, ...]:
-    """Effects that a diagnosis names, in its order; of a class its members, of a parameter the effect it belongs to."""
+    """Effects that a diagnosis names, in its order; of a class its members, and those whose parameters are off."""
     effects, verdict = diagnosis.get("effects") or [], diagnosis.get("verdict")
     names = [effect["name"] for effect in effects]
     if verdict == "class":
         members = (diagnosis.get("class") or {}).get("members") or []
         names += members or [other["name"] for effect in effects for other in effect.get("alternatives") or []]
-    if verdict == "parameter":
+    if verdict in ("named", "class", "parameter"):
         names += list(diagnosis.get("parameters") or {})
     return tuple(dict.fromkeys(names))
 

@@ -144,6 +144,15 @@ def test_excess_noise_may_be_called_a_wrong_parameter():
     assert not answered(case, "parameter", parameters={"dark_current": {"ratio": 4.0}}).right
 
 
+def test_parameters_that_are_off_beside_effects_are_named_too():
+    case = replace(case_of("pair", ""), truth=("random_telegraph_noise", "excess_threshold_noise"))
+    off = {"parameters": {"reset_noise": {"ratio": 20.0}}}
+    both = answered(case, "named", "random_telegraph_noise", **off)
+    assert both.right and set(both.found) == set(case.truth) and not both.spurious
+    assert not answered(case, "named", "random_telegraph_noise").right
+    assert answered(case_of("strong", "dead_time"), "named", "dead_time", **off).spurious == ("reset_noise",)
+
+
 def test_tricky_cases_have_their_own_answers():
     assert answered(case_of("tricky", "wrong_label"), "data").right
     assert not answered(case_of("tricky", "wrong_label"), "unknown").right

@@ -109,10 +109,10 @@ def features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray
     over = np.pad(np.maximum(bright.reshape(bins, *shape) - 1.0, 0.0), ((0, 0), (1, 1), (1, 1)))
     spill = (over[:, :-2, 1:-1] + over[:, 2:, 1:-1] + over[:, 1:-1, :-2] + over[:, 1:-1, 2:]) / 4
     kinds.append((spill - over[:, 1:-1, 1:-1]).reshape(bins, -1))
-    basis = np.zeros((len(kinds), x.size), np.float32)
+    basis = np.zeros((len(kinds), x.size))  # in single precision sums of 10^6 terms lose the fifth digit somewhere
     size = np.zeros(len(kinds))
     for n, kind in enumerate(kinds):
-        v = kind.reshape(-1).astype(np.float32)
+        v = kind.reshape(-1).astype(np.float64)
         whole = float(np.linalg.norm(v))
         for _ in range(2):
             v = v - (basis[:n] @ v) @ basis[:n]
@@ -120,4 +120,4 @@ def features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray
         if whole > 0 and length > 1e-3 * whole:
             basis[n] = v / length
             size[n] = length
-    return basis, size
+    return basis.astype(np.float32), size
