@@ -40,6 +40,8 @@ class BlindTrial:
     """Groups: none, strong, weak, base, outside, left_out, pair, tricky, severe; default all."""
     limit: int | None = None
     """At most so many cases of each group."""
+    record: Path | None = None
+    """File that holds all results, a line each: what it has is not done again, and what is done is written to it."""
     keep: bool = False
     """Keep the campaigns' data (some 100 MB each)."""
     world: Path = WORLD
@@ -54,8 +56,11 @@ class BlindTrial:
             if getattr(self, name) is not None and getattr(self, name) < 1:
                 raise InputError(f"{name} = {getattr(self, name)}; it must be at least 1")
         trial = hidden_world(self.world)
+        record = importlib.import_module("tests.hidden_world.record")
         try:
             picked = trial.chosen(self.set, self.part, self.only, self.limit)
+            if self.record:
+                record.unpack(self.record, self.out)
             steps = trial.run_trial(
                 self.out,
                 self.set,
@@ -70,6 +75,8 @@ class BlindTrial:
                 for done, _ in steps:
                     bar.update(done - bar.n)
                     scored = trial.score_trial(self.out, picked)
+                    if self.record:
+                        record.pack(self.out, self.record)
         except (ValueError, ImportError) as error:
             raise InputError(str(error)) from error
         print(trial.as_text(scored))

@@ -287,7 +287,8 @@ def step_of(
     total = chance + own_astray(null, predicted, solve) + (solve * null.floor**2) @ solve.T + np.outer(off, off)
     prior = np.diag(np.square(before * np.ones(len(scale))))
     held = (back * (OPEN / values)) @ basis
-    total = back @ no_wider(basis @ (total + held @ prior @ held.T) @ basis.T, basis @ prior @ basis.T) @ back.T
+    total = total + held @ prior @ held.T
+    total = total - total @ np.linalg.solve(total + prior, total)
     return np.asarray(step, np.float64), np.atleast_2d(total)
 
 
@@ -303,12 +304,6 @@ def along(normal: Array, scale: Array) -> tuple[Array, Array]:
     """((n,) what is known, OPEN at least, (n, n) directions in units of 1 / `scale` (n,), one a row)."""
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     return np.maximum(values, 0.0) + OPEN, vectors.T * scale
-
-
-def no_wider(covariance: Array, prior: Array) -> Array:
-    """A covariance (n, n) with no variance above that of a prior: noise does not make a measurement worse than none."""
-    shrink = np.sqrt(np.minimum(np.diag(prior) / np.maximum(np.diag(covariance), 1e-300), 1.0))
-    return np.asarray(covariance * np.outer(shrink, shrink))
 
 
 def astray(solve: Array, draws: Sequence[Array] | Array) -> Array:

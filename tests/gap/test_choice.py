@@ -13,7 +13,7 @@ from spikecam_env.gap import search
 from spikecam_env.gap.compare import Draw, Null, Prediction, judged
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
-from spikecam_env.gap.search import PROMISE, Round, chosen_of, revisited, settle
+from spikecam_env.gap.search import PROMISE, Round, chosen_of, instead_of, joined, revisited, settle
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.verdict import explains, harmless
 
@@ -156,6 +156,52 @@ def test_beside_a_later_effect_a_runner_up_may_take_the_earlier_ones_place(monke
     assert [f.name for f in then.fits] == ["comparator_delay", "dead_time"] and then.rivals == ()
     far = replace(turn, fits=(replace(first, misfit=300.0), replace(other, misfit=480.0)))
     assert revisited(recorded(), MODEL, n, seen, values, best, far) == (best, far), "it explained too little"
+
+
+def of_two(n, name: str, change, seen) -> Fit:
+    """A fit beside a dead time found before, confirmed by two twins."""
+    made = a_fit(n, name, change, seen)
+    beside = MODEL.with_effect(effect("dead_time", tau_us=0.5)).with_effect(effect(name))
+    return replace(made, model=beside, prediction=replace(made.prediction, draws=n.draws[:2]))
+
+
+def test_what_leaves_something_is_put_against_its_runner_up_when_all_is_polished(monkeypatch):
+    """The earlier effect had taken some of the true one for its own, so that the wrong one looked better at first."""
+    n, change, values, seen = campaign()
+    values, seen, change = values + 9 * change, seen + 9 * change, 10 * change
+    wrong, true = of_two(n, "light_flicker", 0.5 * change, seen), of_two(n, "supply_ripple", 0.4 * change, seen)
+    left = 10_000.0
+    first = Round(MODEL, unit(), n.prediction, seen, left, (a_fit(n, "dead_time", change, seen),))
+    second = Round(MODEL, unit(), n.prediction, seen, left, (wrong, true), rivals=("supply_ripple",))
+    polished = {"light_flicker": 0.5 * change, "supply_ripple": change}
+    asked = []
+
+    def polish(case, model, here, measured, everything, found, names):
+        asked.append(tuple(names))
+        return of_two(n, found.name, polished[found.name], seen), {found.name: {"x": 0.1}}, False
+
+    monkeypatch.setattr(search, "polished", polish)
+    monkeypatch.setattr(search, "rejoined", lambda case, model, here, measured, best, earlier: best)
+    monkeypatch.setattr(search, "revisited", lambda case, model, here, measured, everything, best, turn: (best, turn))
+    *_, last = joined(recorded(), MODEL, n, seen, values, [first, second], 0.0)
+    assert asked == [("dead_time", "light_flicker"), ("dead_time", "supply_ripple")]
+    assert [f.name for f in last.fits] == ["supply_ripple", "light_flicker"] and last.rivals == ()
+    polished["light_flicker"] = change
+    asked.clear()
+    *_, last = joined(recorded(), MODEL, n, seen, values, [first, second], 0.0)
+    assert len(asked) == 1 and last.fits[0].name == "light_flicker", "it leaves nothing"
+
+
+def test_a_runner_up_that_explained_little_or_was_not_confirmed_is_not_tried_again():
+    n, change, _, seen = campaign()
+    best, near, far = (of_two(n, name, change, seen) for name in ("light_flicker", "supply_ripple", "crosstalk"))
+    best, near, far = (replace(f, misfit=m) for f, m in ((best, 300.0), (near, 390.0), (far, 410.0)))
+    turn = Round(MODEL, unit(), n.prediction, seen, 800.0, (best, far, near))
+    names = ["dead_time", "light_flicker"]
+    assert [f.name for f in instead_of(turn, names)] == ["supply_ripple"]
+    guess = replace(near, prediction=replace(near.prediction, draws=()))
+    assert instead_of(replace(turn, fits=(best, far, guess)), names) == []
+    assert instead_of(turn, ["lamp_drift", "light_flicker"]) == [], "what was found before is another one now"
 
 
 def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():

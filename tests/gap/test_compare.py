@@ -251,6 +251,37 @@ def test_a_slope_of_what_was_measured_is_told_beside_far_louder_ones_that_were_n
     assert list(slope) == list(moves) and 0.03 < np.sqrt(covariance[0, 0]) < 0.3
 
 
+def test_what_two_parameters_do_alike_is_open_between_them():
+    """Their derivatives are the same: what was known of one before (0.2) is all that is known of either, though both
+    together are told to 0.4 %."""
+    null = made_up(count=40)
+    alike = np.full((40, 2), 20.0)
+    _, covariance = step_of(null, np.zeros(40), exactly(np.zeros(40)), alike, before=np.array([1.0, 0.2]))
+    together = float(np.sqrt(np.array([0.5, 0.5]) @ covariance @ np.array([0.5, 0.5])))
+    print(np.sqrt(np.diag(covariance)), together)
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(np.full(2, 0.2), rel=0.15) and together < 0.005
+    [one] = step_of(null, np.zeros(40), exactly(np.zeros(40)), alike[:, :1])[1].reshape(1)
+    assert np.sqrt(one) == pytest.approx(1 / 20 / np.sqrt(40), rel=0.2), "alone it is told"
+
+
+def test_noise_of_derivatives_does_not_tell_parameters_apart():
+    """Two parameters make up for each other but for 5 %, and are half a logarithm off, one up and one down.  Their
+    derivatives, noisy twins less the same one, differ by more: how often 90 % intervals hold the truth of 300."""
+    rng = np.random.default_rng(3)
+    null = made_up(count=30)
+    true = 10.0 * np.stack([np.ones(30), np.ones(30) + 0.05 * np.linspace(-1, 1, 30)], axis=1)
+    inside = {2.0: 0, 0.0: 0}
+    for _ in range(300):
+        seen = true + np.sqrt(2.0) * (rng.standard_normal((30, 2)) - rng.standard_normal((30, 1)))
+        truth = 0.5 * rng.standard_normal() * np.array([1.0, -1.0])
+        measured = true @ truth + rng.standard_normal(30)
+        for doubt in inside:
+            step, covariance = step_of(null, measured, exactly(np.zeros(30)), seen, doubt)
+            inside[doubt] += bool(abs(step[1] - truth[1]) < 1.645 * np.sqrt(covariance[1, 1]))
+    print(inside)
+    assert inside[2.0] > 0.8 * 300 > 0.5 * 300 > inside[0.0]
+
+
 def test_errors_know_that_an_effect_falls_on_other_pixels_each_time():
     """Twins whose statistics move by 20 % together: so unsure is the strength, however many statistics there are."""
     rng = np.random.default_rng(0)

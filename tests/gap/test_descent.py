@@ -8,7 +8,7 @@ import numpy as np
 from small import MODEL, unit
 
 from spikecam_env.gap.compare import Draw, Null, Prediction
-from spikecam_env.gap.descent import Probe, descend
+from spikecam_env.gap.descent import WHITE, Probe, derivatives, descend, nudge_of, spans
 from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import with_effect
@@ -61,6 +61,28 @@ def test_both_parameters_are_found_within_their_errors():
     for (_, key), error in zip(FREE, errors, strict=True):
         assert 0.001 < error < 0.1
         assert abs(np.log(found[key] / TRUE[key])) < 4 * error
+
+
+def test_what_one_parameter_moves_says_how_far_another_of_its_effect_does():
+    """Statistics that the time constant moves by less than is clear have its derivative too, and a doubt about it."""
+    n = null()
+
+    def weak(fraction: float, tau_us: float) -> np.ndarray:
+        return law(fraction, TRUE["tau_us"]) * (1.0 + 0.02 * np.log(tau_us / TRUE["tau_us"]) * (np.arange(COUNT) < 30))
+
+    model, probe = start(fraction=1.0, tau_us=1.0), probe_of(n, weak)
+    columns, doubt = derivatives(probe, n, n.mean, model, unit(), probe(model, unit()), FREE)
+    told = columns[:30, 1]
+    print(told[:3], doubt[:3])
+    assert np.all(columns[:, 0] != 0) and 0.1 < np.median(told) < 0.6 and np.all(columns[30:, 1] == 0)
+    assert np.all(np.abs(doubt[:, 1]) > 0)
+
+
+def test_shapes_are_told_by_steps_that_suit_them():
+    """A time constant by half a logarithm, the level from which light spills by a tenth; each is open by twice that."""
+    free = [("blooming", "share"), ("blooming", "full"), ("incomplete_reset", "tau_us"), WHITE]
+    assert [nudge_of(*what, peak=12.0) for what in free] == [0.5, -0.1, -0.5, -0.2]
+    assert list(spans(free)) == [1.0, 0.2, 1.0, 1.0]
 
 
 def test_where_steps_come_to_leave_more_the_best_is_kept():

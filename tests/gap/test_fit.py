@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded
@@ -9,8 +11,8 @@ from small import MODEL, effect, null, recorded
 from spikecam_env.gap import fit as fit_module
 from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_pattern
 from spikecam_env.gap.candidates import testable as split_testable
-from spikecam_env.gap.compare import judged, misfit, scale_of, values_of
-from spikecam_env.gap.fit import concerned, fit, predict, with_held_out
+from spikecam_env.gap.compare import Prediction, judged, misfit, scale_of, values_of
+from spikecam_env.gap.fit import concerned, fit, predict, slope_between, with_held_out
 from spikecam_env.gap.strength import with_effect
 from spikecam_env.gap.units import spread_factor
 from spikecam_env.sensor import CATALOGUE
@@ -27,6 +29,20 @@ def test_scale_is_recovered_within_its_stated_error(true):
     scale, sd = scale_of(true * change + rng.standard_normal(200), change, ONE, NONE)
     print(f"{scale:.4f} +- {sd:.4f}")
     assert abs(scale - true) < 4 * sd and sd < 0.1 * max(abs(true), 0.2)
+
+
+def test_the_slope_of_what_saturates_is_told_by_two_twins():
+    """The logarithm of a line beside noise: twice the strength is not four times the change.  What one lacks is out."""
+    n = null()
+    line = lambda strength: 40.0 * n.noise * np.log1p(strength**2)  # noqa: E731
+    one, other = (Prediction(n.mean + line(s), n.sd / np.sqrt(n.twins), n.sd) for s in (2.0, 2.4))
+    lacks = np.arange(len(n.keys)) % 2 == 0
+    one = replace(one, mean=np.where(lacks, n.mean, one.mean))
+    slope = slope_between(n, n.mean, (2.0, one), (2.4, other))
+    assert slope is not None and np.all(slope[lacks] == 0)
+    assert slope[~lacks] / (40.0 * n.noise[~lacks]) == pytest.approx(2 * 2.2**2 / (1 + 2.2**2), rel=0.02)
+    assert slope_between(n, n.mean, (2.4, one), (2.4, other)) is None, "no two strengths"
+    assert slope_between(n, n.mean, None, (2.4, other)) is None, "no two twins"
 
 
 def test_an_effect_that_shows_nowhere_has_no_scale():

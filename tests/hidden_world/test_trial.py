@@ -16,6 +16,7 @@ from tests.hidden_world.cases import Case, cases
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 from tests.hidden_world.keys import BrokenSealError, key_text, open_key, seal
 from tests.hidden_world.outside import REPORT, TUNE
+from tests.hidden_world.record import code, in_short, pack, unpack
 from tests.hidden_world.score import FAMILIES, binomial_90, confusion, family_of, figures, score_case
 from tests.hidden_world.trial import as_text, chosen, is_done, run_trial, score_trial
 
@@ -253,6 +254,33 @@ def test_a_diagnosis_that_breaks_is_counted_and_tried_again(tmp_path):
     assert not is_done(tmp_path, picked[0].id)
     list(run_trial(tmp_path, "full", "tune", "tests.hidden_world.bench:says_dead_time", picked=picked))
     assert score_trial(tmp_path, picked)["errors"] == 0
+
+
+def test_a_record_holds_a_trial_to_be_scored_and_gone_on_with(tmp_path):
+    picked = [small(c) for c in chosen("full", "tune", ["none", "strong"], 1)]
+    said, first, second = "tests.hidden_world.bench:says_dead_time", tmp_path / "first", tmp_path / "second"
+    record = tmp_path / "records" / "full.jsonl"
+    assert unpack(record, first) == 0
+    list(run_trial(first, "full", "tune", said, picked=picked[:1]))
+    assert pack(first, record) == 1
+    assert unpack(record, second) == 1 and unpack(record, second) == 0
+    assert list(run_trial(second, "full", "tune", said, picked=picked)) == [(1, 2), (2, 2)]
+    assert pack(second, record) == 2
+    trial = score_trial(second, picked)
+    assert trial["code"] == {code() or "unknown code": 2} and trial["cases"] == 2
+    assert trial["scored"][0] == score_trial(first, picked[:1])["scored"][0]
+    line = json.loads(record.read_text().splitlines()[0])
+    assert {"id", "code", "threads", "seconds", "diagnosis"} < set(line) and "statistics" not in line["diagnosis"]
+
+
+def test_what_is_not_scored_is_not_recorded():
+    gap = {"before": 2.0, "removed": 0.5, "by_recording": {"disk": {}}}
+    said = {"verdict": "named", "effects": [], "ranking": [1], "discrepancies": [2], "gap": gap}
+    kept = in_short({"id": "a", "seconds": 3.0, "diagnosis": said})
+    assert kept["diagnosis"] == {"verdict": "named", "effects": [], "gap": {"before": 2.0, "removed": 0.5}}
+    assert (
+        kept["seconds"] == 3.0 and in_short({"diagnosis": {"verdict": "data", "gap": None}})["diagnosis"]["gap"] is None
+    )
 
 
 def test_command_says_where_the_world_is_not(tmp_path):

@@ -14,6 +14,7 @@ import resource
 import shutil
 import time
 import traceback
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
@@ -23,6 +24,7 @@ from typing import Any
 
 from tests.hidden_world.cases import GROUPS, Case, cases
 from tests.hidden_world.keys import open_key, seal, write_whole
+from tests.hidden_world.record import code
 from tests.hidden_world.score import Figure, Scored, by_effect, confusion, figures, score_case
 from tests.hidden_world.world import write_campaign
 
@@ -95,7 +97,8 @@ def run_case(case: Case, out: Path, diagnose: str, threads: int, keep: bool) -> 
     campaign, work = out / "campaigns" / case.id, out / "diagnoses" / case.id
     began = time.perf_counter()
     write_campaign(case.recipe, campaign)
-    result: dict[str, Any] = {"id": case.id, "threads": threads, "generate_s": round(time.perf_counter() - began, 2)}
+    took = round(time.perf_counter() - began, 2)
+    result: dict[str, Any] = {"id": case.id, "code": code(), "threads": threads, "generate_s": took}
     began = time.perf_counter()
     try:
         function: Diagnose = _named(diagnose)
@@ -119,13 +122,14 @@ def _named(name: str) -> Diagnose:
 def score_trial(out: Path, picked: Sequence[Case]) -> dict[str, Any]:
     """Open the keys of all cases with a result, score, and write trial.json and trial.md; returns the former."""
     scored: list[Scored] = []
-    memory = 0.0
+    memory, by = 0.0, Counter[str]()
     for case in picked:
         path = out / "results" / f"{case.id}.json"
         if path.exists():
             result = json.loads(path.read_text(encoding="utf-8"))
             scored.append(score_case(open_key(out, case.id), result))
             memory = max(memory, float(result.get("peak_gib", 0.0)))
+            by[result.get("code") or "unknown code"] += 1
     made = figures(scored)
     if memory:
         made.append(Figure("7", "largest process [GiB]", memory, "<= 4", len(scored)))
@@ -134,6 +138,7 @@ def score_trial(out: Path, picked: Sequence[Case]) -> dict[str, Any]:
         "cases": len(scored),
         "of": len(picked),
         "errors": sum(bool(s.error) for s in scored),
+        "code": dict(by),
         "figures": [{**asdict(f), "met": f.met} for f in made],
         "effects": by_effect(scored),
         "confusion": confusion(scored),
@@ -165,6 +170,8 @@ def as_text(trial: dict[str, Any]) -> str:
     ]
     lines = [
         f"# Blind trial: {trial['cases']} of {trial['of']} cases, {trial['errors']} ended in an error",
+        "",
+        f"Diagnosed by {', '.join(f'{name} ({count})' for name, count in trial['code'].items()) or 'nobody'}.",
         "",
         _table(rows),
         "## By effect: right of tried, by group",

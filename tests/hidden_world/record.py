@@ -1,0 +1,56 @@
+"""A trial in one file: a line a case, what was said of it and by which code, to be scored anew or gone on with.
+
+What scoring does not need of a diagnosis is left out.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from tests.hidden_world.keys import write_whole
+
+SAID = ("verdict", "effects", "unknown", "class", "parameters", "data", "not_testable")
+"""Entries of a diagnosis that are kept; of its gap, all but those by recording."""
+
+
+def pack(out: Path, record: Path) -> int:
+    """Write all results in OUT that hold a diagnosis to a record, in the order of their ids; returns how many."""
+    found = [json.loads(p.read_text(encoding="utf-8")) for p in sorted((out / "results").glob("*.json"))]
+    lines = [json.dumps(in_short(result)) for result in found if "diagnosis" in result]
+    record.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(record, "".join(line + "\n" for line in lines))
+    return len(lines)
+
+
+def unpack(record: Path, out: Path) -> int:
+    """Put what a record holds, and OUT does not, among the results in OUT; returns how many."""
+    (out / "results").mkdir(parents=True, exist_ok=True)
+    lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
+    results = [json.loads(line) for line in lines]
+    lacking = [r for r in results if not (out / "results" / f"{r['id']}.json").exists()]
+    for result in lacking:
+        write_whole(out / "results" / f"{result['id']}.json", json.dumps(result, indent=1) + "\n")
+    return len(lacking)
+
+
+def in_short(result: dict[str, Any]) -> dict[str, Any]:
+    """A result with what is scored of its diagnosis."""
+    said = result["diagnosis"]
+    gap = said.get("gap")
+    kept = {key: said[key] for key in SAID if key in said}
+    kept["gap"] = gap and {key: value for key, value in gap.items() if key != "by_recording"}
+    return {**result, "diagnosis": kept}
+
+
+@lru_cache(maxsize=1)
+def code() -> str:
+    """The commit that this checkout is at, `-dirty` with changes; empty where there is no git."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=7", "--exclude=*"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return ""
