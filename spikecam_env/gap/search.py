@@ -330,7 +330,8 @@ def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
 
 
 def worth_fitting(screened: Sequence[Screened], before: float, loud: Collection[str] = ()) -> list[Screened]:
-    """The best by their templates, FEWEST and those that explain half of what the best does.  before: misfit of none.
+    """The best by their templates, FEWEST and those that explain half of what the best does; one that takes several
+    twins a try is tried for that alone.  before: misfit of none.
 
     loud: groups of statistics that stand out.  Where the pattern does, with the two best of those that only change it,
     whose statistics are not in proportion to their strength; where motion does, with all that show by it alone, whose
@@ -338,8 +339,9 @@ def worth_fitting(screened: Sequence[Screened], before: float, loud: Collection[
     """
     if not screened:
         return []
-    best = before - screened[0].misfit
-    tried = [s for i, s in enumerate(screened[:TRIED]) if i < FEWEST or before - s.misfit > 0.5 * best]
+    half = before - 0.5 * (before - screened[0].misfit)
+    worth = [s for s in screened if s.misfit < half or not (candidate(s.name).wanders or candidate(s.name).strikes)]
+    tried = [s for i, s in enumerate(worth[:TRIED]) if i < FEWEST or s.misfit < half]
     also = [s for s in screened if is_pattern(s.name)][:2] if "pattern" in loud else []
     also += [s for s in screened if of_motion(s.name)] if {"moving", "step"} & set(loud) else []
     return tried + [s for s in also if s not in tried]

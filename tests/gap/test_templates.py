@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small import MODEL, TWINS, effect, recorded
@@ -9,7 +11,7 @@ from small import MODEL, TWINS, effect, recorded
 from spikecam_env.gap.candidates import NOISE_OF_A_RESET
 from spikecam_env.gap.compare import misfit, values_of
 from spikecam_env.gap.null import model_null
-from spikecam_env.gap.screen import screen
+from spikecam_env.gap.screen import Screened, screen
 from spikecam_env.gap.search import best_of_each, worth_fitting
 from spikecam_env.gap.templates import TIMES, load
 from spikecam_env.sensor import CATALOGUE
@@ -24,6 +26,18 @@ def test_every_candidate_has_templates_weak_ones_first_and_severe_ones_stronger(
         strength = e.parameters[CATALOGUE[e.name].strength]
         assert e.times == 1 or weak[e.shape] < strength <= 1.01 * e.times * weak[e.shape], e.name
         assert 0 < e.white <= 1 and e.shift.shape == templates.noise.shape and np.isfinite(e.shift).all()
+
+
+def test_the_best_are_tried_and_what_takes_many_twins_where_it_explains_half():
+    """Of 1000, misfits by template: the three best, others of less than half of the best's 100 left, at most five."""
+    left = {"clock_jitter": 100.0, "lamp_drift": 560.0, "crosstalk": 700.0, "ir_drop": 800.0, "dead_time": 900.0}
+    names = lambda found: [s.name for s in worth_fitting(found, 1000.0)]  # noqa: E731
+    screened = [Screened(name, {}, misfit, np.zeros(1)) for name, misfit in left.items()]
+    assert names(screened) == ["clock_jitter", "crosstalk", "ir_drop"]
+    nearer = [replace(s, misfit=540.0) if s.name in ("lamp_drift", "dead_time") else s for s in screened]
+    nearer.sort(key=lambda s: s.misfit)
+    assert names(nearer) == ["clock_jitter", "lamp_drift", "dead_time"]
+    assert names(screened[1:2]) == ["lamp_drift"] and worth_fitting([], 1000.0) == []
 
 
 @pytest.mark.parametrize(
