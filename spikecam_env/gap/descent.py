@@ -38,7 +38,7 @@ CLEAR = 3.0
 """Noises by which a step has to surprise for derivatives to be corrected by it."""
 
 LONGEST = 0.7
-"""Largest step of a logarithm at once."""
+"""Largest step of a logarithm at once; none is further than what is open of its parameter before (`spans`)."""
 
 WORSE = 3.0
 """Misfit by which a step may seem worse, by chance of the draws."""
@@ -78,14 +78,16 @@ def descend(
     worth: float = WORTH,
 ) -> Descent:
     """From a model and its unit down to the parameters `free` that suit (S,) `measured` best; where steps have come to
-    leave more, the best of where they led, of those alike the first.  jobs: threads.  worth: misfit that a step has to
-    promise, and the one before it to have removed."""
+    leave more, the best of where they led, of those alike the first, and no step further that promises little and goes
+    as far as one may.  jobs: threads.  worth: misfit that a step has to promise, and the one before it to have removed.
+    """
     at = probe(model, base)
     columns, doubt = derivatives(probe, null, measured, model, base, at, free, jobs)
+    longest = np.minimum(spans(free), LONGEST)
     tried = []
     for turn in range(TURNS):
         step, covariance = step_of(null, measured, at, columns, doubt, spans(free))
-        step = np.clip(step, -LONGEST, LONGEST)
+        step = np.clip(step, -longest, longest)
         left, promised = (judged(null, measured, p)[1] for p in (at, replace(at, mean=at.mean + columns @ step)))
         tried.append((left, Descent(model, base, at, columns, doubt, covariance)))
         there = as_seen(model, within(model, base), null, at)
@@ -101,7 +103,8 @@ def descend(
             columns, doubt = derivatives(probe, null, measured, model, base, after, free, jobs)
         at = after
     least = min(t[0] for t in tried)
-    if left > least + WORSE:
+    guess = little and bool(np.any(np.abs(step) >= longest))
+    if guess or left > least + WORSE:
         return next(where for there, where in tried if there < least + WORTH)
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, doubt, covariance)
 

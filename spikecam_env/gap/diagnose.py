@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from tqdm import tqdm
 from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.audit import Contradiction, audit, upheld
-from spikecam_env.gap.candidates import chosen, testable
+from spikecam_env.gap.candidates import chosen, is_pattern, testable
 from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import (
     Null,
@@ -113,7 +114,9 @@ def diagnose(
                 templates = templates or own_templates(case, start, null, names)
             rounds = harmless(case, null, values, search(case, start, null, values, names, templates or load()))
     if rounds and not lacking:
-        off = replace(off, parameters=off_nominal(case, assumed, rounds[-1].base).parameters)
+        off = replace(
+            off, parameters=off_nominal(case, patterned(assumed, rounds[-1].model), rounds[-1].base).parameters
+        )
     with timed("verdict"):
         found = concluded(
             case, start, null, in_order(before, null), values, lacking, off, rounds, contradictions, untestable
@@ -171,6 +174,11 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     if not bad or not refittable([case.conditions[i] for i in keep]):
         return case
     return case.of([case.conditions[i] for i in keep], [case.observations[i] for i in keep])
+
+
+def patterned(model: SensorModel, found: SensorModel) -> SensorModel:
+    """The model with those effects of another that make pixels differ: what they explain, its own spreads do not."""
+    return reduce(SensorModel.with_effect, (e for e in found.effects if is_pattern(e.name)), model)
 
 
 def in_order(other: Null, null: Null) -> Array:

@@ -102,6 +102,19 @@ def test_where_steps_come_to_leave_more_the_best_is_kept():
     assert abs(np.log(parameters_of(kept.model)["fraction"] / TRUE["fraction"])) < 0.05
 
 
+def test_a_far_step_that_promises_little_is_not_taken():
+    """Nothing tells the time constant but a whisper, that would have it three times as long."""
+    n = null()
+
+    def whisper(fraction: float, tau_us: float) -> np.ndarray:
+        return law(fraction, TRUE["tau_us"]) + 0.4 * np.log(tau_us / TRUE["tau_us"]) * (np.arange(COUNT) < 30)
+
+    measured = n.mean + law(**TRUE) + np.where(np.arange(COUNT) < 30, 0.45, 0.0)
+    end = descend(probe_of(n, whisper), n, measured, start(fraction=1.0, tau_us=1.0), unit(), FREE, worth=20.0)
+    print(parameters_of(end.model), np.sqrt(np.diag(end.covariance)))
+    assert parameters_of(end.model) == TRUE
+
+
 def test_steps_go_on_while_they_are_worth_their_twins():
     """One look here and one for each derivative; then a step that promises too little is the last."""
     n = null()
