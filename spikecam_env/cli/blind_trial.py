@@ -77,7 +77,7 @@ class BlindTrial:
                     scored = trial.score_trial(self.out, picked)
                     if self.record:
                         record.pack(self.out, self.record)
-        except (ValueError, ImportError) as error:
+        except (ValueError, ImportError, OSError) as error:
             raise InputError(str(error)) from error
         print(trial.as_text(scored))
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")

@@ -21,20 +21,33 @@ def pack(out: Path, record: Path) -> int:
     """Write all results in OUT that hold a diagnosis to a record, in the order of their ids; returns how many."""
     found = [json.loads(p.read_text(encoding="utf-8")) for p in sorted((out / "results").glob("*.json"))]
     lines = [json.dumps(in_short(result)) for result in found if "diagnosis" in result]
-    record.parent.mkdir(parents=True, exist_ok=True)
     write_whole(record, "".join(line + "\n" for line in lines))
     return len(lines)
 
 
 def unpack(record: Path, out: Path) -> int:
-    """Put what a record holds, and OUT does not, among the results in OUT; returns how many."""
+    """Put what a record holds, and OUT does not, among the results in OUT; returns how many.
+
+    Errors: ValueError if a line of it is no result, OSError if its folder can't be made.
+    """
     (out / "results").mkdir(parents=True, exist_ok=True)
+    record.parent.mkdir(parents=True, exist_ok=True)
     lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
-    results = [json.loads(line) for line in lines]
+    results = [_result(line, record) for line in lines]
     lacking = [r for r in results if not (out / "results" / f"{r['id']}.json").exists()]
     for result in lacking:
         write_whole(out / "results" / f"{result['id']}.json", json.dumps(result, indent=1) + "\n")
     return len(lacking)
+
+
+def _result(line: str, record: Path) -> dict[str, Any]:
+    try:
+        result: dict[str, Any] = json.loads(line)
+        if {"id", "diagnosis"} <= set(result):
+            return result
+    except (ValueError, TypeError):
+        pass
+    raise ValueError(f"{record} is no record of a trial: {line[:60]!r} is no result")
 
 
 def in_short(result: dict[str, Any]) -> dict[str, Any]:

@@ -273,6 +273,15 @@ def test_a_record_holds_a_trial_to_be_scored_and_gone_on_with(tmp_path):
     assert {"id", "code", "threads", "seconds", "diagnosis"} < set(line) and "statistics" not in line["diagnosis"]
 
 
+def test_what_is_no_record_is_an_error_before_anything_is_run(tmp_path):
+    for text in ("nonsense", "[1, 2]", '{"id": "a"}'):
+        (tmp_path / "record").write_text(text + "\n")
+        with pytest.raises(InputError, match="no record of a trial"):
+            BlindTrial(tmp_path / "out", only=["none"], limit=1, record=tmp_path / "record").run()
+    with pytest.raises(InputError, match="record"):
+        BlindTrial(tmp_path / "out", only=["none"], limit=1, record=tmp_path / "record" / "in" / "a" / "file").run()
+
+
 def test_what_is_not_scored_is_not_recorded():
     gap = {"before": 2.0, "removed": 0.5, "by_recording": {"disk": {}}}
     said = {"verdict": "named", "effects": [], "ranking": [1], "discrepancies": [2], "gap": gap}
