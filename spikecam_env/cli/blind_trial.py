@@ -60,7 +60,7 @@ class BlindTrial:
         try:
             picked = trial.chosen(self.set, self.part, self.only, self.limit)
             if self.record:
-                record.unpack(self.record, self.out)
+                record.unpack(self.record, self.out, {case.id for case in trial.cases(self.set, self.part)})
             steps = trial.run_trial(
                 self.out,
                 self.set,

@@ -83,10 +83,10 @@ def descend(
     """
     at = probe(model, base)
     columns, doubt = derivatives(probe, null, measured, model, base, at, free, jobs)
-    longest = np.minimum(spans(free), LONGEST)
+    before, longest = spans(free), longest_of(free)
     tried = []
     for turn in range(TURNS):
-        step, covariance = step_of(null, measured, at, columns, doubt, spans(free))
+        step, covariance = step_of(null, measured, at, columns, doubt, before)
         step = np.clip(step, -longest, longest)
         left, promised = (judged(null, measured, p)[1] for p in (at, replace(at, mean=at.mean + columns @ step)))
         tried.append((left, Descent(model, base, at, columns, doubt, covariance)))
@@ -157,6 +157,11 @@ def spans(free: Free) -> Array:
     of a shape twice the step that its derivative takes."""
     fitted = [name != WHITE[0] and key != candidate(name).fitted[0] for name, key in free]
     return np.array([2 * abs(candidate(f[0]).nudge) if shape else 1.0 for f, shape in zip(free, fitted, strict=True)])
+
+
+def longest_of(free: Free) -> Array:
+    """(n,) largest step of each logarithm at once."""
+    return np.minimum(spans(free), LONGEST)
 
 
 def nudge_of(name: str, key: str, peak: float) -> float:

@@ -12,7 +12,7 @@ from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, step_of
 from spikecam_env.gap.confirm import FINAL, confirmed
-from spikecam_env.gap.descent import LONGEST, WHITE, WORSE, Free, Probe, descend, moved, spans
+from spikecam_env.gap.descent import WHITE, WORSE, Free, Probe, descend, longest_of, moved, spans
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
@@ -86,7 +86,7 @@ def _stepped(null: Null, measured: Array, best: Fit, free: Free, columns: Array,
     scatter is in the parameters that it led to."""
     predicted = replace(best.prediction, mean=best.prediction.mean + columns @ step)
     rho, left = judged(null, measured, predicted)
-    if np.abs(step).max() > LONGEST or left > best.misfit:
+    if np.any(np.abs(step) > longest_of(free)) or left > best.misfit:
         return best
     model, base = moved(best.model, best.base, free, step)
     return replace(best, model=model, base=base, prediction=predicted, rho=rho, misfit=left)

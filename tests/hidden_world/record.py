@@ -6,12 +6,12 @@ What scoring does not need of a diagnosis is left out.
 from __future__ import annotations
 
 import json
-import subprocess
-from functools import lru_cache
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
 from tests.hidden_world.keys import write_whole
+from tests.hidden_world.trial import is_done
 
 SAID = ("verdict", "effects", "unknown", "class", "parameters", "data", "not_testable")
 """Entries of a diagnosis that are kept; of its gap, all but those by recording."""
@@ -25,16 +25,18 @@ def pack(out: Path, record: Path) -> int:
     return len(lines)
 
 
-def unpack(record: Path, out: Path) -> int:
+def unpack(record: Path, out: Path, ids: Collection[str]) -> int:
     """Put what a record holds, and OUT does not, among the results in OUT; returns how many.
 
-    Errors: ValueError if a line of it is no result, OSError if its folder can't be made.
+    ids: of the trial's cases.  Errors: ValueError if a line of it is no result, or of another trial; OSError if its folder can't be made.
     """
     (out / "results").mkdir(parents=True, exist_ok=True)
     record.parent.mkdir(parents=True, exist_ok=True)
     lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
     results = [_result(line, record) for line in lines]
-    lacking = [r for r in results if not (out / "results" / f"{r['id']}.json").exists()]
+    if others := {r["id"] for r in results} - set(ids):
+        raise ValueError(f"{record} is of another trial (other set or part): it has {min(others)}; take another file")
+    lacking = [r for r in results if not is_done(out, r["id"])]
     for result in lacking:
         write_whole(out / "results" / f"{result['id']}.json", json.dumps(result, indent=1) + "\n")
     return len(lacking)
@@ -57,13 +59,3 @@ def in_short(result: dict[str, Any]) -> dict[str, Any]:
     kept = {key: said[key] for key in SAID if key in said}
     kept["gap"] = gap and {key: value for key, value in gap.items() if key != "by_recording"}
     return {**result, "diagnosis": kept}
-
-
-@lru_cache(maxsize=1)
-def code() -> str:
-    """The commit that this checkout is at, `-dirty` with changes; empty where there is no git."""
-    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=7", "--exclude=*"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return ""

@@ -2,7 +2,7 @@
 
 Rules
 - The names of a diagnosis are those of its `effects`; of a `class`, also its members (`class.members`, or where there
-  is no such list the alternatives); and, unless it is `none` or `unknown`, the keys of `parameters` that are off.
+  is no such list the alternatives); of these and of a `parameter`, also the keys of `parameters`, which are off.
 - A single effect has its right name when the verdict is `named` (or `parameter`, see EQUIVALENT) and exactly
   that effect is named, or when the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
 - Its family is right when one effect of its family (FAMILIES) is named and none of another.

@@ -16,9 +16,9 @@ from tests.hidden_world.cases import Case, cases
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 from tests.hidden_world.keys import BrokenSealError, key_text, open_key, seal
 from tests.hidden_world.outside import REPORT, TUNE
-from tests.hidden_world.record import code, in_short, pack, unpack
+from tests.hidden_world.record import in_short, pack, unpack
 from tests.hidden_world.score import FAMILIES, binomial_90, confusion, family_of, figures, score_case
-from tests.hidden_world.trial import as_text, chosen, is_done, run_trial, score_trial
+from tests.hidden_world.trial import as_text, chosen, code, is_done, run_trial, score_trial
 
 FULL = {part: cases("full", part) for part in ("tune", "report")}
 TITLE = {"set": "full", "part": "tune"}
@@ -259,11 +259,11 @@ def test_a_diagnosis_that_breaks_is_counted_and_tried_again(tmp_path):
 def test_a_record_holds_a_trial_to_be_scored_and_gone_on_with(tmp_path):
     picked = [small(c) for c in chosen("full", "tune", ["none", "strong"], 1)]
     said, first, second = "tests.hidden_world.bench:says_dead_time", tmp_path / "first", tmp_path / "second"
-    record = tmp_path / "records" / "full.jsonl"
-    assert unpack(record, first) == 0
+    record, ids = tmp_path / "records" / "full.jsonl", {c.id for c in picked}
+    assert unpack(record, first, ids) == 0
     list(run_trial(first, "full", "tune", said, picked=picked[:1]))
     assert pack(first, record) == 1
-    assert unpack(record, second) == 1 and unpack(record, second) == 0
+    assert unpack(record, second, ids) == 1 and unpack(record, second, ids) == 0
     assert list(run_trial(second, "full", "tune", said, picked=picked)) == [(1, 2), (2, 2)]
     assert pack(second, record) == 2
     trial = score_trial(second, picked)
@@ -278,6 +278,9 @@ def test_what_is_no_record_is_an_error_before_anything_is_run(tmp_path):
         (tmp_path / "record").write_text(text + "\n")
         with pytest.raises(InputError, match="no record of a trial"):
             BlindTrial(tmp_path / "out", only=["none"], limit=1, record=tmp_path / "record").run()
+    (tmp_path / "record").write_text(json.dumps({"id": case_of("strong", "dead_time").id, "diagnosis": {}}) + "\n")
+    with pytest.raises(InputError, match="of another trial"):
+        BlindTrial(tmp_path / "out", only=["none"], limit=1, record=tmp_path / "record").run()
     with pytest.raises(InputError, match="record"):
         BlindTrial(tmp_path / "out", only=["none"], limit=1, record=tmp_path / "record" / "in" / "a" / "file").run()
 

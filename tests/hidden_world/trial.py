@@ -12,19 +12,20 @@ import importlib
 import json
 import resource
 import shutil
+import subprocess
 import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
+from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from tests.hidden_world.cases import GROUPS, Case, cases
 from tests.hidden_world.keys import open_key, seal, write_whole
-from tests.hidden_world.record import code
 from tests.hidden_world.score import Figure, Scored, by_effect, confusion, figures, score_case
 from tests.hidden_world.world import write_campaign
 
@@ -112,6 +113,16 @@ def run_case(case: Case, out: Path, diagnose: str, threads: int, keep: bool) -> 
     write_whole(out / "results" / f"{case.id}.json", json.dumps(result, indent=1) + "\n")
     if not keep:
         shutil.rmtree(campaign)
+
+
+@lru_cache(maxsize=1)
+def code() -> str:
+    """The commit that this checkout is at, `-dirty` with changes; empty where there is no git."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=7", "--exclude=*"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return ""
 
 
 def _named(name: str) -> Diagnose:
