@@ -28,7 +28,8 @@ def pack(out: Path, record: Path) -> int:
 def unpack(record: Path, out: Path, ids: Collection[str]) -> int:
     """Put what a record holds, and OUT does not, among the results in OUT; returns how many.
 
-    ids: of the trial's cases.  Errors: ValueError if a line of it is no result, or of another trial; OSError if its folder can't be made.
+    ids: of the trial's cases.
+    Errors: ValueError if a line of it is no result, or of another trial; OSError if its folder can't be made.
     """
     (out / "results").mkdir(parents=True, exist_ok=True)
     record.parent.mkdir(parents=True, exist_ok=True)
