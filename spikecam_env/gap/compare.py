@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
+from spikecam_env.gap.moderate import moderated
 from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.statistics import Key, floor_of
 
@@ -73,8 +74,8 @@ class Null:
     """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns, kept in `draws`, or of the
     pattern over as many drawn units.
 
-    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  weight: (S,) how much each says
-    of its own: what several recordings tell of one fixed pattern is told once.
+    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  freedom: (S,) degrees of freedom
+    of sd.  weight: (S,) how much each says of its own: what several recordings tell of one fixed pattern is told once.
     """
 
     keys: tuple[Key, ...]
@@ -82,6 +83,7 @@ class Null:
     sd: Array
     floor: Array
     twins: Array | int
+    freedom: Array | float
     weight: Array | float = 1.0
     draws: tuple[Draw, ...] = ()
 
@@ -101,9 +103,9 @@ def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key], refits: S
     there = tuple(k for k in keys if all(k in b for b in banks))
     values = np.array([[b[k] for k in there] for b in banks])
     floor = np.maximum([floor_of(k) for k in there], 1e-9)
-    sd = values.std(axis=0, ddof=1)
+    variances, freedom = moderated(there, values.var(axis=0, ddof=1), len(banks) - 1)
     draws = tuple(Draw(n, v, r) for n, (v, r) in enumerate(zip(values, refits, strict=False)))
-    return Null(there, values.mean(axis=0), sd, floor, len(banks), draws=draws)
+    return Null(there, values.mean(axis=0), np.sqrt(variances), floor, len(banks), freedom, draws=draws)
 
 
 def paired(null: Null, made: Sequence[Draw]) -> Prediction:
@@ -172,7 +174,7 @@ def normal(null: Null, t: Array) -> Array:
     """(S,) normal deviates of distances in noise: the noise was learnt from few twins, and is the surer the more of it
     is floor."""
     known = null.sd**2 * (1.0 + 1.0 / null.twins)
-    freedom = (null.twins - 1) * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
+    freedom = null.freedom * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
     log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)
     return np.sign(t) * -special.ndtri_exp(log_p)
 

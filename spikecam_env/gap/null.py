@@ -37,6 +37,7 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         null,
         mean=np.where(of_pattern, values.mean(axis=0), null.mean),
         sd=np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
+        freedom=np.where(of_pattern, UNITS - 1, null.freedom),
         twins=np.where(of_pattern, UNITS, count),
         weight=np.where(of_pattern, 1.0 / told(null.keys, case.conditions), 1.0),
     )

@@ -34,7 +34,7 @@ from spikecam_env.gap.statistics import Key, floor_of
 
 def made_up(mean=0.0, sd=1.0, floor=0.0, twins=12, count=1) -> Null:
     full = lambda v: np.full(count, float(v))  # noqa: E731
-    return Null(tuple(Key("g", "r", str(i)) for i in range(count)), full(mean), full(sd), full(floor), twins)
+    return Null(tuple(Key("g", "r", str(i)) for i in range(count)), full(mean), full(sd), full(floor), twins, twins - 1)
 
 
 def exactly(mean) -> Prediction:
@@ -62,7 +62,7 @@ def test_false_alarms_are_as_often_as_asked_for_however_few_the_twins(twins):
     alarms = 0
     for _ in range(1500):
         made = rng.standard_normal((twins, 20))
-        null = Null(made_up(count=20).keys, made.mean(axis=0), made.std(axis=0, ddof=1), np.zeros(20), twins)
+        null = Null(made_up(count=20).keys, made.mean(axis=0), made.std(axis=0, ddof=1), np.zeros(20), twins, twins - 1)
         alarms += adjusted(deviates(null, rng.standard_normal(20))).min() < 0.05
     share, allowed = alarms / 1500, 0.05 + 4 * np.sqrt(0.05 * 0.95 / 1500)
     print(f"{twins} twins: {share:.3f}, allowed {allowed:.3f}")
@@ -74,7 +74,9 @@ def test_deviates_of_few_twins_are_normal(twins):
     """Kolmogorov distance of 20 000: 1.95 / sqrt(n) once in a thousand times."""
     rng = np.random.default_rng(0)
     made = 3 + 2 * rng.standard_normal((twins, 20_000))
-    null = Null(made_up(count=20_000).keys, made.mean(axis=0), made.std(axis=0, ddof=1), np.zeros(20_000), twins)
+    null = Null(
+        made_up(count=20_000).keys, made.mean(axis=0), made.std(axis=0, ddof=1), np.zeros(20_000), twins, twins - 1
+    )
     z = deviates(null, 3 + 2 * rng.standard_normal(20_000))
     distance = float(stats.kstest(z, "norm").statistic)
     print(f"distance {distance:.4f}, sd {z.std():.3f}")
@@ -148,7 +150,7 @@ def test_rare_events_widen_a_statistic_and_leave_the_others_alone():
     keys = tuple(Key("quiet" if i < 10 else "rare", f"r{i}", "s") for i in range(20))
     sd = np.ones(20)
     sd[10] = 0.0
-    null = Null(keys, np.zeros(20), sd, np.full(20, 0.1), 12)
+    null = Null(keys, np.zeros(20), sd, np.full(20, 0.1), 12, 11)
     twins = np.random.default_rng(0).standard_normal((200, 20)) * np.where(np.arange(20) < 10, 1.0, 5.0)
     spread = spread_of(null, twins)
     print(spread.round(2))
@@ -162,7 +164,7 @@ def drawn(count=40, twins=12, seed=0) -> Null:
     values = np.random.default_rng(seed).standard_normal((twins, count))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
     full = made_up(count=count, twins=twins)
-    return Null(full.keys, values.mean(axis=0), values.std(axis=0, ddof=1), full.floor, twins, draws=draws)
+    return Null(full.keys, values.mean(axis=0), values.std(axis=0, ddof=1), full.floor, twins, twins - 1, draws=draws)
 
 
 def test_the_noise_of_a_twin_cancels_against_the_nulls_of_the_same_draws():

@@ -24,7 +24,7 @@ def null() -> Null:
     values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
     keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
-    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, draws=draws)
+    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
 
 
 def law(fraction: float, tau_us: float) -> np.ndarray:

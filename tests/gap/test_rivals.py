@@ -17,7 +17,7 @@ def null(seed: int) -> Null:
     values = np.random.default_rng(seed).standard_normal((TWINS, COUNT))
     keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, draws=draws)
+    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
 
 
 def shown(n: Null, change: np.ndarray) -> Prediction:

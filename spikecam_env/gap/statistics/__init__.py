@@ -63,8 +63,12 @@ light labels to 2e-5, the first-order laws of noise to 1 %; counts, on the scale
 
 def floor_of(key: Key) -> float:
     """The least noise of a statistic, in its own unit."""
-    fitting = [n for g, n in FLOORS if g == key.group and key.name.startswith(n)]
-    return FLOORS[key.group, max(fitting, key=len)] if fitting else 0.0
+    return FLOORS.get(alike(key), 0.0)
+
+
+def alike(key: Key) -> tuple[str, str]:
+    """(group, start of the name) that a statistic has its floor in common by: the longest in FLOORS."""
+    return key.group, max((n for g, n in FLOORS if g == key.group and key.name.startswith(n)), key=len, default="")
 
 
 class Key(NamedTuple):
