@@ -71,8 +71,8 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Null:
-    """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns, kept in `draws`, or of the
-    pattern over as many drawn units.
+    """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns, the whole ones kept in
+    `draws`, or of the pattern over as many drawn units.
 
     floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  freedom: (S,) degrees of freedom
     of sd.  weight: (S,) how much each says of its own: what several recordings tell of one fixed pattern is told once.

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.case import Case, twins
-from spikecam_env.gap.compare import Null, null_of
+from spikecam_env.gap.compare import Null, null_of, values_of
 from spikecam_env.gap.fit import UNITS
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.settle import settled
@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 
 
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
-    """The prediction of `count` twins."""
+    """The prediction of `count` twins, and of recordings in motion as many again: of their statistics there is one of
+    a kind, and no other recording tells how much it varies (`moderate`)."""
     base = within(model, case.base)
     if case.scenes_only:  # too short for the closed law of jitter
         base = settled(model, base, case.base, [t.base for t in twins(case, model, base, range(50, 54)) if t.base])
@@ -31,6 +32,9 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
     made = twins(case, model, base, range(count))
     banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]
     null = null_of(banks, list(case.bank), [t.base for t in made if t.base])
+    moving = [i for i, c in enumerate(case.conditions) if c.moves and c.use == "fit"]
+    if moving:
+        null = surer(null, [t.bank for t in twins(case, model, base, range(count, 2 * count), moving)])
     values = np.array([[d.get(k, np.nan) for k in null.keys] for d in drawn])
     of_pattern = np.array([k.group == "pattern" for k in null.keys])
     return replace(
@@ -38,8 +42,21 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         mean=np.where(of_pattern, values.mean(axis=0), null.mean),
         sd=np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
         freedom=np.where(of_pattern, UNITS - 1, null.freedom),
-        twins=np.where(of_pattern, UNITS, count),
+        twins=np.where(of_pattern, UNITS, null.twins),
         weight=np.where(of_pattern, 1.0 / told(null.keys, case.conditions), 1.0),
+    )
+
+
+def surer(null: Null, more: Sequence[Mapping[Key, float]]) -> Null:
+    """The null with campaigns of some recordings more, where they have a statistic."""
+    values = np.array([*(d.values for d in null.draws), *(values_of(bank, null.keys) for bank in more)])
+    known = np.isfinite(values).all(axis=0)
+    return replace(
+        null,
+        mean=np.where(known, values.mean(axis=0), null.mean),
+        sd=np.where(known, values.std(axis=0, ddof=1), null.sd),
+        twins=np.where(known, len(values), null.twins),
+        freedom=np.where(known, len(values) - 1, null.freedom),
     )
 
 

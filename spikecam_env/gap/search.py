@@ -139,11 +139,14 @@ def compared(
     left = [n for n in names if n not in {e.name for e in turn.model.effects}]
     shapes = screen(templates, case.conditions, here, seen, left, line_of(case))
     distance = np.nan_to_num((seen - here.mean) / here.noise)
-    tried = worth_fitting(best_of_each(shapes), misfit(distance, here.weight), loud(here, distance))
+    tried = worth_fitting(shapes, misfit(distance, here.weight), loud(here, distance))
     unit = replace(case, base=turn.base)
     confirm = partial(confirmed, unit, turn.model, here, seen)
-    sure, rest = settle(fits_of(unit, turn.model, here, seen, turn.misfit, tried), confirm)
-    again = other_shapes(sure[0].name, shapes, turn.misfit) if sure else []
+    fits = fits_of(unit, turn.model, here, seen, turn.misfit, tried)
+    sure, rest = settle([f for f in fits if shows(here, f)], confirm)
+    rest = [*rest, *(f for f in fits if not shows(here, f))]
+    addable = bool(sure) and turn.misfit - sure[0].misfit > GAIN
+    again = [s for s in other_shapes(sure[0].name, shapes, turn.misfit) if s not in tried] if addable else []
     anew = settle(other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again), confirm)[0] if again else []
     if anew and anew[0].misfit < sure[0].misfit:
         sure[0] = anew[0]
@@ -154,9 +157,13 @@ def compared(
 def fits_of(
     case: Case, model: SensorModel, null: Null, seen: Array, before: float, starts: Sequence[Screened]
 ) -> list[Fit]:
-    """Candidates fitted from where their templates say; before: misfit of none."""
+    """Candidates fitted from where their templates say, each from the best of its starts; before: misfit of none."""
     with ThreadPoolExecutor(case.jobs) as pool:
-        fits = list(pool.map(partial(fit_from, case, model, null, seen), starts))
+        from_all = list(pool.map(partial(fit_from, case, model, null, seen), starts))
+        fits = [
+            min((f for f in from_all if f.name == name), key=lambda f: f.misfit)
+            for name in dict.fromkeys(f.name for f in from_all)
+        ]
         worth = worth_shaping(null, before, fits)
         better = list(pool.map(partial(shaped, case, model, null, seen), worth))
     return [*better, *(f for f in fits if f not in worth)]
@@ -329,21 +336,22 @@ def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
     return [s for i, s in enumerate(screened) if s.name not in {before.name for before in screened[:i]}]
 
 
-def worth_fitting(screened: Sequence[Screened], before: float, loud: Collection[str] = ()) -> list[Screened]:
+def worth_fitting(shapes: Sequence[Screened], before: float, loud: Collection[str] = ()) -> list[Screened]:
     """The best by their templates, FEWEST and those that explain half of what the best does; one that takes several
     twins a try is tried for that alone.  before: misfit of none.
 
     loud: groups of statistics that stand out.  Where the pattern does, with the two best of those that only change it,
-    whose statistics are not in proportion to their strength; where motion does, with all that show by it alone, whose
-    templates are of other pictures.
+    whose statistics are not in proportion to their strength; where motion does, with all that show by it alone, in
+    every shape: templates are of other pictures.
     """
+    screened = best_of_each(shapes)
     if not screened:
         return []
     half = before - 0.5 * (before - screened[0].misfit)
     worth = [s for s in screened if s.misfit < half or not (candidate(s.name).wanders or candidate(s.name).strikes)]
     tried = [s for i, s in enumerate(worth[:TRIED]) if i < FEWEST or s.misfit < half]
     also = [s for s in screened if is_pattern(s.name)][:2] if "pattern" in loud else []
-    also += [s for s in screened if of_motion(s.name)] if {"moving", "step"} & set(loud) else []
+    also += [s for s in shapes if of_motion(s.name)] if {"moving", "step"} & set(loud) else []
     return tried + [s for s in also if s not in tried]
 
 

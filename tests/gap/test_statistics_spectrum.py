@@ -12,7 +12,7 @@ CASES = [
     (effect("light_flicker", modulation=0.02, frequency_hz=400.0), "flat-0.65", ["line", "band 2"], ["dark", "rates"]),
     (effect("supply_ripple", ripple=0.002, frequency_hz=400.0), "flat-0.65", ["line", "band 2"], ["rates"]),
     (effect("common_threshold_noise", sigma_mV=3.0), "dark", ["band 7"], ["rates", "intervals"]),
-    (effect("clock_jitter", sigma_ns=2000.0), "flat-0.65", ["band 7"], ["step"]),
+    (effect("clock_jitter", sigma_ns=500.0), "flat-0.65", ["band 7"], ["step"]),
 ]
 
 

@@ -12,7 +12,7 @@ from spikecam_env.gap.candidates import NOISE_OF_A_RESET
 from spikecam_env.gap.compare import misfit, values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.screen import Screened, screen
-from spikecam_env.gap.search import best_of_each, worth_fitting
+from spikecam_env.gap.search import worth_fitting
 from spikecam_env.gap.templates import TIMES, load
 from spikecam_env.sensor import CATALOGUE
 
@@ -40,6 +40,15 @@ def test_the_best_are_tried_and_what_takes_many_twins_where_it_explains_half():
     assert names(screened[1:2]) == ["lamp_drift"] and worth_fitting([], 1000.0) == []
 
 
+def test_where_motion_stands_out_all_that_shows_by_it_is_tried_in_every_shape():
+    """A template of other bars may take the level from which light spills for another."""
+    shapes = [Screened("blooming", {"full": full}, 990.0, np.zeros(1)) for full in (0.85, 1.0, 0.75)]
+    screened = [Screened("clock_jitter", {}, 100.0, np.zeros(1)), *shapes]
+    tried = worth_fitting(screened, 1000.0, {"moving"})
+    assert [s.start for s in tried if s.name == "blooming"] == [s.start for s in shapes]
+    assert [s.start for s in worth_fitting(screened, 1000.0) if s.name == "blooming"] == [{"full": 0.85}]
+
+
 @pytest.mark.parametrize(
     "hidden",
     [
@@ -59,7 +68,7 @@ def test_screening_starts_near_the_truth_weak_or_severe(hidden):
     values = values_of(case.bank, null.keys)
     found = screen(load(), case.conditions, null, values, list(CATALOGUE))
     distance = np.nan_to_num((values - null.mean) / null.noise)
-    tried = worth_fitting(best_of_each(found), misfit(distance, null.weight))
+    tried = worth_fitting(found, misfit(distance, null.weight))
     [first] = [s for s in tried if s.name == hidden.name]
     key = type(hidden).strength
     assert first.start[key] == pytest.approx(hidden.parameters()[key], rel=0.6)
