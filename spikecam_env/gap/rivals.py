@@ -20,12 +20,14 @@ Array = NDArray[np.float64]
 DOUBT = 0.01
 """Chance of so large a lead below which a candidate is no rival."""
 
-
 LEAST = 6.0
 """Lead that tells nothing, whatever the draws say: a likelihood ratio of 20."""
 
 CLOSE = 2 * LEAST
 """Lead by which one may lose on some recordings to win on all: noise beside another effect is known from few twins."""
+
+CLEAR = 3.0
+"""Noises by which twins of two candidates have to differ for it to be their laws."""
 
 
 def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Prediction, other: Prediction) -> bool:
@@ -38,13 +40,22 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
     noise = noise - noise.mean(axis=0)
     scatter = noise.std(axis=0, ddof=1)
     noise *= np.maximum(null.sd / np.where(scatter > 0, scatter, np.inf), 1.0)
-    noise += np.sqrt(own_variance(null, other)) * np.random.default_rng(len(noise)).standard_normal(noise.shape)
+    middle, own2 = likely(null, *(rescaled(null, measured, p) for p in (best, other)))
+    noise += np.sqrt(own2) * np.random.default_rng(len(noise)).standard_normal(noise.shape)
     known = np.isfinite(measured)
-    middle = rescaled(null, measured, other).mean
     by_chance = [lead(null, np.where(known, middle + n, np.nan), best, other) for n in noise]
     above = observed - np.mean(by_chance)
     sd = np.std(by_chance, ddof=1) * np.sqrt(1 + 1 / len(noise))
     return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > DOUBT)
+
+
+def likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:
+    """((S,) what `other` most likely gives, (S,) the variance of that): where twins of the two do not clearly differ,
+    both tell it.  Its own chance, taken for its law, would be held against it."""
+    apart, own2, others2 = best.mean - other.mean, own_variance(null, other), own_variance(null, best)
+    both2 = np.maximum(own2 + others2, 1e-300)
+    share = np.where(np.abs(apart) > CLEAR * np.sqrt(both2), 0.0, own2 / both2)
+    return other.mean + share * apart, (1.0 - share) * own2
 
 
 def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
