@@ -30,6 +30,7 @@ from spikecam_env.gap.compare import (
 )
 from spikecam_env.gap.confirm import confirmed, of_any_dark, rejoined, resettled
 from spikecam_env.gap.fit import Fit, fit
+from spikecam_env.gap.opposed import PAIR, opposed
 from spikecam_env.gap.polish import Errors, polished
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
@@ -122,7 +123,37 @@ def search(
         if is_little(turn, turn.fits[0].misfit, chance, len(rounds) > 1):
             break
     rho, left_over = judged(null, seen, prediction)
-    return [*rounds, Round(now, base, prediction, rho, left_over)]
+    last = Round(now, base, prediction, rho, left_over)
+    return cancelling(case, model, null, seen, values, names, [*rounds, last]) or [*rounds, last]
+
+
+def cancelling(
+    case: Case, model: SensorModel, null: Null, seen: Array, values: Array, names: Sequence[str], rounds: list[Round]
+) -> list[Round]:
+    """Rounds that find two bends that cancel, where those of the search leave something and began with a bend; empty
+    where the two leave no less."""
+    first, last = rounds[0], rounds[-1]
+    bends = {candidate(name).family for name in (*PAIR, "synchronous_reset")}
+    if not first.fits or candidate(first.fits[0].name).family not in bends:
+        return []
+    if not alarmed(null, residual(null, values, last.prediction)):
+        return []
+    found = opposed(case, model, null, seen, names)
+    if found is None or found.misfit > last.misfit:
+        return []
+    found, errors, lent = polished(case, model, null, seen, values, found, PAIR)
+    if found.misfit > last.misfit - GAIN:
+        return []
+    one, other = (next(e for e in found.model.effects if e.name == name).parameters() for name in PAIR)
+    alone = replace(found, name=PAIR[0], parameters={"tau_us": one["tau_us"]}, sd=errors[PAIR[0]])
+    found = replace(found, parameters={"beta": other["beta"]}, sd=errors[PAIR[1]])
+    between = replace(first, model=found.model.without(PAIR[1]), fits=(found,), rivals=(), lent=lent)
+    rest = [f for f in first.fits if f.name != PAIR[0]]
+    return [
+        replace(first, fits=(alone, *rest), rivals=()),
+        between,
+        Round(found.model, found.base, found.prediction, found.rho, found.misfit),
+    ]
 
 
 def compared(
@@ -342,7 +373,7 @@ def worth_fitting(shapes: Sequence[Screened], before: float, loud: Collection[st
 
     loud: groups of statistics that stand out.  Where the pattern does, with the two best of those that only change it,
     whose statistics are not in proportion to their strength; where motion does, with all that show by it alone, in
-    every shape: templates are of other pictures.
+    every shape that promises anything: templates are of other pictures.
     """
     screened = best_of_each(shapes)
     if not screened:
@@ -351,7 +382,8 @@ def worth_fitting(shapes: Sequence[Screened], before: float, loud: Collection[st
     worth = [s for s in screened if s.misfit < half or not (candidate(s.name).wanders or candidate(s.name).strikes)]
     tried = [s for i, s in enumerate(worth[:TRIED]) if i < FEWEST or s.misfit < half]
     also = [s for s in screened if is_pattern(s.name)][:2] if "pattern" in loud else []
-    also += [s for s in shapes if of_motion(s.name)] if {"moving", "step"} & set(loud) else []
+    if {"moving", "step"} & set(loud):
+        also += [s for s in shapes if of_motion(s.name) and (s in screened or s.misfit < before - LEAST)]
     return tried + [s for s in also if s not in tried]
 
 
