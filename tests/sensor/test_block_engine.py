@@ -91,6 +91,21 @@ def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.
         np.testing.assert_array_equal(other, streams[0])
 
 
+@pytest.mark.parametrize("shape", [(2, 2500), (3, 1021), (25, 100)])
+@pytest.mark.parametrize("name", ["crosstalk", "ir_drop", "incomplete_reset", "dead_time"])
+def test_rows_wider_than_a_band_and_bands_of_rows_have_the_bits_of_the_reference(
+    name: str, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spikecam_env.sensor.kernels.fast._WORTH_A_THREAD", 1)
+    model = with_effects("ideal", CATALOGUE[name](**MODERATE.get(name, {})))
+    light = np.random.default_rng(0).uniform(0.0, 2.5, shape).astype(np.float32)
+    expected = SpikeSensor(model, shape, 1, "reference").step(light, 60)
+    assert not np.array_equal(expected, SpikeSensor("ideal", shape, 1, "reference").step(light, 60))
+    for threads in (1, 2):
+        sensor = SpikeSensor(model, shape, 1, "fast", threads=threads)
+        np.testing.assert_array_equal(np.concatenate([sensor.step(light, 37), sensor.step(light, 23)]), expected)
+
+
 @dataclass(frozen=True)
 class Blinking(Effect):
     """A user's own effect, of hooks for blocks alone."""
