@@ -47,9 +47,11 @@ def expose(
     light = condition.light
     assert light is not None
     picture: Keyframes | NDArray[np.float32] = light.radiance[0] if not condition.moves else light
+    spikes = np.empty((min(_BLOCK, condition.frames), *shape), np.uint8)
     parts = []
     for first in range(0, condition.frames, _BLOCK):
-        parts.append(pack_frames(sensor.step(picture, min(_BLOCK, condition.frames - first))))
+        frames = min(_BLOCK, condition.frames - first)
+        parts.append(pack_frames(sensor.step(picture, frames, out=spikes[:frames])))
     return np.concatenate(parts)
 
 

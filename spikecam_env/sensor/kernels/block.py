@@ -31,8 +31,9 @@ from spikecam_env.sensor.unit import Unit
 _BLOCK = 1 << 22
 """Pixel-steps of a block, at most: what differs from pixel to pixel and frame to frame then takes 32 megabytes."""
 
-_MOVING = 1 << 18
-"""Where light moves, since a dozen such arrays are then made of it: two megabytes each, which a cache holds."""
+_MOVING = 1 << 16
+"""Where light moves, since a dozen such arrays are then made of it: half a megabyte each, which a cache holds and the
+allocator keeps; fresh pages cost up to four times the arithmetic."""
 
 _FEWEST = 8
 """Frames of a block, even of a large array: what a block costs besides is shared by so many."""
