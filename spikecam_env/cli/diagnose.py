@@ -33,6 +33,8 @@ class Diagnose:
     """Of every simulation; the same seed gives the same result."""
     jobs: int = 1
     """Simulations at a time."""
+    effort: float = 60.0
+    """Times the campaign may be simulated before nothing more is begun that an answer can do without; inf: no end."""
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder
@@ -43,6 +45,8 @@ class Diagnose:
             raise InputError(f"--jobs {self.jobs}: it must be 1 or more")
         if not (self.campaign / "campaign.json").is_file():
             raise InputError(f"{self.campaign} is no campaign: there is no campaign.json in it")
+        if not self.effort > 0:
+            raise InputError(f"--effort {self.effort:g}: it must be above 0")
         SensorModel.load(self.model)
         self._known_effects()
         from spikecam_env.gap.diagnose import diagnose
@@ -56,6 +60,7 @@ class Diagnose:
                 exclude=self.exclude,
                 seed=self.seed,
                 jobs=self.jobs,
+                effort=self.effort,
                 progress=True,
             )
             diagnosis.write(folder)

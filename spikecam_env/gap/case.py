@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.observe import Observation
 from spikecam_env.gap.refit import BaseFit, measured_base
 from spikecam_env.gap.scene import simulate_seen
@@ -24,7 +25,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Case:
-    """conditions, observations: of the measurement.  base: its free refit.  bank: its statistics."""
+    """conditions, observations: of the measurement.  base: its free refit.  bank: its statistics.
+
+    effort: what was simulated for it, by all that was made of it.
+    """
 
     shape: tuple[int, int]
     conditions: tuple[Shown, ...]
@@ -35,6 +39,7 @@ class Case:
     seed: int
     jobs: int = 1
     frame_rate_hz: float = 40_000.0
+    effort: Effort = field(default_factory=Effort, compare=False)
 
     @property
     def scenes_only(self) -> bool:
@@ -96,6 +101,7 @@ def twins(
 
 def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None) -> Twin:
     which = range(len(case.conditions)) if only is None else only
+    case.effort.spent.append(len(which))
     conditions = [case.conditions[i] for i in which]
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)

@@ -31,6 +31,7 @@ from spikecam_env.gap.compare import (
     of_all_recordings,
     values_of,
 )
+from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.maps import diagnose_maps
@@ -44,7 +45,7 @@ from spikecam_env.gap.screen import bounds
 from spikecam_env.gap.search import Round, of_fit, search
 from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.verdict import concluded, grounded, harmless
-from spikecam_env.gap.words import sentence
+from spikecam_env.gap.words import sentence, unfinished
 from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
 
@@ -62,6 +63,7 @@ def diagnose(
     exclude: Sequence[str] = (),
     seed: int = 0,
     jobs: int = 1,
+    effort: float = CAMPAIGNS,
     twin_count: int = 12,
     templates: Templates | None = None,
     progress: bool = True,
@@ -70,9 +72,12 @@ def diagnose(
 
     campaign: a folder in the format spikecam-campaign/1.  model: a SensorModel, a preset's name or a TOML path.
     candidates: names to try, default the whole catalogue; exclude: names to leave out.  Same seed, same answer.
-    jobs: threads.  Raises InputError for an unreadable campaign, an unknown name, or too few static recordings
-    of known light to refit the unit by.
+    jobs: threads.  effort: times the campaign may be simulated before nothing more is begun that an answer can do
+    without, such as a third effect; infinite for whatever it takes.  Raises InputError for an unreadable campaign, an
+    unknown name, no effort, or too few static recordings of known light to refit the unit by.
     """
+    if not effort > 0:
+        raise InputError(f"effort {effort:g}: it must be above 0")
     stages: dict[str, float] = {}
     timed = _stages(stages, progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
@@ -83,6 +88,7 @@ def diagnose(
         "model_name": assumed.name if isinstance(model, SensorModel) else str(model),
         "candidates": None if candidates is None else tuple(candidates),
         "exclude": tuple(exclude),
+        "effort": effort,
         "stages": stages,
     }
     if not any(r.spikes for r in measured.recordings):
@@ -95,6 +101,7 @@ def diagnose(
     with timed("audit"):
         contradictions = upheld(case, assumed, audit(case))
         case = trimmed(case, contradictions)
+        case = replace(case, effort=Effort(effort * len(case.conditions)))
     names, untestable = testable(names, case.conditions)
     lacking = missing(case, assumed, names)
     start = assumed
@@ -134,6 +141,8 @@ def diagnose(
         gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
         evidence=evidence,
+        data=(*found.data, *unfinished(case.effort)),
+        simulated=case.effort.simulated,
         **asked,  # type: ignore[arg-type]
     )
     return replace(found, sentence=sentence(found))

@@ -43,6 +43,8 @@ def polished(
     sure = replace(sharp, prediction=replace(sharp.prediction, error=error))
     if leaves_nothing(null, values, sharp.prediction) or not leaves_nothing(null, values, sure.prediction):
         return sure, errors, False
+    if not case.effort.allows("parameters that the recordings held out tell"):
+        return sure, errors, False
     whole, known, _ = _refined(case, model, null, values, sharp, names)
     if not agree(sharp, whole, errors):
         return sure, errors, False

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.gap import plots
+from spikecam_env.gap.effort import CAMPAIGNS
 from spikecam_env.gap.evidence import Maps, shape_of
 from spikecam_env.gap.exhibits import LOUD, Exhibit, by_loudness, exhibits
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, NamedEffect
@@ -435,6 +436,8 @@ def _reproduce(d: Diagnosis) -> Iterator[str]:
     )
     rows = [(name, f"{seconds:.1f}") for name, seconds in d.stages.items()]
     yield table(("stage", "seconds"), [*rows, ("all", f"{sum(d.stages.values()):.1f}")], numbers=(1,))
+    if d.simulated:
+        yield element("p", f"{d.simulated} recordings were simulated to find this.")
 
 
 def command_of(d: Diagnosis) -> str:
@@ -444,6 +447,8 @@ def command_of(d: Diagnosis) -> str:
         words.append(f"--candidates {' '.join(d.candidates)}")
     if d.exclude:
         words.append(f"--exclude {' '.join(d.exclude)}")
+    if d.effort != CAMPAIGNS:
+        words.append(f"--effort {d.effort:g}")
     return " ".join(words)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.effort import CAMPAIGNS
 from spikecam_env.gap.observe import Observation
 from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.world import Shown
@@ -140,7 +141,8 @@ class Diagnosis:
     """The answer.  patched: the model with what was found, or with an empirical patch; loads back as a model.
 
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
-    candidates, exclude: as asked for; None: all of the catalogue.
+    candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
+    simulated.  simulated: recordings that were, but for the page's own.
     """
 
     verdict: str
@@ -163,6 +165,8 @@ class Diagnosis:
     candidates: tuple[str, ...] | None = None
     exclude: tuple[str, ...] = ()
     evidence: Evidence | None = field(default=None, repr=False)
+    simulated: int = 0
+    effort: float = CAMPAIGNS
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
@@ -193,6 +197,7 @@ class Diagnosis:
             "model": self.model_name,
             "campaign": self.campaign,
             "seed": self.seed,
+            "simulated": self.simulated,
             "stages_s": self.stages,
             "elapsed_s": sum(self.stages.values()),
         }

@@ -109,6 +109,8 @@ def search(
         rho = residual(null, seen, prediction)
         if rounds and not alarmed(null, rho) and not alarmed(null, residual(null, values, prediction)):
             break
+        if len(rounds) > 1 and not case.effort.allows("a third effect"):
+            break
         here = standing_on(null, prediction)
         left_over = judged(here, seen, here.prediction)[1]
         turn = compared(case, null, here, seen, values, names, templates, Round(now, base, prediction, rho, left_over))
@@ -136,7 +138,7 @@ def cancelling(
     bends = {candidate(name).family for name in (*PAIR, "synchronous_reset")}
     if not first.fits or candidate(first.fits[0].name).family not in bends:
         return []
-    if not alarmed(null, residual(null, values, last.prediction)):
+    if not alarmed(null, residual(null, values, last.prediction)) or not case.effort.allows("two that cancel"):
         return []
     found = opposed(case, model, null, seen, names)
     if found is None or found.misfit > last.misfit:
@@ -178,6 +180,8 @@ def compared(
     rest = [*rest, *(f for f in fits if not shows(here, f))]
     addable = bool(sure) and turn.misfit - sure[0].misfit > GAIN
     again = [s for s in other_shapes(sure[0].name, shapes, turn.misfit) if s not in tried] if addable else []
+    if again and not case.effort.allows(f"{sure[0].name} of another shape"):
+        again = []
     anew = settle(other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again), confirm)[0] if again else []
     if anew and anew[0].misfit < sure[0].misfit:
         sure[0] = anew[0]
@@ -238,8 +242,8 @@ def joined(
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
     last = replace(last, fits=(best, *last.fits[1:]), lent=lent)
-    if before and alarmed(null, best.rho):
-        for other in instead_of(last, names):
+    for other in instead_of(last, names) if before and alarmed(null, best.rho) else []:
+        if case.effort.allows(f"others in place of {names[-1]}"):
             tried, known, all_told = polished(case, model, null, seen, values, other, [*names[:-1], other.name])
             if tried.misfit < best.misfit - LEAST:
                 rest = [f for f in last.fits if f.name != other.name]
@@ -330,7 +334,7 @@ def revisited(
     least = turn.misfit - NEAR * (turn.misfit - first.misfit)
     has = {e.name for e in best.model.effects}
     others = sorted((f for f in turn.fits if f.name not in has and f.misfit < least), key=lambda f: f.misfit)[:RETRIED]
-    if not others:
+    if not others or not case.effort.allows(f"others in place of {first.name}"):
         return best, turn
     rest = best.model.without(first.name)
     alone = confirmed(case, model, null, seen, resettled(case, null, best, rest))

@@ -7,6 +7,7 @@ import inspect
 import math
 
 from spikecam_env.errors import InputError
+from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.catalogue_page import Sheet
@@ -92,6 +93,12 @@ LENT = (
     "the gap on them is a fit, and no check."
 )
 """A note on the data of a diagnosis: where the recordings to fit left something open."""
+
+
+def unfinished(effort: Effort) -> list[str]:
+    """A note on what was not begun because enough had been simulated; none where nothing was left out."""
+    left_out = _joined([human(what) for what in effort.left_out], "and")
+    return [f"After {effort.simulated} simulated recordings not looked for: {left_out}."] if left_out else []
 
 
 def gap_line(gap: Gap) -> str:

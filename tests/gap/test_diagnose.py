@@ -13,6 +13,7 @@ from small import DESIGN, FRAMES, MODEL, SHAPE, effect
 from spikecam_env.errors import InputError
 from spikecam_env.gap import Bars, Flat, Step, read_campaign, write_campaign
 from spikecam_env.gap.diagnose import diagnose, read_case
+from spikecam_env.gap.report import command_of
 from spikecam_env.gap.result import VERDICTS, Diagnosis
 from spikecam_env.sensor import SensorModel
 
@@ -26,7 +27,7 @@ KEYS = {
     "format": str, "verdict": str, "sentence": str, "effects": list, "unknown": (dict, type(None)),
     "class": (dict, type(None)), "parameters": dict, "data": list, "gap": (dict, type(None)), "discrepancies": list,
     "not_testable": list, "bounds": list, "ranking": list, "model": str, "campaign": str, "seed": int,
-    "stages_s": dict, "elapsed_s": float,
+    "simulated": int, "stages_s": dict, "elapsed_s": float,
 }  # fmt: skip
 
 
@@ -149,6 +150,18 @@ def test_json_has_the_documented_entries(which, request, tmp_path):
 def test_the_same_seed_gives_the_same_answer(lagging, only):
     again = asked(lagging, candidates=ONLY)
     assert again.to_json() | {"stages_s": 0, "elapsed_s": 0} == only.to_json() | {"stages_s": 0, "elapsed_s": 0}
+
+
+def test_what_was_simulated_is_counted(only, nothing):
+    assert only.simulated > nothing.simulated >= FEW * len(DESIGN)
+    assert not any("not looked for" in note for note in only.data), "the default is enough for one effect"
+    assert "--effort" not in command_of(only)
+    assert command_of(replace(only, effort=5.0)).endswith("--effort 5")
+
+
+def test_no_effort_is_refused(clean):
+    with pytest.raises(InputError, match="effort 0"):
+        asked(clean, effort=0)
 
 
 def test_threads_change_nothing(clean, nothing):

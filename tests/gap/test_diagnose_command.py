@@ -40,7 +40,7 @@ def test_it_writes_three_files_and_prints_verdict_parameters_and_gap(campaign: P
         assert said in printed
     wanted = {
         "campaign": campaign, "model": "scsim", "candidates": ("photodiode_lag", "dead_time"),
-        "exclude": ("crosstalk",), "seed": 7, "jobs": 2, "progress": True,
+        "exclude": ("crosstalk",), "seed": 7, "jobs": 2, "effort": 60.0, "progress": True,
     }  # fmt: skip
     assert wanted == made_up.ASKED
 
@@ -61,6 +61,7 @@ def test_a_terminal_is_told_the_verdict_and_what_was_found(verdict: str) -> None
         (["--candidates", "dead_tim"], "'dead_tim'"),
         (["--exclude", "lag"], "'lag'"),
         (["--jobs", "0"], "--jobs 0"),
+        (["--effort", "0"], "--effort 0"),
     ],
 )
 def test_what_is_wrong_ends_in_one_line(options, message: str, campaign: Path, tmp_path: Path, capsys) -> None:

@@ -1,0 +1,45 @@
+"""What is not begun once enough has been simulated, and that it is said."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from spikecam_env.cli.diagnose import Diagnose
+from spikecam_env.gap.effort import CAMPAIGNS, Effort
+from spikecam_env.gap.search import revisited
+from spikecam_env.gap.words import unfinished
+
+
+def test_nothing_is_left_out_while_there_is_less_than_the_most():
+    effort = Effort(20, [13, 6])
+    assert effort.allows("a third effect") and effort.simulated == 19
+    assert effort.left_out == [] and unfinished(effort) == []
+
+
+def test_what_is_left_out_is_said_once():
+    effort = Effort(20, [13, 7])
+    assert not effort.allows("a third effect") and not effort.allows("a third effect")
+    assert not effort.allows("photodiode_lag of another shape")
+    assert unfinished(effort) == [
+        "After 20 simulated recordings not looked for: a third effect and photodiode lag of another shape."
+    ]
+
+
+def test_without_a_most_there_is_no_end():
+    assert Effort(math.inf, [10**9]).allows("a third effect")
+
+
+def test_runners_up_are_not_tried_anew_when_enough_was_simulated():
+    fits = tuple(SimpleNamespace(name=name, misfit=misfit) for name, misfit in (("blooming", 10.0), ("ir_drop", 20.0)))
+    turn = SimpleNamespace(misfit=100.0, fits=fits)
+    best = SimpleNamespace(model=SimpleNamespace(effects=()))
+    case = SimpleNamespace(effort=Effort(0))
+    assert revisited(case, None, None, None, None, best, turn) == (best, turn)
+    assert case.effort.left_out == ["others in place of blooming"]
+
+
+def test_the_command_asks_for_what_the_function_does():
+    assert Diagnose.__dataclass_fields__["effort"].default == pytest.approx(CAMPAIGNS)
