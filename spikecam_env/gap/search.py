@@ -117,8 +117,11 @@ def search(
         rounds.append(turn)
         if not turn.fits or left_over - turn.fits[0].misfit < GAIN or not shows(here, turn.fits[0]):
             break
-        rounds = joined(case, model, null, seen, values, rounds, chance)
-        best = rounds[-1].fits[0]
+        together = joined(case, model, null, seen, values, rounds, chance)
+        best = together[-1].fits[0]
+        if judged(null, seen, prediction)[1] - best.misfit < GAIN:
+            break
+        rounds = together
         now, base, prediction = best.model, best.base, best.prediction
         if prediction.own is not None:
             prediction = of_any_dark(case, now, base, null, prediction)

@@ -11,6 +11,7 @@ from small import MODEL, effect, recorded, unit
 
 from spikecam_env.gap import search
 from spikecam_env.gap.compare import Draw, Null, Prediction, judged
+from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.search import PROMISE, Round, chosen_of, instead_of, joined, revisited, settle
@@ -18,6 +19,7 @@ from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.verdict import explains, harmless
 
 COUNT, TWINS = 200, 12
+DEAD_TIME = effect("dead_time", tau_us=0.2)
 FIT = np.arange(COUNT) < 150
 """Statistics of the recordings to fit; the others are held out."""
 
@@ -215,3 +217,21 @@ def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
         end = Round(patched, unit(), found.prediction, found.rho, found.misfit)
         after = harmless(case, n, values, [replace(start, fits=(found,)), end])
         assert (after[-1].model is patched) == kept and len(after) == 2 and after[-1].fits == ()
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, monkeypatch):
+    n, effect, values, _ = campaign()
+    found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
+    faded = replace(found, prediction=n.prediction, misfit=judged(n, values, n.prediction)[1])
+    case = SimpleNamespace(base=unit(), use=lambda _: "fit", effort=Effort())
+
+    def polished(*given):
+        *before, last = given[5]
+        return [*before, replace(last, fits=(found if keeps else faded, *last.fits[1:]))]
+
+    monkeypatch.setattr(search, "compared", lambda *given: replace(given[-1], fits=(found,)))
+    monkeypatch.setattr(search, "joined", polished)
+    monkeypatch.setattr(search, "cancelling", lambda *_: [])
+    rounds = search.search(case, MODEL, n, values, [], None)
+    assert rounds[-1].model is (found.model if keeps else MODEL)

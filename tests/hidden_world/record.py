@@ -13,7 +13,7 @@ from typing import Any
 from tests.hidden_world.keys import write_whole
 from tests.hidden_world.trial import is_done
 
-SAID = ("verdict", "effects", "unknown", "class", "parameters", "data", "not_testable")
+SAID = ("verdict", "effects", "unknown", "class", "parameters", "data", "not_testable", "simulated")
 """Entries of a diagnosis that are kept; of its gap, all but those by recording."""
 
 
