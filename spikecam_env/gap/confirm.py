@@ -12,7 +12,7 @@ from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, judged, scaled, size_of
 from spikecam_env.gap.fit import WANDER, Fit, as_seen, concerned, predict, twins_of, with_held_out, with_pattern
-from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.gap.refit import LINES, BaseFit, within
 from spikecam_env.gap.settle import HIDDEN, shifted
 from spikecam_env.gap.strength import as_loud, with_effect
 from spikecam_env.gap.units import drawn
@@ -34,13 +34,13 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
     """The fit simulated with more draws, on the recordings held out as well."""
     added = [e.name for e in found.model.effects if e not in model.effects]
     predicted = null.prediction
-    if not (added and all(is_pattern(name) for name in added)):
+    if not (added and all(is_pattern(name) and name not in LINES for name in added)):
         only = concerned(case, added or [found.name], null, measured, found.prediction.mean - null.mean)
         count = max(count, *(WANDER if candidate(name).wanders else twins_of(name) for name in added), 1)
         there = with_held_out(case, only)
         loud, times = found, 1.0
         severe = found.base.white < HIDDEN * case.base.white
-        if len(added) == 1 and not severe:
+        if len(added) == 1 and not severe and not is_pattern(added[0]):
             loud, times = made_loud(case, model, null, measured, found, added[0])
         predicted = predict(case, loud.model, within(loud.model, loud.base), null, count, there)
         predicted = quietened(null, predicted, times) if times > 1.0 else predicted

@@ -26,7 +26,8 @@ RESPONSE = ("conversion_gain_spread", "bias_voltage_spread", "capacitor_spread",
 DARK = ("dark_current", "dark_current_spread", "dark_current_tail", "hot_pixels")
 DARK_PATTERN = (*DARK[1:], *RESPONSE)
 NOISE = ("shot_noise", "reset_noise", "excess_threshold_noise")
-
+LINES = ("row_fixed_pattern", "column_fixed_pattern")
+"""Offsets of the swing by row and column."""
 
 RESTLESS = 3.0
 """Times the median A_16 from which a pixel is left out of the jitter."""
@@ -128,7 +129,10 @@ def within(model: SensorModel, base: BaseFit) -> BaseFit:
 
 
 def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
-    """The unit to simulate: N as the model says and the rest of s^2 as reset noise; less is all shot noise."""
+    """The unit to simulate: N as the model says and the rest of s^2 as reset noise; less is all shot noise.
+
+    Both follow a pixel's swing, as its response lets expect it: N = N0 swing, kappa = sigma / swing.
+    """
     nominal = PixelArray.nominal(model.circuit, model.frame_rate_hz, shape)
     names = {e.name: e for e in model.effects}
     for name in NOISE:
@@ -140,12 +144,14 @@ def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
     if "reset_noise" not in names and "excess_threshold_noise" not in names:
         inverse = base.white if shot else 0.0
     inverse = min(inverse, base.white)
-    kappa = np.sqrt(max(base.white - inverse, 0.0))
-    electrons = np.full_like(law.electrons, 1.0 / inverse) if inverse > 0 else law.electrons
-    swing = law.swing_V * _swings(model, base.gain)
+    swing = _swings(model, base.gain)
+    reset = max(base.white - inverse, 0.0)
+    more = np.mean(inverse / swing + reset / swing**2) / base.white if base.white > 0 else 1.0
+    electrons = swing * more / inverse if inverse > 0 else law.electrons
+    kappa = np.sqrt(reset / more) / swing
     dark = less_traps(model, law, base.dark)
-    return replace(law, gain=base.gain, dark=dark, electrons=electrons, kappa=np.full_like(law.kappa, kappa),
-                   swing_V=swing, shot=inverse > 0)  # fmt: skip
+    return replace(law, gain=base.gain, dark=dark, electrons=electrons, kappa=kappa,
+                   swing_V=law.swing_V * swing, shot=inverse > 0)  # fmt: skip
 
 
 def unit_as_base(unit: Unit) -> BaseFit:
@@ -159,7 +165,9 @@ def _swings(model: SensorModel, gain: Array) -> Array:
     """(P,) swing of each pixel over nominal, as its response lets expect: of what makes pixels differ by the model, a
     share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less."""
     circuit, spreads = model.circuit, {e.name: e.parameters() for e in model.effects}
-    bias = spreads.get("bias_voltage_spread", {}).get("sigma_V", 0.0) / circuit.swing_V
+    offsets_V = [spreads.get("bias_voltage_spread", {}).get("sigma_V", 0.0)]
+    offsets_V += [1e-3 * spreads[name]["sigma_mV"] for name in LINES if name in spreads]
+    bias = float(np.linalg.norm(offsets_V)) / circuit.swing_V
     others = np.hypot(
         spreads.get("conversion_gain_spread", {}).get("sigma", 0.0),
         spreads.get("capacitor_spread", {}).get("sigma_fF", 0.0) / circuit.capacitance_fF,

@@ -164,3 +164,21 @@ def test_a_slow_pixel_has_as_much_larger_a_swing_as_slow_pixels_of_the_model_hav
     assert slopes[0] < -0.2 and slopes[1] == pytest.approx(slopes[0], abs=0.03)
     without = unit_of(MODEL.without("bias_voltage_spread"), unit_as_base(true), shape)
     assert np.ptp(without.swing_V) == 0.0
+
+
+@pytest.mark.parametrize("lines", [(), ("row_fixed_pattern",), ("column_fixed_pattern",)], ids=str)
+def test_noise_follows_the_swing_as_in_drawn_units_and_is_the_refits_in_the_mean(lines):
+    """Regressions on log gain: a fast pixel of a small swing has fewer electrons, and a millivolt is more to it."""
+    shape = (256, 256)
+    model = MODEL
+    for name in lines:
+        model = model.with_effect(effect(name, sigma_mV=100.0))
+    true = model.draw_unit(shape, 3)
+    base = unit_as_base(true)
+    law = unit_of(model, base, shape)
+    assert np.mean(1 / law.electrons + law.kappa**2) == pytest.approx(base.white, rel=1e-9)
+    x = np.log(true.gain / np.median(true.gain))
+    for what in ("electrons", "kappa"):
+        slopes = [np.polyfit(x, np.log(getattr(unit, what)), 1)[0] for unit in (true, law)]
+        print(what, slopes)
+        assert abs(slopes[0]) > 0.2 and slopes[1] == pytest.approx(slopes[0], abs=0.04)
