@@ -98,7 +98,7 @@ LENT = (
 def unfinished(effort: Effort) -> list[str]:
     """A note on what was not begun because enough had been simulated; none where nothing was left out."""
     left_out = _joined([human(what) for what in effort.left_out], "and")
-    return [f"After {effort.simulated} simulated recordings not looked for: {left_out}."] if left_out else []
+    return [f"To save time, not looked for: {left_out}. A larger --effort does."] if left_out else []
 
 
 def gap_line(gap: Gap) -> str:

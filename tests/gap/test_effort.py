@@ -24,7 +24,7 @@ def test_what_is_left_out_is_said_once():
     assert not effort.allows("a third effect") and not effort.allows("a third effect")
     assert not effort.allows("photodiode_lag of another shape")
     assert unfinished(effort) == [
-        "After 20 simulated recordings not looked for: a third effect and photodiode lag of another shape."
+        "To save time, not looked for: a third effect and photodiode lag of another shape. A larger --effort does."
     ]
 
 
