@@ -233,7 +233,8 @@ _STRUCTURE = {
     "where": "Where",
     "when": "When",
     "best_candidate": "Nearest candidate",
-    "worst_group": "Where that one fails",
+    "worst_group": "Statistics that are off most",
+    "groups": "Share of what is off, by statistics",
     "patch": "What the patched model holds",
 }
 
