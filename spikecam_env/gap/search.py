@@ -141,7 +141,7 @@ def cancelling(
     bends = {candidate(name).family for name in (*PAIR, "synchronous_reset")}
     if not first.fits or candidate(first.fits[0].name).family not in bends:
         return []
-    if not alarmed(null, residual(null, values, last.prediction)) or not case.effort.allows("two that cancel"):
+    if not alarmed(null, residual(null, values, last.prediction)):
         return []
     found = opposed(case, model, null, seen, names)
     if found is None or found.misfit > last.misfit:
