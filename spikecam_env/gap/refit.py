@@ -27,7 +27,7 @@ DARK = ("dark_current", "dark_current_spread", "dark_current_tail", "hot_pixels"
 DARK_PATTERN = (*DARK[1:], *RESPONSE)
 NOISE = ("shot_noise", "reset_noise", "excess_threshold_noise")
 LINES = ("row_fixed_pattern", "column_fixed_pattern")
-"""Offsets of the swing by row and column."""
+"""Offsets of the swing by row and column: they change how noisy pixels are, too, and not the pattern alone."""
 
 RESTLESS = 3.0
 """Times the median A_16 from which a pixel is left out of the jitter."""

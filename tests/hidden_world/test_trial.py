@@ -206,6 +206,20 @@ def test_gap_and_parameters_of_right_names():
     assert value["diagnoses within 120 s, threads: 1"].value == 0.0
 
 
+def test_times_are_printed_by_threads_where_these_differ():
+    case = case_of("strong", "dead_time")
+    diagnosis = {"verdict": "unknown", "effects": [], "gap": None}
+    one, two = (
+        score_case(key_of(case), {"diagnosis": diagnosis, "seconds": seconds, "threads": threads})
+        for seconds, threads in ((200.0, 1), (100.0, 2))
+    )
+    value = {f.what: f.value for f in figures([one, two])}
+    assert value["diagnoses within 120 s, threads: 1 and 2"] == 0.5
+    assert value["diagnoses within 120 s, threads: 2"] == 1.0
+    assert value["slowest diagnosis [s], threads: 2"] == 100.0 and value["slowest diagnosis [s]"] == 200.0
+    assert "slowest diagnosis [s], threads: 1" not in {f.what for f in figures([one])}
+
+
 def test_a_share_of_a_gap_that_is_hardly_above_its_floor_is_not_scored():
     case = case_of("strong", "dead_time")
     gaps = [{"before": before, "floor": 1.0, "removed": 0.3} for before in (1.4, 1.6)]
