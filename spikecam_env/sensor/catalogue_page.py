@@ -163,9 +163,10 @@ cut, saved and restored; docs, bounds, twins that exist; and a test of your own,
 Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
 carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames,
 arrays of (frames, rows, columns), which the fast engine runs as they stand. A `Charge` keeps a picture and a number a
-frame apart: `light.scaled(numbers)` costs nothing a pixel, `Charge(f(light.values))` an array. What depends on the
-spikes is written frame by frame, `react`, `after_reset`, `spiked`, for the reference, and declared in `feedback` for
-the fast engine; without a declaration that engine refuses the effect by name and `engine="auto"` takes the reference.
+frame apart: `light.scaled(numbers)` costs nothing a pixel, `dark.plus(Few(pixels, charge))` only in these few, and
+`Charge(f(light.values))` an array. What depends on the spikes is written frame by frame, `react`, `after_reset`,
+`spiked`, for the reference, and declared in `feedback` for the fast engine; without a declaration that engine refuses
+the effect by name and `engine="auto"` takes the reference.
 
 What must be remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator
 of the effect's own, so that no other effect's draws change. What belongs to the unit (which pixels have a trap) `begin`

@@ -88,12 +88,20 @@ class Exposure:
         return (current_pA * 1e3 / self.frame_rate_hz / self.unit.threshold_fC).reshape(self.shape)
 
 
+class Few(NamedTuple):
+    """Charge of a few pixels: flat indices (n,), ascending, and what each gets in every frame (F, n) [thresholds]."""
+
+    pixels: NDArray[np.intp]
+    charge: Array
+
+
 @dataclasses.dataclass(frozen=True)
 class Charge:
     """Charge expected of every pixel in every frame of a block [thresholds]: pixels * factor, below zero as zero.
 
     pixels: (F, H, W), or (1, H, W) where all frames are alike.  factor: (F, 1, 1), (F, H, 1) or a number.
-    Two parts, so that what is common to all pixels costs a number a frame and not a picture.
+    few: what some of the pixels get besides, before the factor.
+    Three parts, so that what is common to all pixels, or is in few, costs a number a frame and not a picture.
     rise: as pixels, or 0: by how much more of it comes at a frame's end than at its start, a frame.  An effect that
     changes charge otherwise than by a factor may leave it out.
     """
@@ -101,15 +109,30 @@ class Charge:
     pixels: Array
     factor: Array | float = 1.0
     rise: Array | float = 0.0
+    few: Few | None = None
 
     def scaled(self, factor: Array | float) -> Charge:
         """This, times a number a frame or a row."""
-        return Charge(self.pixels, self.factor * factor, self.rise)
+        return Charge(self.pixels, self.factor * factor, self.rise, self.few)
+
+    def plus(self, few: Few) -> Charge:
+        """This, and what a few pixels get besides."""
+        if self._whole and self.few is None:
+            return Charge(self.pixels, 1.0, self.rise, few)
+        return Charge(self.values, 1.0, self.rises, few)
 
     @property
     def values(self) -> Array:
         """Multiplied out: (F, H, W), or (1, H, W) where all frames are alike."""
-        return self.pixels if self._whole else self.pixels * self.factor
+        pixels = self.pixels if self.few is None else self._with_few(self.few)
+        return pixels if self._whole else pixels * self.factor
+
+    def _with_few(self, few: Few) -> Array:
+        frames, (height, width) = len(few.charge), self.pixels.shape[1:]
+        all_frames = np.empty((frames, height * width))
+        all_frames[:] = self.pixels.reshape(-1, height * width)
+        all_frames[:, few.pixels] += few.charge
+        return all_frames.reshape(frames, height, width)
 
     @property
     def rises(self) -> Array:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Few, Stage, parameter
 
 
 class Traps(NamedTuple):
@@ -51,7 +51,5 @@ class RandomTelegraphNoise(Effect):
         leaves = -math.expm1(-2e3 / (self.dwell_ms * now.frame_rate_hz)) / 2.0
         switches = memory.rng.random((now.frames, memory.upper.size)) < leaves
         upper = np.logical_xor.accumulate(np.concatenate([memory.upper[None], switches]))[1:]
-        raised = np.empty((now.frames, *now.shape))
-        raised[:] = dark.values
-        raised.reshape(now.frames, -1)[:, memory.pixels] += memory.charge * upper
-        return light, Charge(raised), memory._replace(upper=upper[-1].copy())
+        raised = dark.plus(Few(memory.pixels, memory.charge * upper))
+        return light, raised, memory._replace(upper=upper[-1].copy())

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, having
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, Few, having
 from spikecam_env.sensor.kernels import block_loop, fast
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.kernels.threads import together
@@ -34,6 +34,8 @@ _BLOCK = 1 << 22
 _MOVING = 1 << 16
 """Where light moves, since a dozen such arrays are then made of it: half a megabyte each, which a cache holds and the
 allocator keeps; fresh pages cost up to four times the arithmetic."""
+
+_NOBODY = Few(np.empty(0, np.intp), np.empty((1, 0)))
 
 _FEWEST = 8
 """Frames of a block, even of a large array: what a block costs besides is shared by so many."""
@@ -192,11 +194,15 @@ def _block(
     light, dark = drive.expected_charge(now, effects, state.memory, mean, rise)
     law = drive.comparators(now, effects, state.memory)
     feedback = _sum([e.feedback(now) for e in effects])
+    light = light if light.few is None else Charge(light.values)
+    few = dark.few or _NOBODY
     work = (
         now.number,
         now.shape[1],
         _pixels(light),
         _pixels(dark),
+        few.pixels,
+        np.ascontiguousarray(few.charge),
         _rows(light.factor, now),
         _rows(dark.factor, now),
         np.ascontiguousarray(law.factor),

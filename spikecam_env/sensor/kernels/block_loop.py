@@ -69,6 +69,8 @@ def advance(  # type: ignore[no-untyped-def]
     columns,
     light,
     dark,
+    few,
+    extra,
     light_factor,
     dark_factor,
     factor,
@@ -90,9 +92,10 @@ def advance(  # type: ignore[no-untyped-def]
 ):
     """Frames `number` .. of the rows top .. bottom.  F frames, H rows of `columns` pixels, P pixels in all.
 
-    light, dark: (F or 1, P) [thresholds].  light_factor, dark_factor, factor, common [mV]: (F, H).  field: (F or 1, P)
-    float32 [mV].  grains_per_mV: (P,).  feedback: the numbers of `Feedback`, in its order.  per_electron (1/N),
-    kappa_squared: (P,).  polynomial: 8 float32.  seed_low, seed_high: uint32.
+    light, dark: (F or 1, P) [thresholds]; extra: (F, n), what the pixels few (n,), ascending, get in the dark besides.
+    light_factor, dark_factor, factor, common [mV]: (F, H).  field: (F or 1, P) float32 [mV].  grains_per_mV: (P,).
+    feedback: the numbers of `Feedback`, in its order.  per_electron (1/N), kappa_squared: (P,).  polynomial: 8 float32.
+    seed_low, seed_high: uint32.
     charge, threshold: (P,) [grains], fired: (P,) uint32, activity: (H,), crossing: (P,) [frames]; updated.
     spikes: (F, P) uint8, overwritten.  What is not said to be otherwise is float64.
     """
@@ -113,6 +116,8 @@ def advance(  # type: ignore[no-untyped-def]
     stood = np.empty((together, lines, 5))
     live = np.empty(BAND // GROUP, np.int64)
     around = np.empty(columns, np.uint8)
+    place = np.empty(few.size, np.int64)
+    few_of = np.empty(together + 1, np.int64)
     for line0 in range(0, row_of.size, together * lines):
         stop = min(line0 + together * lines, row_of.size)
         stood[:] = np.nan
@@ -128,6 +133,14 @@ def advance(  # type: ignore[no-untyped-def]
             copy(fired[p0 : p0 + n], words[_FIRED + h0 : _FIRED + h0 + n])
             for j in range(n):
                 words[_PIXEL + h0 + j] = _U(p0 + j)
+        for b in range(together + 1):
+            line = min(line0 + b * lines, stop) - 1
+            few_of[b] = np.searchsorted(few, pixel_of[line] + width_of[line] if b else pixel_of[line0])
+        line = line0
+        for i in range(few_of[0], few_of[together]):
+            while few[i] >= pixel_of[line] + width_of[line]:
+                line += 1
+            place[i] = slot_of[line] + few[i] - pixel_of[line]
         for t in range(frames):
             lights, darks, fields = light[t * light_moves], dark[t * dark_moves], field[t * field_moves]
             bits = spikes[t]
@@ -158,6 +171,11 @@ def advance(  # type: ignore[no-untyped-def]
                             x[_STANDS + h0 : _STANDS + h0 + n],
                             x[_LIMIT + h0 : _LIMIT + h0 + n],
                         )
+                for i in range(few_of[b], few_of[b + 1]):
+                    p = few[i]
+                    r = p // columns
+                    at_light, at_dark = lights[p] * light_factor[t, r], (darks[p] + extra[t, i]) * dark_factor[t, r]
+                    x[_ARRIVES + place[i]] = (max(at_light, 0.0) + max(at_dark, 0.0)) * _G
                 used = (end - begin) * pitch
                 collect(x[_HELD:], x[_ARRIVES:], x[_LIMIT:], used, hit)
                 groups = find_live(hit.view(np.uint64), (used + GROUP - 1) // GROUP, live)

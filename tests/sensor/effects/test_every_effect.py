@@ -16,7 +16,7 @@ from laws import camera, population, with_effects
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor, catalogue_page
 from spikecam_env.sensor.catalogue_page import SECTIONS, Sheet
-from spikecam_env.sensor.effects.base import Charge, Exposure
+from spikecam_env.sensor.effects.base import Charge, Exposure, Few
 from spikecam_env.sensor.kernels import block
 
 SHAPE = (10, 12)
@@ -129,6 +129,22 @@ def test_hooks_change_nothing_in_place_and_keep_shapes(name: str) -> None:
             assert all(a.shape == SHAPE and a.dtype == np.float64 for a in (limit, left))
             assert residual.shape == (fired.sum(),)
         number += frames
+
+
+def test_what_a_few_pixels_get_is_as_if_all_were_written_out() -> None:
+    """Beside charge that stays it is kept apart; beside charge that moves, or that others get too, it is added."""
+    rng, frames = np.random.default_rng(0), 3
+    still, moving = rng.random((1, *SHAPE)), rng.random((frames, *SHAPE))
+    few = Few(np.array([0, 3, SHAPE[1] + 1]), rng.random((frames, 3)))
+    besides = np.zeros((frames, *SHAPE))
+    besides.reshape(frames, -1)[:, few.pixels] = few.charge
+    factor = rng.random((frames, 1, 1))
+    apart = Charge(still).plus(few)
+    assert apart.pixels is still and np.array_equal(apart.values, still + besides)
+    assert np.array_equal(apart.scaled(factor).values, (still + besides) * factor)
+    assert np.array_equal(apart.plus(few).values, still + besides + besides)
+    assert np.array_equal(Charge(moving).plus(few).values, moving + besides)
+    assert np.array_equal(Charge(still, factor).plus(few).values, still * factor + besides)
 
 
 def test_state_of_a_model_with_other_effects_is_refused() -> None:
