@@ -179,13 +179,13 @@ def compared(
     unit = replace(case, base=turn.base)
     confirm = partial(confirmed, unit, turn.model, here, seen)
     fits = fits_of(unit, turn.model, here, seen, turn.misfit, tried)
-    sure, rest = settle([f for f in fits if shows(here, f)], confirm)
+    sure, rest = settle([f for f in fits if shows(here, f)], confirm, enough=turn.misfit - GAIN)
     rest = [*rest, *(f for f in fits if not shows(here, f))]
     addable = bool(sure) and turn.misfit - sure[0].misfit > GAIN
     again = [s for s in other_shapes(sure[0].name, shapes, turn.misfit) if s not in tried] if addable else []
     if again and not case.effort.allows(f"{sure[0].name} of another shape"):
         again = []
-    anew = settle(other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again), confirm)[0] if again else []
+    anew = [confirm(f) for f in other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again)]
     if anew and anew[0].misfit < sure[0].misfit:
         sure[0] = anew[0]
     sure, rivals = chosen_of(null, here, seen, values, sure)
@@ -215,11 +215,12 @@ def fit_from(case: Case, model: SensorModel, null: Null, seen: Array, start: Scr
 def other_ends(
     case: Case, model: SensorModel, null: Null, seen: Array, before: float, best: Fit, starts: Sequence[Screened]
 ) -> list[Fit]:
-    """The best candidate from its other shapes, where it removes ALIKE of what it does before they are fitted too."""
+    """The best candidate from the best of its other shapes, if any removes ALIKE of what it does before they are fitted
+    too; starts: none for none."""
     with ThreadPoolExecutor(case.jobs) as pool:
         fits = pool.map(partial(fit_from, case, model, null, seen), starts)
         alike = [f for f in fits if before - f.misfit > ALIKE * (before - best.misfit)]
-        return list(pool.map(partial(shaped, case, model, null, seen), alike))
+    return [shaped(case, model, null, seen, f) for f in sorted(alike, key=lambda f: f.misfit)[:1]]
 
 
 def is_little(turn: Round, left: float, chance: float, later: bool) -> bool:
@@ -286,11 +287,19 @@ def with_errors(turn: Round, errors: Errors) -> Round:
     return replace(turn, fits=(replace(best, sd=errors.get(best.name) or best.sd), *turn.fits[1:]))
 
 
-def settle(fits: Sequence[Fit], confirm: Callable[[Fit], Fit]) -> tuple[list[Fit], list[Fit]]:
+def settle(
+    fits: Sequence[Fit], confirm: Callable[[Fit], Fit], known: Sequence[Fit] = (), enough: float = np.inf
+) -> tuple[list[Fit], list[Fit]]:
     """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, two
-    at least, until one, as much better as that made the others, still stands PROMISE above the best."""
-    waiting, sure, better = sorted(fits, key=lambda f: f.misfit), list[Fit](), 0.0
-    while waiting and (len(sure) < 2 or waiting[0].misfit - better < min(f.misfit for f in sure) + PROMISE):
+    at least, until one, as much better as that made the others, still stands PROMISE above the best.
+
+    known: confirmed before.  enough: misfit that one has to come down to, for any to be worth it.
+    """
+    waiting, sure, better = sorted(fits, key=lambda f: f.misfit), list(known), 0.0
+    while waiting:
+        least, hope = min((f.misfit for f in sure), default=np.inf), waiting[0].misfit - better
+        if min(least, hope) > enough or (len(sure) > 1 and hope >= least + PROMISE):
+            break
         sure.append(confirm(waiting[0]))
         better = max(better, waiting.pop(0).misfit - sure[-1].misfit)
     return sorted(sure, key=lambda f: f.misfit), waiting
@@ -345,8 +354,8 @@ def revisited(
     with ThreadPoolExecutor(case.jobs) as pool:
         fits = list(pool.map(lambda f: fit(unit, rest, here, seen, f.name, f.parameters), others))
     confirm = partial(confirmed, unit, rest, here, seen)
-    sure = [confirm(replace(best, name=first.name)), *settle(fits, confirm)[0]]
-    sure, rivals = chosen_of(null, here, seen, values, sorted(sure, key=lambda f: f.misfit))
+    sure, _ = settle(fits, confirm, [confirm(replace(best, name=first.name))])
+    sure, rivals = chosen_of(null, here, seen, values, sure)
     name = sure[0].name
     order = sorted(turn.fits, key=lambda f: f.name != name)
     if name != first.name:

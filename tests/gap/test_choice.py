@@ -109,6 +109,30 @@ def test_fits_are_confirmed_until_one_stands_clear_above_the_best():
     assert asked == ["a", "b", "c"] and [f.name for f in sure] == ["a", "b", "c"] and [f.name for f in rest] == ["d"]
 
 
+def test_fits_that_promise_too_little_are_not_confirmed_unless_one_does_not():
+    """60 are enough.  Alone, 61 are not worth it; beside one confirmed at 55, those within PROMISE of it are."""
+    n, effect, _values, seen = campaign()
+    base = a_fit(n, "", effect, seen)
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 61.0), ("b", 66.0), ("c", 55.0 + PROMISE))]
+    best = replace(base, name="best", misfit=55.0)
+    sure, rest = settle(fits, lambda f: f, enough=60.0)
+    assert sure == [] and [f.name for f in rest] == ["a", "b", "c"]
+    sure, rest = settle([best, *fits], lambda f: f, enough=60.0)
+    assert [f.name for f in sure] == ["best", "a", "b"] and [f.name for f in rest] == ["c"]
+    disappointing = replace(best, misfit=75.0)
+    sure, rest = settle([best, *fits], lambda f: disappointing, enough=60.0)
+    assert [f.name for f in sure] == ["best"] and [f.name for f in rest] == ["a", "b", "c"], "as will the others"
+
+
+def test_one_confirmed_before_is_among_those_that_others_are_measured_by():
+    n, effect, _values, seen = campaign()
+    base = a_fit(n, "", effect, seen)
+    known = replace(base, name="known", misfit=10.0)
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 10.0 + PROMISE), ("b", 11.0 + PROMISE))]
+    sure, rest = settle(fits, lambda f: f, known=[known])
+    assert [f.name for f in sure] == ["known", "a"] and [f.name for f in rest] == ["b"]
+
+
 def test_what_is_left_may_be_little_beside_what_was_there():
     n = null()
     loud, calm = np.where(np.arange(COUNT) < 50, 100.0, 0.5), np.full(COUNT, 0.5)

@@ -61,7 +61,7 @@ def test_more_parameters_are_not_fitted_where_fewer_leave_nothing():
     assert worth_shaping(null(), before, [poor, replace(enough, rho=loud)]) == [], "removes next to nothing"
 
 
-def test_of_other_shapes_those_are_fitted_whole_that_remove_nearly_as_much():
+def test_of_other_shapes_the_best_is_fitted_whole_where_it_removes_nearly_as_much():
     """Lag of 1 ms from 0.6 and from 8 ms, where its strength alone removes most of what it does at 1 ms, or some."""
     case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
     measured = values_of(case.bank, null().keys)
