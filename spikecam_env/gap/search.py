@@ -181,13 +181,12 @@ def compared(
     fits = fits_of(unit, turn.model, here, seen, turn.misfit, tried)
     sure, rest = settle([f for f in fits if shows(here, f)], confirm, enough=turn.misfit - GAIN)
     rest = [*rest, *(f for f in fits if not shows(here, f))]
-    addable = bool(sure) and turn.misfit - sure[0].misfit > GAIN
-    again = [s for s in other_shapes(sure[0].name, shapes, turn.misfit) if s not in tried] if addable else []
-    if again and not case.effort.allows(f"{sure[0].name} of another shape"):
-        again = []
-    anew = [confirm(f) for f in other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again)]
-    if anew and anew[0].misfit < sure[0].misfit:
-        sure[0] = anew[0]
+    if sure and turn.misfit - sure[0].misfit > GAIN:
+        again = [s for s in other_shapes(sure[0].name, shapes, turn.misfit) if s not in tried]
+        if again and not case.effort.allows(f"{sure[0].name} of another shape"):
+            again = []
+        anew = [confirm(f) for f in other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again)]
+        sure[0] = min((sure[0], *anew), key=lambda f: f.misfit)
     sure, rivals = chosen_of(null, here, seen, values, sure)
     return replace(turn, fits=(*sure, *rest), rivals=rivals)
 
