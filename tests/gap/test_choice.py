@@ -124,6 +124,19 @@ def test_fits_that_promise_too_little_are_not_confirmed_unless_one_does_not():
     assert [f.name for f in sure] == ["best"] and [f.name for f in rest] == ["a", "b", "c"], "as will the others"
 
 
+def test_a_round_in_which_nothing_promises_enough_is_one_without_a_choice(monkeypatch):
+    n, _effect, values, seen = campaign()
+    poor = a_fit(n, "crosstalk", np.where(np.arange(COUNT) >= 150, 4.0, 0.0), seen)
+    rho, before = judged(n, seen, n.prediction)
+    assert poor.misfit == pytest.approx(before)
+    monkeypatch.setattr(search, "screen", lambda *_: [])
+    monkeypatch.setattr(search, "fits_of", lambda *_: [poor])
+    monkeypatch.setattr(search, "confirmed", lambda *_: pytest.fail("it was confirmed"))
+    turn = Round(MODEL, unit(), n.prediction, rho, before)
+    after = search.compared(recorded(), n, n, seen, values, [], {}, turn)
+    assert after.fits == (poor,) and after.rivals == ()
+
+
 def test_one_confirmed_before_is_among_those_that_others_are_measured_by():
     n, effect, _values, seen = campaign()
     base = a_fit(n, "", effect, seen)
