@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.refit import DARK, DARK_PATTERN, NOISE, RESPONSE
+from spikecam_env.gap.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common
 from spikecam_env.gap.units import width
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
@@ -51,7 +51,7 @@ def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missin
     spread = width(gain)
     if not has & set(RESPONSE) and spread > LEAST_WIDTH:
         add("conversion_gain_spread", spread, spread / count, ("bias_voltage_spread", "capacitor_spread"))
-    level = float(np.median(dark))
+    level = common(dark, case.base.dark_sd[live])
     error = float(np.median(case.base.dark_sd[live]))
     if not has & set(DARK) and level > 5 * error / count and fires_in_the_dark(case, level):
         add("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))

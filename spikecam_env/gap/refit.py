@@ -32,6 +32,9 @@ LINES = ("row_fixed_pattern", "column_fixed_pattern")
 RESTLESS = 3.0
 """Times the median A_16 from which a pixel is left out of the jitter."""
 
+ALIKE = 5.0
+"""Errors within which pixels do not differ."""
+
 RARE = 0.1
 """Share of pixels too silent or too bright in a recording, below which they are judged by no line: theirs rests on the
 other recordings alone, and where the response bends it is another line."""
@@ -122,10 +125,20 @@ def within(model: SensorModel, base: BaseFit) -> BaseFit:
     if not names & set(DARK):
         dark = np.zeros_like(dark)
     elif not names & set(DARK_PATTERN):
-        dark = np.full_like(dark, np.median(dark))
+        dark = np.full_like(dark, common(dark, base.dark_sd))
     if not names & set(NOISE):
         white = 0.0
     return replace(base, gain=np.maximum(gain, 0.0), dark=np.maximum(dark, 0.0), white=white)
+
+
+def common(values: Array, errors: Array) -> float:
+    """What all pixels have, where most differ by their errors alone: the mean of those; else the median.
+
+    Rates are read between whole frames, and alike pixels' lie on a lattice, of which a median is one step.
+    """
+    middle = np.median(values)
+    alike = np.abs(values - middle) <= ALIKE * errors
+    return float(values[alike].mean()) if alike.mean() > 0.5 else float(middle)
 
 
 def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:

@@ -12,6 +12,7 @@ from spikecam_env.gap.observe import Observation, observe
 from spikecam_env.gap.refit import BaseFit, unit_of
 from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
+from spikecam_env.sensor.light import GRAINS
 from spikecam_env.streams import pack_frames
 
 _BLOCK = 1024
@@ -34,7 +35,7 @@ def simulate(
     """
     unit = unit_of(model, base, shape)
     return [
-        observe(expose(model, unit, c, shape, seed, take), shape, film=c.moves)
+        observe(expose(model, between_grains(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
         for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
     ]
 
@@ -53,6 +54,17 @@ def expose(
         frames = min(_BLOCK, condition.frames - first)
         parts.append(pack_frames(sensor.step(picture, frames, out=spikes[:frames])))
     return np.concatenate(parts)
+
+
+def between_grains(unit: Unit, seed: int, take: int) -> Unit:
+    """A unit of pixels that are all alike, its dark level up to half a grain higher or lower, drawn for one recording.
+
+    The sensor counts charge in whole grains: relative to dim light, one is a hundred thousandth.  Where all pixels fire
+    alike and without noise, the beat with the read-out's clock shows what was rounded; drawn, it is no law.
+    """
+    if np.ptp(unit.gain) > 0 or unit.dark.min() < 1.0 / GRAINS:
+        return unit
+    return replace(unit, dark=unit.dark + np.random.default_rng([seed, take, 4]).uniform(-0.5, 0.5) / GRAINS)
 
 
 def at_any_phase(model: SensorModel, seed: int, take: int) -> SensorModel:

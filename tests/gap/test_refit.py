@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, effect, recorded, unit
 
-from spikecam_env.gap.refit import BaseFit, measured_base, unit_as_base, unit_of, within
+from spikecam_env.gap.refit import BaseFit, common, measured_base, unit_as_base, unit_of, within
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 PIXELS = SHAPE[0] * SHAPE[1]
@@ -182,3 +182,16 @@ def test_noise_follows_the_swing_as_in_drawn_units_and_is_the_refits_in_the_mean
         slopes = [np.polyfit(x, np.log(getattr(unit, what)), 1)[0] for unit in (true, law)]
         print(what, slopes)
         assert abs(slopes[0]) > 0.2 and slopes[1] == pytest.approx(slopes[0], abs=0.04)
+
+
+def test_what_all_pixels_have_is_the_mean_of_those_that_do_not_differ():
+    """Rates between whole frames lie on a lattice, of which their median is a step.  Hot pixels are left out."""
+    rng = np.random.default_rng(0)
+    level, step = 0.37, 1.0
+    lattice = np.floor(level + rng.random(4000)) * step  # 0 or 1, 0.37 on average
+    errors = np.full(4000, 0.5)
+    assert common(lattice, errors) == pytest.approx(level, abs=0.03) and np.median(lattice) == 0.0
+    hot = np.where(np.arange(4000) < 20, 1000.0, lattice)
+    assert common(hot, errors) == pytest.approx(level, abs=0.03)
+    spread = 100.0 * rng.standard_normal(4000)
+    assert common(spread, errors) == np.median(spread)

@@ -1,14 +1,19 @@
-"""The twin's waves start anywhere."""
+"""The twin's waves start anywhere, and its charge lies anywhere between whole grains."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from small import MODEL, SHAPE, unit
 
-from spikecam_env.gap.twin import FIRST, at_any_phase
+from spikecam_env.gap.refit import unit_of
+from spikecam_env.gap.twin import FIRST, at_any_phase, between_grains
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
+from spikecam_env.sensor.light import GRAINS
 
 PLAIN = SensorModel.preset("scsim")
 FLICKERING = PLAIN.with_effect(build(CATALOGUE, "light_flicker", {"modulation": 0.01}))
@@ -33,3 +38,16 @@ def test_of_four_twins_a_wave_has_no_mean_and_its_whole_scatter():
 
 def test_a_model_without_waves_is_left_alone():
     assert at_any_phase(PLAIN, 0, 0) == PLAIN
+
+
+def test_alike_pixels_are_not_known_better_than_the_sensor_counts():
+    """Up to half a grain of dark charge, another in every recording, the same in all pixels; spread pixels as given."""
+    every = np.ones(SHAPE[0] * SHAPE[1])
+    alike = replace(unit_of(MODEL, unit(), SHAPE), gain=0.8 * every, dark=3e-4 * every)
+    moved = [(between_grains(alike, 17, take).dark - alike.dark) * GRAINS for take in range(8)]
+    assert all(np.ptp(m) < 1e-6 and abs(m[0]) <= 0.5 for m in moved) and len({float(m[0]) for m in moved}) == 8
+    assert np.array_equal(between_grains(alike, 17, 3).dark, between_grains(alike, 17, 3).dark)
+    spread = replace(alike, gain=np.linspace(0.7, 0.9, alike.gain.size))
+    assert between_grains(spread, 17, 0) is spread
+    dark = replace(alike, dark=np.zeros(alike.gain.size))
+    assert between_grains(dark, 17, 0) is dark
