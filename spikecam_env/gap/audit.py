@@ -46,8 +46,9 @@ MOST_BINS = 25
 RELABELLED = 6
 """Twins by which a recording is judged under another label."""
 
-PASSES = 0.4
-"""Share of the largest lateness that may be left two and three intervals away from it, for a gap to be there."""
+OFTEN, PASSES = 0.9, 0.4
+"""Share of a recording in which lateness, away from the largest, has to stay below what share of that, for a gap to be
+there: two gaps are few of its frames, a flicker is many."""
 
 SEGMENTS = 8
 """Parts of a moving recording whose timing is compared."""
@@ -269,8 +270,8 @@ def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
 def _jump_steady(o: Observation) -> tuple[int, float] | None:
     """(frame, missing): intervals that span a gap are short by it; they end within an interval after it.
 
-    A gap of half an interval makes some of them odd, which are not timed, and lengthens the others.  Where those
-    two and three intervals away are off as well, it is light, or the dark, that changes.
+    A gap of half an interval makes some of them odd, which are not timed, and lengthens the others.  Where more is off
+    than two intervals on either side, it is light, or the dark, that changes; nearer to an end, it may be.
     """
     interval = o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9)
     window = int(np.clip(round(interval), 4, o.frames // 8))
@@ -278,9 +279,10 @@ def _jump_steady(o: Observation) -> tuple[int, float] | None:
     spread = 1.4826 * float(np.median(np.abs(total - np.median(total)))) + 1e-9
     at = int(np.argmax(np.abs(total)))
     mean = float(total[at] / max(timed[at], 1))
-    away = [total[i] for k in (-3, -2, 2, 3) if 0 <= (i := at + k * window) < total.size]
-    passes = abs(float(np.median(away))) < PASSES * abs(total[at])
-    if abs(total[at]) > 12 * spread and abs(mean) > 0.3 and passes:
+    elsewhere = np.delete(np.abs(total), slice(max(at - 2 * window, 0), at + 2 * window))
+    passes = float(np.quantile(elsewhere, OFTEN)) < PASSES * abs(total[at])
+    inside = 2 * window <= at < total.size - 2 * window
+    if abs(total[at]) > 12 * spread and abs(mean) > 0.3 and passes and inside:
         return at, -mean
     return None
 

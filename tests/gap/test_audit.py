@@ -146,6 +146,28 @@ def test_a_quick_drift_of_the_dark_is_no_gap_in_time():
     assert found(recorded(effect("dark_current_drift", rise=0.3, tau_ms=5.0))) == []
 
 
+def fired(rate, light):
+    """(F, H, W) spikes of pixels that fire at `rate` (H, W) a frame, in light (F,) times that, without noise."""
+    phase = np.random.default_rng(0).random(rate.shape) + np.cumsum(light)[:, None, None] * rate
+    return np.diff(np.floor(phase), axis=0, prepend=np.floor(phase[:1])).astype(np.uint8)
+
+
+@pytest.mark.parametrize("frequency_hz", [100.0, 137.0, 200.0, 300.0])
+def test_a_flicker_that_sets_in_half_way_is_no_gap_in_time(frequency_hz):
+    """Nothing is late before, and two and three intervals after its first trough its waves may cancel."""
+    spikes, frame = spikes_of(), np.arange(FRAMES)
+    for name in ("flat-0.03", "flat-0.2"):
+        wave = 0.04 * (frame > FRAMES // 2) * np.sin(2 * np.pi * frequency_hz / 40_000 * frame)
+        spikes[name] = fired(spikes[name].mean(axis=0), 1.0 + wave)
+    assert found(case_from(spikes)) == []
+
+
+def test_two_gaps_in_time_are_still_gaps():
+    spikes = spikes_of()
+    spikes["flat-0.2"] = np.delete(spikes["flat-0.2"], [700, 701, 1300, 1301], axis=0)
+    assert found(case_from(spikes)) == [("dropped", ("flat-0.2",))]
+
+
 def test_a_lit_recording_without_spikes_is_named():
     spikes = spikes_of()
     spikes["flat-0.2"][:] = 0
