@@ -7,6 +7,7 @@ is read off their scatter beyond chance.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,30 +30,43 @@ def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Ar
     """((S,) variances, (S,) degrees of freedom) from (S,) sample variances with `freedom` each.
 
     A statistic's kind is the same one of all recordings; how alike a kind's variances are is told by all kinds that
-    share a floor (`alike`).  What never varied, or is of one recording alone, stays as it is.
+    share a floor (`alike`), or, where that says more, how alike they are but for what a recording has in common: some
+    have more spikes to count than others.  What never varied, or is of one recording alone, stays as it is.
     """
     out, degrees = variances.copy(), np.full(len(keys), float(freedom))
-    kinds: dict[tuple[str, str], list[int]] = {}
+    several = Counter((k.group, k.name) for k, v in zip(keys, variances, strict=True) if v > 0)
+    families: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(keys):
-        if variances[i] > 0:
-            kinds.setdefault((key.group, key.name), []).append(i)
-    families: dict[tuple[str, str], list[list[int]]] = {}
-    for (group, name), of in kinds.items():
-        if len(of) > 1:
-            families.setdefault(alike(Key(group, "", name)), []).append(of)
+        if variances[i] > 0 and several[key.group, key.name] > 1:
+            families.setdefault(alike(key), []).append(i)
     logs = np.log(np.where(variances > 0, variances, 1.0)) - bias(freedom)
     chance = float(special.polygamma(1, freedom / 2))
-    for family in families.values():
-        known = sum(len(of) - 1 for of in family)
-        if known < FEWEST:
-            continue
-        scatter = sum(float(np.sum((logs[of] - logs[of].mean()) ** 2)) for of in family) / known
-        share = chance / max(scatter, chance)
-        joint = worth(chance * (1 - share))
-        for of in family:
-            out[of] = np.exp(share * logs[of].mean() + (1 - share) * logs[of] + bias(joint))
-            degrees[of] = joint
+    for of in families.values():
+        kinds, recordings = one_of_each([keys[i].name for i in of]), one_of_each([keys[i].recording for i in of])
+        found = [joined(logs[of], like, chance) for like in (kinds, np.hstack([kinds, recordings]))]
+        joint, doubt = min(found, key=lambda f: f[1])
+        if doubt < chance:
+            degrees[of] = worth(doubt)
+            out[of] = np.exp(joint + bias(degrees[of[0]]))
     return out, degrees
+
+
+def one_of_each(names: Sequence[str]) -> Array:
+    """(S, n) 1 where a statistic has that name."""
+    return np.array([[name == other for other in dict.fromkeys(names)] for name in names], dtype=np.float64)
+
+
+def joined(logs: Array, like: Array, chance: float) -> tuple[Array, float]:
+    """((S,) logarithms drawn to what those like them say, the variance of their error): `like` (S, n) says how they
+    are, chance is the variance of each by itself."""
+    fitted = like @ np.linalg.lstsq(like, logs)[0]
+    told = int(np.linalg.matrix_rank(like))
+    known = len(logs) - told
+    if known < FEWEST:
+        return logs, chance
+    scatter = float(np.sum((logs - fitted) ** 2)) / known
+    share = chance / max(scatter, chance)
+    return share * fitted + (1 - share) * logs, chance * (1 - share * known / len(logs))
 
 
 def bias(freedom: float) -> float:

@@ -24,6 +24,17 @@ def test_what_is_alike_in_all_recordings_is_known_much_better():
     assert abs(np.mean(np.log(found / true))) < 0.1
 
 
+def test_what_differs_by_recording_alone_is_known_better():
+    """Coincidences scatter as one over their number, which is a recording's."""
+    of_band, of_flat = np.geomspace(1.0, 50.0, 8), np.geomspace(1.0, 1e-4, 10)
+    true = np.outer(of_band, of_flat).ravel()
+    made = drawn(true, 7)
+    found, freedom = moderated(KEYS, made, FREEDOM)
+    assert np.std(np.log(found / true)) < 0.7 * np.std(np.log(made / true))
+    assert freedom.min() > 25
+    assert abs(np.mean(np.log(found / true))) < 0.1
+
+
 def test_what_differs_keeps_its_own():
     rng = np.random.default_rng(1)
     true = np.exp(2.0 * rng.standard_normal(len(KEYS)))
@@ -33,11 +44,13 @@ def test_what_differs_keeps_its_own():
     assert np.std(np.log(found / true)) < 1.1 * np.std(np.log(made / true))
 
 
+@pytest.mark.parametrize("of_recording", [0.0, 2.0])
 @pytest.mark.parametrize("apart", [0.2, 0.5, 1.0])
-def test_what_is_said_of_a_variance_is_as_sure_as_it_says(apart):
+def test_what_is_said_of_a_variance_is_as_sure_as_it_says(apart, of_recording):
     """The logarithm's error is that of a sample variance with the degrees of freedom stated."""
     keys = [Key("spectrum", f"flat-{r}", f"band {n}") for n in range(50) for r in range(40)]
-    true = np.exp(apart * np.random.default_rng(3).standard_normal(len(keys)))
+    rng = np.random.default_rng(3)
+    true = np.exp(apart * rng.standard_normal(len(keys)) + np.tile(of_recording * rng.standard_normal(40), 50))
     found, freedom = moderated(keys, drawn(true, 4), FREEDOM)
     error = np.log(found / true)
     assert error.mean() == pytest.approx(bias(freedom[0]), abs=0.02)
@@ -49,6 +62,15 @@ def test_a_variance_far_below_its_like_is_chance():
     made[0] = 0.05
     found, _ = moderated(KEYS, made, FREEDOM)
     assert found[0] > 0.4
+
+
+def test_few_variances_make_each_other_no_surer_than_they_are():
+    """Of six recordings of one kind: the error of what they say together is part of it."""
+    keys, rng = [Key("spectrum", f"flat-{r}", "band 0") for r in range(6)], np.random.default_rng(8)
+    found = [moderated(keys, rng.chisquare(FREEDOM, len(keys)) / FREEDOM, FREEDOM) for _ in range(400)]
+    error2 = np.mean([np.log(v) ** 2 for v, _ in found])
+    stated = np.mean([polygamma(1, f / 2) for _, f in found])
+    assert error2 == pytest.approx(stated, rel=0.15)
 
 
 def test_what_stands_alone_or_never_varies_is_left():
