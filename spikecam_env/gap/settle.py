@@ -52,10 +52,10 @@ def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Array) -> Array:
 
 def shifted(bare: BaseFit, settled: BaseFit, factor: float) -> BaseFit:
     """The unit for an effect `factor` times as strong as the one under which `bare` became `settled`; no further than
-    FURTHEST times as far, for it will settle anew."""
+    FURTHEST times as far, for it will settle anew.  A pixel whose light tells nothing keeps its gain."""
     factor = min(factor, FURTHEST)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(bare.gain > 0, settled.gain / bare.gain, 1.0)
+        ratio = np.where((bare.gain > 0) & (settled.gain > 0), settled.gain / bare.gain, 1.0)
     dark = np.maximum(bare.dark + factor * (settled.dark - bare.dark), 0.0)
     white = bare.white * (settled.white / bare.white) ** factor if bare.white > 0 else settled.white
     return replace(settled, gain=bare.gain * ratio**factor, dark=dark, white=white)

@@ -38,3 +38,13 @@ def test_a_unit_is_shifted_in_proportion_but_never_out_of_the_world(factor):
     reach = min(factor, FURTHEST)
     assert np.allclose(found.gain, base.gain * 1.01**reach) and found.white == pytest.approx(base.white * 3.0**reach)
     assert np.allclose(found.dark, np.maximum(base.dark * (1 - 0.1 * reach), 0.0))
+
+
+@pytest.mark.parametrize("factor", [-0.5, 0.3])
+def test_a_pixel_of_which_light_tells_nothing_keeps_its_gain(factor):
+    """A refit of a dead pixel may have any gain about none."""
+    base = unit()
+    gain = 1.01 * base.gain
+    gain[:2] = -1e-4 * base.gain[0], 0.0
+    found = shifted(base, replace(base, gain=gain), factor)
+    assert np.array_equal(found.gain[:2], base.gain[:2]) and np.isfinite(found.gain).all()
