@@ -13,7 +13,7 @@ import numpy as np
 
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common
-from spikecam_env.gap.units import width
+from spikecam_env.gap.units import scatter, width
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
@@ -56,9 +56,9 @@ def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missin
     if not has & set(DARK) and level > 5 * error / count and fires_in_the_dark(case, level):
         add("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
     if not has & set(DARK_PATTERN) and level > 0:
-        own = np.sqrt(max(width(dark) ** 2 - width(gain) ** 2 - (error / level) ** 2, 0.0))
-        if own * level > error:
-            add("dark_current_spread", own * level * to_pA, own * level * to_pA / count)
+        own = float(np.sqrt(max(scatter(dark) ** 2 - (level * width(gain)) ** 2 - error**2, 0.0)))
+        if own > error:
+            add("dark_current_spread", own * to_pA, own * to_pA / count)
     if not has & set(NOISE) and white > LEAST_JITTER:
         add("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
     return found

@@ -66,10 +66,15 @@ def spread_factor(model: SensorModel, what: str, wanted: float, shape: tuple[int
 
 
 def width(values: Array) -> float:
-    """Robust relative spread: half of the middle 68 % over the median."""
+    """Robust relative spread: the scatter over the median."""
     middle = float(np.median(values))
+    return scatter(values) / middle if middle > 0 else 0.0
+
+
+def scatter(values: Array) -> float:
+    """Robust standard deviation: half of the middle 68 %."""
     low, high = np.quantile(values, [0.1587, 0.8413])
-    return float(high - low) / 2 / middle if middle > 0 else 0.0
+    return float(high - low) / 2
 
 
 def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small import SHAPE, effect, recorded
@@ -77,6 +79,18 @@ def test_shot_noise_beside_a_spread_is_found_with_its_size():
     found = lacking(model)
     assert list(found) == ["conversion_gain_spread", "shot_noise"]
     assert found["shot_noise"].effect.quanta == pytest.approx(2e4, rel=0.05)
+
+
+def test_dark_levels_that_differ_by_their_errors_alone_are_no_spread():
+    """However far their median, all but none, is from their mean: of pixels without a dark level neither is a scale."""
+    case = recorded(model=IDEAL.with_effect(effect("conversion_gain_spread", sigma=0.03)))
+    errors = np.random.default_rng(3).normal(0.0, 5e-7, PIXELS)
+    errors -= np.median(errors)
+    for middle in (1e-12, 1e-9, 1e-7):
+        dark = np.where(errors > 0, 1.1, 1.0) * errors + middle
+        base = replace(case.base, dark=dark, dark_sd=np.full(PIXELS, 5e-7))
+        found = [m.effect.name for m in missing(replace(case, base=base), IDEAL, NAMES)]
+        assert found == ["conversion_gain_spread"]
 
 
 def test_only_names_that_are_asked_for_are_added():
