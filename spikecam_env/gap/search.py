@@ -43,7 +43,8 @@ from spikecam_env.sensor import SensorModel
 Array = NDArray[np.float64]
 
 LOUD = 6.0
-"""Noises by which a statistic of the pattern, or of motion, has to stand out for its effects to be tried."""
+"""Noises by which a statistic of the pattern, or of motion, has to stand out for its effects to be tried; or it stands
+out most."""
 
 FEWEST, TRIED = 3, 5
 """Candidates fitted a round, the best by their templates: so many at least and at most."""
@@ -403,5 +404,6 @@ def worth_fitting(shapes: Sequence[Screened], before: float, loud: Collection[st
 
 
 def loud(null: Null, distance: Array) -> set[str]:
-    """Groups of which a statistic stands out by itself."""
-    return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) > LOUD}
+    """Groups of which a statistic stands out by itself, or is what stands out most."""
+    least = min(LOUD, float(np.abs(distance).max()))
+    return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) >= least}

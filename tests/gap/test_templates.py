@@ -9,10 +9,11 @@ import pytest
 from small import MODEL, TWINS, effect, recorded
 
 from spikecam_env.gap.candidates import NOISE_OF_A_RESET
-from spikecam_env.gap.compare import misfit, values_of
+from spikecam_env.gap.compare import Null, misfit, values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.screen import Screened, screen
-from spikecam_env.gap.search import worth_fitting
+from spikecam_env.gap.search import loud, worth_fitting
+from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.templates import TIMES, load
 from spikecam_env.sensor import CATALOGUE
 
@@ -47,6 +48,15 @@ def test_where_motion_stands_out_all_that_shows_by_it_is_tried_in_every_shape():
     tried = worth_fitting(screened, 1000.0, {"moving"})
     assert [s.start for s in tried if s.name == "blooming"] == [s.start for s in shapes]
     assert [s.start for s in worth_fitting(screened, 1000.0) if s.name == "blooming"] == [{"full": 0.85}]
+
+
+def test_what_stands_out_most_is_loud_however_quiet_it_is():
+    """An alarm raised by motion alone, at 5.5 noises, was never put to blooming."""
+    keys = (Key("rates", "flat", "slope"), Key("moving", "bars", "bloom"), Key("step", "step", "down 1-2"))
+    null = Null(keys, np.zeros(3), np.ones(3), np.ones(3), 12, 11.0)
+    assert loud(null, np.array([5.0, -5.5, 1.0])) == {"moving"}
+    assert loud(null, np.array([5.0, -5.5, 7.0])) == {"step"}
+    assert loud(null, np.array([50.0, -6.5, 7.0])) == {"rates", "moving", "step"}
 
 
 @pytest.mark.parametrize(
