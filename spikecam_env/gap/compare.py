@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -170,13 +171,31 @@ def deviates(null: Null, values: Array) -> Array:
     return normal(null, np.nan_to_num((values - null.mean) / null.noise))
 
 
-def normal(null: Null, t: Array) -> Array:
-    """(S,) normal deviates of distances in noise: the noise was learnt from few twins, and is the surer the more of it
-    is floor."""
-    known = null.sd**2 * (1.0 + 1.0 / null.twins)
-    freedom = null.freedom * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
+def normal(null: Null, t: Array, predicted: Prediction | None = None) -> Array:
+    """(S,) normal deviates of distances in noise, of a prediction's or of the null's: the noise was learnt from few
+    twins, and is the surer the more of it is floor."""
+    known, freedom = null.sd**2 * (1.0 + 1.0 / null.twins), null.freedom
+    if predicted is not None:
+        known, freedom = predicted.spread**2 + predicted.error**2, freedom_of(null, predicted)
+    freedom = freedom * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
     log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)
     return np.sign(t) * -special.ndtri_exp(log_p)
+
+
+def freedom_of(null: Null, predicted: Prediction) -> Array:
+    """(S,) degrees of freedom of a prediction's spread (Welch and Satterthwaite): what is the null's has its own, what
+    an effect's twins scatter beyond has those of few twins, `halved`, or of the drawn units.
+
+    How much they scatter beyond, all statistics of a group say: one that happened to scatter little is no surer.
+    """
+    beyond = np.maximum(predicted.spread / np.maximum(null.sd, 1e-300), 1.0) ** 2 - 1.0
+    groups = np.unique([k.group for k in null.keys], return_inverse=True)[1]
+    beyond = np.maximum(beyond, (np.bincount(groups, beyond) / np.bincount(groups))[groups])
+    kind = Counter((k.group, k.name) for k in null.keys)
+    few = max(len(predicted.draws) - 1, 1) / (0.25 + 0.75 / np.array([kind[k.group, k.name] for k in null.keys]))
+    if predicted.units is not None:
+        few = np.where(np.isfinite(predicted.units[0]), len(predicted.units) - 1, few)
+    return np.asarray((1.0 + beyond) ** 2 / (1.0 / null.freedom + beyond**2 / few))
 
 
 def of_all_recordings(keys: Sequence[Key], z: Array, group: str) -> Array:
@@ -197,9 +216,9 @@ def adjusted(z: Array) -> Array:
     return out
 
 
-def alarmed(null: Null, rho: Array) -> bool:
-    """Whether residuals say that something is left."""
-    return bool(adjusted(normal(null, rho)).min() < GATE)
+def alarmed(null: Null, rho: Array, predicted: Prediction | None = None) -> bool:
+    """Whether residuals, of a prediction or of the null's, say that something is left."""
+    return bool(adjusted(normal(null, rho, predicted)).min() < GATE)
 
 
 def variance(null: Null, predicted: Prediction) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.compare import Null, Prediction, judged, scaled, size_of
+from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, scaled, size_of
 from spikecam_env.gap.fit import WANDER, Fit, as_seen, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.refit import LINES, BaseFit, within
 from spikecam_env.gap.settle import HIDDEN, shifted
@@ -51,6 +51,20 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
         predicted = with_pattern(case, found.model, null, predicted)
     rho, left = judged(null, measured, predicted)
     return replace(found, prediction=predicted, rho=rho, misfit=left)
+
+
+def made_sure(case: Case, model: SensorModel, null: Null, seen: Array, values: Array, found: Fit) -> Fit:
+    """The fit, by as many draws as the null has where those it stands on are too few to say whether it leaves anything.
+
+    seen, values: (S,) of the recordings to fit (NaN elsewhere), and of all.
+    """
+    left = [residual(null, measured, found.prediction) for measured in (seen, values)]
+    if not any(alarmed(null, rho) and not alarmed(null, rho, found.prediction) for rho in left):
+        return found
+    sure = confirmed(case, model, null, seen, found, len(null.draws))
+    predicted = replace(sure.prediction, error=np.maximum(sure.prediction.error, found.prediction.error))
+    rho, left_over = judged(null, seen, predicted)
+    return replace(sure, prediction=predicted, rho=rho, misfit=left_over)
 
 
 def made_loud(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, name: str) -> tuple[Fit, float]:

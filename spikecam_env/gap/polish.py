@@ -96,7 +96,7 @@ def _stepped(null: Null, measured: Array, best: Fit, free: Free, columns: Array,
 
 def leaves_nothing(null: Null, values: Array, predicted: Prediction) -> bool:
     """Whether a prediction explains what was measured, but for chance."""
-    return not alarmed(null, residual(null, values, predicted))
+    return not alarmed(null, residual(null, values, predicted), predicted)
 
 
 def agree(before: Fit, after: Fit, errors: Errors) -> bool:

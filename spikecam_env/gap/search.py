@@ -22,13 +22,14 @@ from spikecam_env.gap.compare import (
     Null,
     Prediction,
     alarmed,
+    freedom_of,
     judged,
     law,
     misfit,
     own_variance,
     residual,
 )
-from spikecam_env.gap.confirm import confirmed, of_any_dark, rejoined, resettled
+from spikecam_env.gap.confirm import confirmed, made_sure, of_any_dark, rejoined, resettled
 from spikecam_env.gap.fit import Fit, fit
 from spikecam_env.gap.opposed import PAIR, opposed
 from spikecam_env.gap.polish import Errors, polished
@@ -108,7 +109,7 @@ def search(
     now, base, prediction = model, within(model, case.base), null.prediction
     while len(rounds) < MOST:
         rho = residual(null, seen, prediction)
-        if rounds and not alarmed(null, rho) and not alarmed(null, residual(null, values, prediction)):
+        if rounds and not any(alarmed(null, r, prediction) for r in (rho, residual(null, values, prediction))):
             break
         if len(rounds) > 1 and not case.effort.allows("a third effect"):
             break
@@ -142,7 +143,7 @@ def cancelling(
     bends = {candidate(name).family for name in (*PAIR, "synchronous_reset")}
     if not first.fits or candidate(first.fits[0].name).family not in bends:
         return []
-    if not alarmed(null, residual(null, values, last.prediction)):
+    if not alarmed(null, residual(null, values, last.prediction), last.prediction):
         return []
     found = opposed(case, model, null, seen, names)
     if found is None or found.misfit > last.misfit:
@@ -242,11 +243,12 @@ def joined(
             if turn.fits[0].name in {e.name for e in best.model.effects}:
                 best, before[i] = revisited(case, model, null, seen, values, best, turn)
     names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
-    if is_little(last, best.misfit, chance, bool(before)) and alarmed(null, best.rho):
+    if is_little(last, best.misfit, chance, bool(before)) and alarmed(null, best.rho, best.prediction):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
+    best = made_sure(case, model, null, seen, values, best)
     last = replace(last, fits=(best, *last.fits[1:]), lent=lent)
-    for other in instead_of(last, names) if before and alarmed(null, best.rho) else []:
+    for other in instead_of(last, names) if before and alarmed(null, best.rho, best.prediction) else []:
         if case.effort.allows(f"others in place of {names[-1]}"):
             tried, known, all_told = polished(case, model, null, seen, values, other, [*names[:-1], other.name])
             if tried.misfit < best.misfit - LEAST:
@@ -332,7 +334,10 @@ def chosen_of(
         for f in close[1:]
         if (free[f.name] <= free[best.name] or behind[f.name] < behind[best.name])
         and is_rival(here, null.draws, values, best.prediction, f.prediction)
-        and (alarmed(here, left) or not alarmed(here, residual(here, values, f.prediction)))
+        and (
+            alarmed(here, left, best.prediction)
+            or not alarmed(here, residual(here, values, f.prediction), f.prediction)
+        )
     ]
     return [*close, *(f for f in sure if f not in close)], tuple(rivals)
 
@@ -366,7 +371,8 @@ def revisited(
 def standing_on(null: Null, predicted: Prediction) -> Null:
     """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
     floor = np.sqrt(null.floor**2 + law(null, predicted) ** 2 + own_variance(null, predicted))
-    return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, draws=predicted.draws)
+    freedom = freedom_of(null, predicted)
+    return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, freedom=freedom, draws=predicted.draws)
 
 
 def line_of(case: Case) -> float | None:

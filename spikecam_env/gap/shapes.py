@@ -40,7 +40,7 @@ def worth_shaping(null: Null, before: float, fits: Sequence[Fit]) -> list[Fit]:
     """
     least = min((f.misfit for f in fits), default=np.inf)
     simple = min((f for f in fits if not has_shapes(f.name)), key=lambda f: f.misfit, default=None)
-    enough = simple.misfit if simple and not alarmed(null, simple.rho) else np.inf
+    enough = simple.misfit if simple and not alarmed(null, simple.rho, simple.prediction) else np.inf
     near = before - HALF * (before - least)
     return [f for f in fits if has_shapes(f.name) and f.misfit < min(near, enough)]
 

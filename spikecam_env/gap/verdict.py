@@ -43,21 +43,22 @@ QUIET = 0.1
 """The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
 
 
-def explains(null: Null, before: Array, rho: Array) -> bool:
-    """Whether residuals `rho` are chance; or, beside those of the model as given, little and quiet, and none that was
-    not there, which would contradict what was added."""
+def explains(null: Null, before: Array, rho: Array, predicted: Prediction) -> bool:
+    """Whether residuals `rho` of a prediction are chance; or, beside those of the model as given, little and quiet, and
+    none that was not there, which would contradict what was added."""
     by_chance = float(np.sum(null.weight * np.ones(len(rho))))
     left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
     quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
-    contradicted = alarmed(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0))
-    return not alarmed(null, rho) or bool(left < UNEXPLAINED and quiet and not contradicted)
+    contradicted = alarmed(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0), predicted)
+    return not alarmed(null, rho, predicted) or bool(left < UNEXPLAINED and quiet and not contradicted)
 
 
 def harmless(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
     """The rounds; where what they found does not explain the data, they end where they came nearest to recordings held
     out: a stand-in has to be of use where nobody looked."""
     *before, last = rounds
-    if explains(null, residual(null, values, null.prediction), residual(null, values, last.prediction)):
+    given, rho = residual(null, values, null.prediction), residual(null, values, last.prediction)
+    if explains(null, given, rho, last.prediction):
         return list(rounds)
     left = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
     return [*before, replace(rounds[int(np.argmin(left))], fits=())]
@@ -86,7 +87,7 @@ def concluded(
              for r in turns]  # fmt: skip
     rho = residual(null, values, last.prediction) if last else before
     predicted = last.prediction.mean if last else null.mean
-    explained = explains(null, before, rho)
+    explained = explains(null, before, rho, last.prediction if last else null.prediction)
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     place, time_ = where(case), when(case)
     share = lambda f: gap_of(case, null, values, given, f.prediction).removed  # noqa: E731

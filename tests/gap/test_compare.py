@@ -9,6 +9,7 @@ import pytest
 from scipy import special, stats
 
 from spikecam_env.gap.compare import (
+    GATE,
     HEAVY,
     PAIRED,
     TOLERANCE,
@@ -16,7 +17,9 @@ from spikecam_env.gap.compare import (
     Null,
     Prediction,
     adjusted,
+    alarmed,
     deviates,
+    freedom_of,
     misfit,
     normal,
     null_of,
@@ -67,6 +70,38 @@ def test_false_alarms_are_as_often_as_asked_for_however_few_the_twins(twins):
     share, allowed = alarms / 1500, 0.05 + 4 * np.sqrt(0.05 * 0.95 / 1500)
     print(f"{twins} twins: {share:.3f}, allowed {allowed:.3f}")
     assert 0.02 < share < allowed
+
+
+@pytest.mark.parametrize("twins", [2, 4])
+@pytest.mark.parametrize("recordings", [1, 10])
+def test_an_effect_that_scatters_is_not_held_against_its_own_few_twins(twins, recordings):
+    """300 campaigns of 200 statistics of a model whose effect scatters three times the null: alarms as often as asked
+    for.  By the null's degrees of freedom the spread of few twins passes for known."""
+    rng = np.random.default_rng(twins)
+    names = 200 // recordings
+    keys = tuple(Key("drift", f"r{r}", str(i)) for i in range(names) for r in range(recordings))
+    with_own, as_the_nulls = 0, 0
+    for _ in range(300):
+        made = rng.standard_normal((12, 200))
+        null = null_of([dict(zip(keys, v, strict=True)) for v in made], keys, [None] * 12)
+        added = 10.0 + np.sqrt(8.0) * rng.standard_normal((twins + 1, 200))
+        predicted = paired(null, [Draw(n, made[n] + added[n], None) for n in range(twins)])
+        rho = residual(null, rng.standard_normal(200) + added[twins], replace(predicted, own=np.zeros(200)))
+        with_own += alarmed(null, rho, predicted)
+        as_the_nulls += alarmed(null, rho)
+    share, allowed = with_own / 300, GATE + 4 * np.sqrt(GATE * (1 - GATE) / 300)
+    print(f"{twins} twins, {recordings} recordings: {share:.3f}, allowed {allowed:.3f}; {as_the_nulls / 300:.3f}")
+    assert share < allowed < as_the_nulls / 300
+
+
+def test_what_an_effect_leaves_as_it_was_is_known_as_well_as_the_nulls():
+    """Twins that scatter as the null's keep its degrees of freedom; one that scatters more takes its group with it."""
+    null = replace(made_up(count=4), keys=tuple(Key("ab"[i > 1], "r", str(i)) for i in range(4)))
+    draws = tuple(Draw(n, np.zeros(4), None) for n in range(3))
+    spread = np.array([1.0, 1.0, 1.0, 3.0])
+    freedom = freedom_of(null, Prediction(np.zeros(4), np.zeros(4), spread, draws))
+    print(freedom)
+    assert freedom[:2].tolist() == [11, 11] and (freedom[2:] < 4).all()
 
 
 @pytest.mark.parametrize("twins", [4, 12])

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from small import MODEL, TWINS, effect, null, recorded
 
-from spikecam_env.gap.compare import judged, size_of, values_of
-from spikecam_env.gap.confirm import as_wide, is_missed, made_loud, of_any_dark, quietened
+from spikecam_env.gap.compare import alarmed, judged, residual, size_of, values_of
+from spikecam_env.gap.confirm import as_wide, is_missed, made_loud, made_sure, of_any_dark, quietened
 from spikecam_env.gap.fit import fit, predict
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import within
@@ -75,3 +75,22 @@ def test_what_is_plainly_missed_need_not_be_simulated_without():
     assert is_missed(there, measured, found, change)
     assert not is_missed(there, measured, found, 0.1 * change)
     assert not is_missed(there, measured, both, change)
+
+
+def test_more_twins_say_whether_something_is_left_where_two_cannot():
+    """Statistics 50 noises off: of two twins that happened to scatter by four it is nothing, by all twelve it is a lot.
+    What suits well needs no more."""
+    case, there = recorded(effect("dead_time", tau_us=0.5)), null()
+    measured = values_of(case.bank, there.keys)
+    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.5})
+    two = predict(case, found.model, found.base, there, 2)
+    found = replace(found, prediction=replace(two, spread=4.0 * there.sd))
+    suits = found.prediction.mean
+    assert made_sure(case, MODEL, there, suits, suits, found) is found
+    off = suits + np.where([k.group == "timing" for k in there.keys], 50.0 * there.sd, 0.0)
+    sure = made_sure(case, MODEL, there, off, off, found)
+    left = [alarmed(there, residual(there, off, f.prediction), f.prediction) for f in (found, sure)]
+    print(left, len(sure.prediction.draws))
+    assert left == [False, True]
+    assert len(sure.prediction.draws) == TWINS and sure.model == found.model
+    assert np.all(sure.prediction.error >= found.prediction.error)
