@@ -149,17 +149,17 @@ def test_one_confirmed_before_is_among_those_that_others_are_measured_by():
 def test_what_is_left_may_be_little_beside_what_was_there():
     n = null()
     loud, calm = np.where(np.arange(COUNT) < 50, 100.0, 0.5), np.full(COUNT, 0.5)
-    assert explains(n, loud, calm)
-    assert explains(n, loud, np.where(np.arange(COUNT) < 1, 9.0, 0.5)), "9 noises of 100"
-    assert not explains(n, loud, np.where(np.arange(COUNT) < 1, 11.0, 0.5)), "11 of 100 are not quiet"
-    assert not explains(n, calm, np.where(np.arange(COUNT) < 1, 9.0, 0.5)), "nothing was as loud before"
+    assert explains(n, loud, calm, n.prediction)
+    assert explains(n, loud, np.where(np.arange(COUNT) < 1, 9.0, 0.5), n.prediction), "9 noises of 100"
+    assert not explains(n, loud, np.where(np.arange(COUNT) < 1, 11.0, 0.5), n.prediction), "11 of 100 are not quiet"
+    assert not explains(n, calm, np.where(np.arange(COUNT) < 1, 9.0, 0.5), n.prediction), "nothing was as loud before"
 
 
 def test_an_effect_that_moves_what_agreed_is_contradicted():
     """9 noises where there was nothing, however much goes elsewhere."""
     n = null()
     loud = np.where(np.arange(COUNT) < 50, 100.0, 0.5)
-    assert not explains(n, loud, np.where(np.arange(COUNT) == 100, 9.0, 0.5))
+    assert not explains(n, loud, np.where(np.arange(COUNT) == 100, 9.0, 0.5), n.prediction)
 
 
 def test_beside_a_later_effect_a_runner_up_may_take_the_earlier_ones_place(monkeypatch):
