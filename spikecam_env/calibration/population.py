@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from spikecam_env.robust import UPPER
 from spikecam_env.sensor import CATALOGUE, Circuit, Effect, SensorModel
 from spikecam_env.sensor.effects.base import build
 
@@ -43,7 +44,7 @@ def pixel_flags(gain: Array, dark: Array, chi2: Array, freedom: NDArray[np.int64
 
 def hot_limit(dark: Array) -> float:
     """Dark level above which a pixel is hot: five standard deviations of ln(dark), taken from its upper middle."""
-    low, high = np.quantile(dark, [0.5, 0.8413])
+    low, high = np.quantile(dark, [0.5, UPPER])
     low = max(low, 1e-12)
     return float(low * (max(high, low) / low) ** _HOT_SIGMAS) if high > 0 else np.inf
 

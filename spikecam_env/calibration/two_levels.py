@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from spikecam_env.calibration.flat_maps import DIM_LUX, FRAMES, LUX, FlatMaps
+from spikecam_env.robust import scatter
 
 Array = NDArray[np.float64]
 
@@ -105,5 +106,4 @@ def split_shading(light: Array) -> tuple[Array, float]:
     """The smooth part (H, W) of a response map, and the pixels' relative spread around it (robust: dust, edges)."""
     smooth = ndimage.gaussian_filter(ndimage.median_filter(light, 5), _SMOOTH, mode="nearest")
     rest = light / smooth - 1.0
-    low, high = np.quantile(rest, [0.1587, 0.8413])
-    return smooth, float((high - low) / 2)
+    return smooth, scatter(rest)

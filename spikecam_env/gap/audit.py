@@ -18,6 +18,7 @@ from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe import BIN, Observation
 from spikecam_env.gap.statistics.moving import light_film
 from spikecam_env.gap.world import Shown
+from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -245,7 +246,7 @@ def uneven(case: Case, name: str, names: Sequence[str]) -> float:
     for c, o in zip(case.conditions, case.observations, strict=True):
         if c.name in names and c.level > 0:
             off = o.rate[live] / (base.gain * c.level + base.dark)[live]
-            spread[c.name] = float(np.diff(np.quantile(off, [0.1587, 0.8413]))[0]) / 2
+            spread[c.name] = scatter(off)
     near = min((n for n in spread if n != name), key=lambda n: abs(np.log(level[n] / level[name])))
     return float(np.sqrt(max(spread[name] ** 2 - spread[near] ** 2, 0.0)))
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common
-from spikecam_env.gap.units import scatter, width
+from spikecam_env.gap.units import width
+from spikecam_env.robust import scatter
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build

@@ -12,6 +12,7 @@ from spikecam_env.gap.refit import BaseFit, responds
 from spikecam_env.gap.statistics import Key, pattern
 from spikecam_env.gap.traps import drawn_traps, level_of
 from spikecam_env.gap.world import Shown
+from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -69,12 +70,6 @@ def width(values: Array) -> float:
     """Robust relative spread: the scatter over the median."""
     middle = float(np.median(values))
     return scatter(values) / middle if middle > 0 else 0.0
-
-
-def scatter(values: Array) -> float:
-    """Robust standard deviation: half of the middle 68 %."""
-    low, high = np.quantile(values, [0.1587, 0.8413])
-    return float(high - low) / 2
 
 
 def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.statistics.reading import log, root, slope
+from spikecam_env.robust import LOWER, UPPER
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ def statistics(rate: Array) -> dict[str, float]:
     if middle <= 0:
         return {}
     relative = rate / middle - 1.0
-    low, lower, upper, high = np.quantile(relative, [0.005, 0.1587, 0.8413, 0.995])
+    low, lower, upper, high = np.quantile(relative, [0.005, LOWER, UPPER, 0.995])
     width = max((upper - lower) / 2, 1e-9)
     silent = root(float((flat < 0.1 * middle).sum()))
     if width < NARROW:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from spikecam_env.gap.statistics.reading import log
+from spikecam_env.robust import LOWER, UPPER, scatter
 
 Array = NDArray[np.float64]
 
@@ -32,12 +33,11 @@ def statistics(rate: Array) -> dict[str, float]:
     if middle <= 0:
         return {}
     relative = rate / middle - 1.0
-    lower, upper = np.quantile(relative, [0.1587, 0.8413])
+    lower, upper = np.quantile(relative, [LOWER, UPPER])
     clipped = np.clip(relative, 3 * lower - 2 * upper, 3 * upper - 2 * lower)
     around = ndimage.uniform_filter(clipped, _WINDOW, mode="nearest")
     grain = relative - around
-    low, high = np.quantile(grain, [0.1587, 0.8413])
-    width = max(float(high - low) / 2, 1e-9)
+    width = max(scatter(grain), 1e-9)
     found = {"fine": log(width), "smooth": log(float(around.std()))}
     for q in (0.001, 0.01, 0.99, 0.999):
         found[f"grain {q:g}"] = log(abs(float(np.quantile(grain, q))) / width)
