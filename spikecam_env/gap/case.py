@@ -90,23 +90,30 @@ def twins(
     base: BaseFit,
     numbers: Sequence[int],
     only: Sequence[int] | None = None,
+    refits: Mapping[int, BaseFit | None] | None = None,
 ) -> list[Twin]:
     """Campaigns of the unit `base` under `model`; one number is one set of draws, whatever the model.
 
-    only: recordings to simulate, by index; without all of those that the refit rests on, `base` stands for it.
+    only: recordings to simulate, by index.  Without all of those that the refit rests on, that of `refits` stands for
+    it, by number, or the unit itself: beside an effect that bends rates, what a unit has is not what a refit sees.
     """
+    stands = refits or {}
+
+    def made(n: int) -> Twin:
+        return _twin(case, model, base, case.seed * 1000 + FIRST + n, only, stands.get(n) or base)
+
     with ThreadPoolExecutor(case.jobs) as pool:
-        return list(pool.map(lambda n: _twin(case, model, base, case.seed * 1000 + FIRST + n, only), numbers))
+        return list(pool.map(made, numbers))
 
 
-def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None) -> Twin:
+def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None, refit: BaseFit) -> Twin:
     which = range(len(case.conditions)) if only is None else only
     case.effort.spent.append(len(which))
     conditions = [case.conditions[i] for i in which]
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)
     own = measured_base(observations, conditions) if rests_on(case) <= set(which) else None
-    return Twin(bank(Reading(observations, conditions, own or base, case.films)), own)
+    return Twin(bank(Reading(observations, conditions, own or refit, case.films)), own)
 
 
 def rests_on(case: Case) -> set[int]:

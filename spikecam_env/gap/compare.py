@@ -173,13 +173,26 @@ def deviates(null: Null, values: Array) -> Array:
 
 def normal(null: Null, t: Array, predicted: Prediction | None = None) -> Array:
     """(S,) normal deviates of distances in noise, of a prediction's or of the null's: the noise was learnt from few
-    twins, and is the surer the more of it is floor."""
+    twins, and is the surer the more of it is floor.  What drawn units show is no less likely than their number says."""
     known, freedom = null.sd**2 * (1.0 + 1.0 / null.twins), null.freedom
     if predicted is not None:
         known, freedom = predicted.spread**2 + predicted.error**2, freedom_of(null, predicted)
     freedom = freedom * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
     log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)
+    if predicted is not None and predicted.units is not None:
+        apart = (predicted.units - predicted.mean) / np.sqrt(variance(null, predicted))
+        log_p = np.maximum(log_p, np.log(np.maximum(share_beyond(t, apart), 1e-300)))
     return np.sign(t) * -special.ndtri_exp(log_p)
+
+
+def share_beyond(t: Array, apart: Array) -> Array:
+    """(S,) share of drawn units, half at most, that lie as far to the same side as a distance; 0 where none does.
+    apart: (U, S) their own distances, NaN where they show nothing.
+
+    Pixels far out in a pattern of rows come by whole rows: one unit in a hundred has some, and no t knows of it.
+    """
+    beyond = np.sum(np.sign(t) * apart >= np.abs(t), axis=0)
+    return np.where(beyond > 0, np.minimum((beyond + 1) / (len(apart) + 1), 0.5), 0.0)
 
 
 def freedom_of(null: Null, predicted: Prediction) -> Array:

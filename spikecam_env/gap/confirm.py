@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, scaled, size_of
-from spikecam_env.gap.fit import WANDER, Fit, as_seen, concerned, predict, twins_of, with_held_out, with_pattern
+from spikecam_env.gap.fit import MANY, WANDER, Fit, as_seen, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.refit import LINES, BaseFit, within
 from spikecam_env.gap.settle import HIDDEN, shifted
 from spikecam_env.gap.strength import as_loud, with_effect
@@ -49,22 +49,36 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
             predicted = replace(predicted, own=predicted.mean - bare.mean)
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)
-    rho, left = judged(null, measured, predicted)
-    return replace(found, prediction=predicted, rho=rho, misfit=left)
+    return rejudged(null, measured, found, predicted)
 
 
 def made_sure(case: Case, model: SensorModel, null: Null, seen: Array, values: Array, found: Fit) -> Fit:
-    """The fit, by as many draws as the null has where those it stands on are too few to say whether it leaves anything.
+    """The fit, by as many draws as the null has where those it stands on are too few to say whether it leaves anything,
+    and by MANY units where what it leaves is of the pattern.
 
     seen, values: (S,) of the recordings to fit (NaN elsewhere), and of all.
     """
+    pattern = found.prediction.units is not None and alarmed(null, of_pattern(null, values, found), found.prediction)
+    if pattern:
+        found = rejudged(null, seen, found, with_pattern(case, found.model, null, found.prediction, MANY))
     left = [residual(null, measured, found.prediction) for measured in (seen, values)]
     if not any(alarmed(null, rho) and not alarmed(null, rho, found.prediction) for rho in left):
         return found
-    sure = confirmed(case, model, null, seen, found, len(null.draws))
-    predicted = replace(sure.prediction, error=np.maximum(sure.prediction.error, found.prediction.error))
-    rho, left_over = judged(null, seen, predicted)
-    return replace(sure, prediction=predicted, rho=rho, misfit=left_over)
+    sure = confirmed(case, model, null, seen, found, len(null.draws)).prediction
+    sure = with_pattern(case, found.model, null, sure, MANY) if pattern else sure
+    return rejudged(null, seen, found, replace(sure, error=np.maximum(sure.error, found.prediction.error)))
+
+
+def rejudged(null: Null, seen: Array, found: Fit, predicted: Prediction) -> Fit:
+    """The fit by another prediction of it."""
+    rho, left = judged(null, seen, predicted)
+    return replace(found, prediction=predicted, rho=rho, misfit=left)
+
+
+def of_pattern(null: Null, values: Array, found: Fit) -> Array:
+    """(S,) what a fit leaves of the pattern, in noise; 0 elsewhere."""
+    there = np.array([k.group == "pattern" for k in null.keys])
+    return np.where(there, residual(null, values, found.prediction), 0.0)
 
 
 def made_loud(case: Case, model: SensorModel, null: Null, measured: Array, found: Fit, name: str) -> tuple[Fit, float]:
@@ -138,6 +152,4 @@ def as_wide(null: Null, measured: Array, found: Fit, known: Prediction) -> Fit:
     """The fit known no better, and its campaigns scattering no less, than a prediction of the same effects."""
     here = found.prediction
     spread, error = np.maximum(here.spread, known.spread), np.maximum(here.error, known.error)
-    wide = replace(here, spread=spread, error=error)
-    rho, left = judged(null, measured, wide)
-    return replace(found, prediction=wide, rho=rho, misfit=left)
+    return rejudged(null, measured, found, replace(here, spread=spread, error=error))

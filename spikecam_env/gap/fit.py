@@ -53,8 +53,8 @@ WANDER, SEVERAL = 6, 3
 APART = 0.05
 """Least step of a logarithm between two twins for a slope."""
 
-UNITS = 24
-"""Units drawn for the pattern statistics of one model."""
+UNITS, MANY = 24, 240
+"""Units drawn for the pattern statistics of one model, and where these do not show what was measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def predict(
     """What a model with effects gives, from twins of the null's last `count` draws; what is not simulated (`only`:
     recordings, by index) is as in `null`."""
     numbers = [d.number for d in null.draws[-count:]]
-    made = twins(case, model, base, numbers, only)
+    made = twins(case, model, base, numbers, only, {d.number: d.refit for d in null.draws})
     draws = [Draw(n, values_of(t.bank, null.keys), t.base) for n, t in zip(numbers, made, strict=True)]
     predicted = paired(null, draws)
     return with_pattern(case, model, null, predicted) if traps_of(model) else predicted
@@ -98,15 +98,15 @@ def as_seen(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction
     return settled(model, base, without, [there]) if without and there else base
 
 
-def with_pattern(case: Case, model: SensorModel, null: Null, predicted: Prediction) -> Prediction:
-    """A prediction with its pattern statistics replaced by those of units of the model."""
-    drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
+def with_pattern(case: Case, model: SensorModel, null: Null, predicted: Prediction, count: int = UNITS) -> Prediction:
+    """A prediction with its pattern statistics replaced by those of `count` units of the model."""
+    drawn = drawn_banks(model, case.base, case.conditions, case.shape, count, case.seed)
     values = np.array([values_of(b, null.keys) for b in drawn])
     known = np.isfinite(values).all(axis=0)
     values = np.where(known, values, 0.0)
     mean = np.where(known, values.mean(axis=0), predicted.mean)
     spread = np.where(known, np.maximum(values.std(axis=0, ddof=1), null.sd), predicted.spread)
-    error = np.where(known, spread / np.sqrt(UNITS), predicted.error)
+    error = np.where(known, spread / np.sqrt(count), predicted.error)
     return replace(predicted, mean=mean, error=error, spread=spread, units=np.where(known, values, np.nan))
 
 

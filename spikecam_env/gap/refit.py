@@ -26,8 +26,9 @@ RESPONSE = ("conversion_gain_spread", "bias_voltage_spread", "capacitor_spread",
 DARK = ("dark_current", "dark_current_spread", "dark_current_tail", "hot_pixels")
 DARK_PATTERN = (*DARK[1:], *RESPONSE)
 NOISE = ("shot_noise", "reset_noise", "excess_threshold_noise")
-LINES = ("row_fixed_pattern", "column_fixed_pattern")
-"""Offsets of the swing by row and column: they change how noisy pixels are, too, and not the pattern alone."""
+LINES = {"row_fixed_pattern": 1, "column_fixed_pattern": 0}
+"""Offsets of the swing by row and column, and the axis along which they are the same: they change how noisy pixels are,
+too, and not the pattern alone."""
 
 RESTLESS = 3.0
 """Times the median A_16 from which a pixel is left out of the jitter."""
@@ -157,7 +158,7 @@ def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
     if "reset_noise" not in names and "excess_threshold_noise" not in names:
         inverse = base.white if shot else 0.0
     inverse = min(inverse, base.white)
-    swing = _swings(model, base.gain)
+    swing = _swings(model, base.gain, shape)
     reset = max(base.white - inverse, 0.0)
     more = np.mean(inverse / swing + reset / swing**2) / base.white if base.white > 0 else 1.0
     electrons = swing * more / inverse if inverse > 0 else law.electrons
@@ -174,17 +175,30 @@ def unit_as_base(unit: Unit) -> BaseFit:
     return BaseFit(unit.gain, unit.dark, zero, zero, white, np.zeros((0, unit.gain.size)), unit.gain > 0)
 
 
-def _swings(model: SensorModel, gain: Array) -> Array:
+def _swings(model: SensorModel, gain: Array, shape: tuple[int, int]) -> Array:
     """(P,) swing of each pixel over nominal, as its response lets expect: of what makes pixels differ by the model, a
-    share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less."""
+    share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less.
+
+    What all pixels of a row or column share is its offset, where the model has such, and a matter of swing alone.
+    """
+    usual = float(np.median(gain))
+    if usual <= 0:
+        return np.ones_like(gain)
+    names = {e.name for e in model.effects}
+    own, lines = (gain / usual).reshape(shape), np.ones(shape)
+    for name, along in LINES.items():
+        if name in names:
+            line = np.median(own, axis=along, keepdims=True)
+            own, lines = own / np.maximum(line, 1e-9), lines * line
+    return np.asarray(np.clip(lines, 0.5, 2.0) ** -1 * np.clip(own, 0.5, 2.0) ** -_share_of_bias(model)).reshape(-1)
+
+
+def _share_of_bias(model: SensorModel) -> float:
+    """Share of bias in the variance of pixels' response, rows and columns apart."""
     circuit, spreads = model.circuit, {e.name: e.parameters() for e in model.effects}
-    offsets_V = [spreads.get("bias_voltage_spread", {}).get("sigma_V", 0.0)]
-    offsets_V += [1e-3 * spreads[name]["sigma_mV"] for name in LINES if name in spreads]
-    bias = float(np.linalg.norm(offsets_V)) / circuit.swing_V
+    bias = spreads.get("bias_voltage_spread", {}).get("sigma_V", 0.0) / circuit.swing_V
     others = np.hypot(
         spreads.get("conversion_gain_spread", {}).get("sigma", 0.0),
         spreads.get("capacitor_spread", {}).get("sigma_fF", 0.0) / circuit.capacitance_fF,
     )
-    share = bias**2 / (bias**2 + others**2) if bias > 0 else 0.0
-    usual = np.median(gain)
-    return np.clip(gain / usual, 0.5, 2.0) ** -share if usual > 0 else np.ones_like(gain)
+    return float(bias**2 / (bias**2 + others**2)) if bias > 0 else 0.0

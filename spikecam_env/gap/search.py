@@ -180,11 +180,11 @@ def compared(
     tried = worth_fitting(shapes, misfit(distance, here.weight), loud(here, distance))
     unit = replace(case, base=turn.base)
     confirm = partial(confirmed, unit, turn.model, here, seen)
-    fits = fits_of(unit, turn.model, here, seen, turn.misfit, tried)
+    fits, began = fits_of(unit, turn.model, here, seen, turn.misfit, tried)
     sure, rest = settle([f for f in fits if shows(here, f)], confirm, enough=turn.misfit - GAIN)
     rest = [*rest, *(f for f in fits if not shows(here, f))]
     if sure and turn.misfit - sure[0].misfit > GAIN:
-        again = [s for s in other_shapes(sure[0].name, shapes, turn.misfit) if s not in tried]
+        again = other_shapes(began[sure[0].name], shapes, turn.misfit)
         if again and not case.effort.allows(f"{sure[0].name} of another shape"):
             again = []
         anew = [confirm(f) for f in other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again)]
@@ -195,17 +195,20 @@ def compared(
 
 def fits_of(
     case: Case, model: SensorModel, null: Null, seen: Array, before: float, starts: Sequence[Screened]
-) -> list[Fit]:
-    """Candidates fitted from where their templates say, each from the best of its starts; before: misfit of none."""
+) -> tuple[list[Fit], dict[str, Screened]]:
+    """(candidates fitted from where their templates say, each from the best of its starts; which that was, by name).
+    before: misfit of none."""
     with ThreadPoolExecutor(case.jobs) as pool:
         from_all = list(pool.map(partial(fit_from, case, model, null, seen), starts))
-        fits = [
-            min((f for f in from_all if f.name == name), key=lambda f: f.misfit)
-            for name in dict.fromkeys(f.name for f in from_all)
-        ]
+        fits, began = [], {}
+        for name in dict.fromkeys(f.name for f in from_all):
+            of_it = [i for i, f in enumerate(from_all) if f.name == name]
+            best = min(of_it, key=lambda i: from_all[i].misfit)
+            fits.append(from_all[best])
+            began[name] = starts[best]
         worth = worth_shaping(null, before, fits)
         better = list(pool.map(partial(shaped, case, model, null, seen), worth))
-    return [*better, *(f for f in fits if f not in worth)]
+    return [*better, *(f for f in fits if f not in worth)], began
 
 
 def fit_from(case: Case, model: SensorModel, null: Null, seen: Array, start: Screened) -> Fit:
@@ -267,19 +270,25 @@ def instead_of(turn: Round, names: Sequence[str]) -> list[Fit]:
     return sorted(beside, key=lambda f: f.misfit)[:1]
 
 
-def other_shapes(name: str, screened: Sequence[Screened], before: float) -> list[Screened]:
+def other_shapes(began: Screened, screened: Sequence[Screened], before: float) -> list[Screened]:
     """Where else to fit a candidate from, whose shape is fitted too: a valley may have two ends.
 
-    Those of its templates that explain half of what the best does; before: misfit of none.
+    Those of its templates, but for where the best fit began, that explain half of what the best of them does; all where
+    templates are of other pictures.  before: misfit of none.
     """
-    best, *others = [s for s in screened if s.name == name]
-    several = set(candidate(name).shapes) & set(candidate(name).fitted)
-    return [s for s in others if several and before - s.misfit > 0.5 * (before - best.misfit)]
+    name = began.name
+    if not set(candidate(name).shapes) & set(candidate(name).fitted):
+        return []
+    there = [s for s in screened if s.name == name]
+    half = 0.5 * (before - there[0].misfit)
+    return [s for s in there if s is not began and (of_motion(name) or before - s.misfit > half)]
 
 
 def shows(here: Null, found: Fit) -> bool:
-    """Whether an effect does anything that a statistic would show, but where it wanders."""
-    change = np.abs(found.prediction.mean - here.mean) / here.noise
+    """Whether an effect does anything that a statistic would show, in the mean or by how campaigns scatter (a few hot
+    pixels are in some units), but where it wanders."""
+    there = found.prediction
+    change = np.hypot(there.mean - here.mean, np.sqrt(np.maximum(there.spread**2 - here.sd**2, 0.0))) / here.noise
     return candidate(found.name).wanders or bool(change.max() > SEEN)
 
 
@@ -395,7 +404,7 @@ def worth_fitting(shapes: Sequence[Screened], before: float, loud: Collection[st
 
     loud: groups of statistics that stand out.  Where the pattern does, with the two best of those that only change it,
     whose statistics are not in proportion to their strength; where motion does, with all that show by it alone, in
-    every shape that promises anything: templates are of other pictures.
+    every shape, whatever it promises: templates are of other pictures.
     """
     screened = best_of_each(shapes)
     if not screened:
@@ -405,7 +414,7 @@ def worth_fitting(shapes: Sequence[Screened], before: float, loud: Collection[st
     tried = [s for i, s in enumerate(worth[:TRIED]) if i < FEWEST or s.misfit < half]
     also = [s for s in screened if is_pattern(s.name)][:2] if "pattern" in loud else []
     if {"moving", "step"} & set(loud):
-        also += [s for s in shapes if of_motion(s.name) and (s in screened or s.misfit < before - LEAST)]
+        also += [s for s in shapes if of_motion(s.name)]
     return tried + [s for s in also if s not in tried]
 
 

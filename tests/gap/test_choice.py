@@ -130,7 +130,7 @@ def test_a_round_in_which_nothing_promises_enough_is_one_without_a_choice(monkey
     rho, before = judged(n, seen, n.prediction)
     assert poor.misfit == pytest.approx(before)
     monkeypatch.setattr(search, "screen", lambda *_: [])
-    monkeypatch.setattr(search, "fits_of", lambda *_: [poor])
+    monkeypatch.setattr(search, "fits_of", lambda *_: ([poor], {}))
     monkeypatch.setattr(search, "confirmed", lambda *_: pytest.fail("it was confirmed"))
     turn = Round(MODEL, unit(), n.prediction, rho, before)
     after = search.compared(recorded(), n, n, seen, values, [], {}, turn)

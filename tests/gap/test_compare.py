@@ -118,6 +118,20 @@ def test_deviates_of_few_twins_are_normal(twins):
     assert distance < 1.95 / np.sqrt(20_000)
 
 
+def test_what_drawn_units_show_is_no_less_likely_than_their_number_says():
+    """Four units in forty are ten widths off: t says that it never happens, these say that one in nine does.  What none
+    of them shows, and the other side, are as they were."""
+    null = made_up(count=3)
+    units = np.zeros((40, 3))
+    units[:4] = 10.0
+    there = Prediction(np.zeros(3), np.zeros(3), np.ones(3), units=units)
+    t = np.array([8.0, -8.0, 12.0])
+    z, before = normal(null, t, there), normal(null, t, replace(there, units=None))
+    print(z, before)
+    assert z[0] == pytest.approx(stats.norm.isf(5 / 41))
+    assert z[1:] == pytest.approx(np.array([-1, 1]) * np.abs(normal(null, t, replace(there, units=0 * units)))[1:])
+
+
 def test_noise_that_is_known_makes_a_normal_deviate():
     """All floor: Student's t has no say.  All learnt: |z| of Student's t of 11 at 5 is 3.6 or so."""
     assert normal(made_up(sd=1e-9, floor=1.0), np.array([5.0]))[0] == pytest.approx(5.0, abs=0.01)

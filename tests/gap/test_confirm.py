@@ -8,8 +8,8 @@ import numpy as np
 from small import MODEL, TWINS, effect, null, recorded
 
 from spikecam_env.gap.compare import alarmed, judged, residual, size_of, values_of
-from spikecam_env.gap.confirm import as_wide, is_missed, made_loud, made_sure, of_any_dark, quietened
-from spikecam_env.gap.fit import fit, predict
+from spikecam_env.gap.confirm import as_wide, confirmed, is_missed, made_loud, made_sure, of_any_dark, quietened
+from spikecam_env.gap.fit import MANY, Fit, fit, predict, with_pattern
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.settle import FURTHEST
@@ -94,3 +94,23 @@ def test_more_twins_say_whether_something_is_left_where_two_cannot():
     assert left == [False, True]
     assert len(sure.prediction.draws) == TWINS and sure.model == found.model
     assert np.all(sure.prediction.error >= found.prediction.error)
+
+
+def test_a_column_that_few_units_have_is_no_surprise_to_many():
+    """Columns of 100 mV, one of them 3 deviations off: none of the first two dozen units has pixels that far out; of
+    240 some have.  What is left in no unit's reach is left."""
+    case, there = recorded(effect("column_fixed_pattern", sigma_mV=100.0)), null()
+    model = with_effect(MODEL, "column_fixed_pattern", {"sigma_mV": 100.0})
+    found = Fit("column_fixed_pattern", {}, {}, there.prediction, within(model, case.base), there.mean, 0.0, model)
+    found = confirmed(case, MODEL, there, values_of(case.bank, there.keys), found)
+    few, many = found.prediction, with_pattern(case, model, there, there.prediction, MANY)
+    at = next(i for i, k in enumerate(there.keys) if k.name == "over 5" and k.recording == "flat-0.2")
+    tops = [float(np.max(p.units[:, at])) for p in (few, many)]
+    values = np.where(np.arange(len(there.keys)) == at, np.nextafter(tops[1], 0.0), few.mean)
+    sure = made_sure(case, MODEL, there, values, values, found)
+    print(f"of {len(few.units)} units {tops[0]:.1f}, of {len(sure.prediction.units)} {tops[1]:.1f}")
+    assert tops[1] > tops[0]
+    left = [alarmed(there, residual(there, values, f.prediction), f.prediction) for f in (found, sure)]
+    assert left == [True, False]
+    off = np.where(np.arange(len(values)) == at, 10 * tops[1], sure.prediction.mean)
+    assert alarmed(there, residual(there, off, sure.prediction), sure.prediction)

@@ -13,6 +13,8 @@ from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_patter
 from spikecam_env.gap.candidates import testable as split_testable
 from spikecam_env.gap.compare import Prediction, judged, misfit, scale_of, values_of
 from spikecam_env.gap.fit import concerned, fit, predict, slope_between, with_held_out
+from spikecam_env.gap.refit import within
+from spikecam_env.gap.search import standing_on
 from spikecam_env.gap.strength import with_effect
 from spikecam_env.gap.units import spread_factor
 from spikecam_env.sensor import CATALOGUE
@@ -168,6 +170,24 @@ def test_held_out_flats_are_simulated_only_where_a_refit_can_judge_them():
     held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
     assert set(with_held_out(case, moving)) == set(moving)
     assert set(with_held_out(case, sorted(still))) == still | held
+
+
+def test_beside_a_bend_what_shows_by_motion_is_read_by_a_refit_with_that_bend():
+    """Skew beside a non-linearity, step and bars alone simulated: as where all is.  Read by the unit itself, whose
+    response the refit does not see, the step was 67 noises off, and no skew was found there."""
+    bent = with_effect(MODEL, "photo_response_nonlinearity", {"beta": 0.05})
+    case = recorded(effect("photo_response_nonlinearity", beta=0.05))
+    base = within(bent, case.base)
+    here = standing_on(null(), predict(case, bent, base, null(), 2))
+    skewed = with_effect(bent, "readout_skew", {"span": 0.5})
+    moving = [i for i, c in enumerate(case.conditions) if c.moves]
+    whole, part = (predict(case, skewed, base, here, 1, only) for only in (None, moving))
+    off = (part.mean - whole.mean) / here.noise
+    names = {case.conditions[i].name for i in moving}
+    worst = float(np.abs(off[[k.recording in names for k in here.keys]]).max())
+    shows = float(np.abs((whole.mean - here.mean) / here.noise).max())
+    print(f"off by {worst:.2f}, shows by {shows:.0f}")
+    assert shows > 10 and worst < 1
 
 
 def test_pixels_that_do_not_respond_are_none_of_the_spread():

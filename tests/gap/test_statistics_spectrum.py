@@ -31,6 +31,18 @@ def test_strongest_line_is_at_its_cycles(cycles):
     assert at == cycles and 20 < ratio < 160
 
 
+def test_where_power_rises_steeply_there_is_no_line():
+    """A thousandfold in ten bins, where dim pixels' own rates begin: the first of them is 50 times the median of both
+    sides, and no more than chance over what comes after it.  A line within the rise, above all that follows, is one."""
+    cycles = np.arange(4001)
+    power = 10.0 ** np.clip((cycles - 600.0) / 3.0, 0.0, 3.0) * np.random.default_rng(1).exponential(size=4001)
+    at, ratio = strongest_line(power)
+    print(f"{at}: {ratio:.0f}")
+    assert ratio < 20
+    power[605] = 1e5
+    assert strongest_line(power)[0] == 605 and strongest_line(power)[1] > 60
+
+
 def test_bands_go_on_from_each_other_to_half_the_rate():
     edges = bands(FRAMES)
     assert edges[0] == 3 and edges[-1] == FRAMES // 2 and (edges[1:] > edges[:-1]).all() and edges.size == BANDS + 1

@@ -12,7 +12,7 @@ from spikecam_env.gap.candidates import NOISE_OF_A_RESET
 from spikecam_env.gap.compare import Null, misfit, values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.screen import Screened, screen
-from spikecam_env.gap.search import loud, worth_fitting
+from spikecam_env.gap.search import loud, other_shapes, worth_fitting
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.templates import TIMES, load
 from spikecam_env.sensor import CATALOGUE
@@ -43,10 +43,11 @@ def test_the_best_are_tried_and_what_takes_many_twins_where_it_explains_half():
 
 def test_where_motion_stands_out_all_that_shows_by_it_is_tried_in_every_shape():
     """A template of other bars may take the level from which light spills for another."""
-    shapes = [Screened("blooming", {"full": full}, 990.0, np.zeros(1)) for full in (0.85, 1.0, 0.75)]
+    shapes = [Screened("blooming", {"full": full}, 1000.0, np.zeros(1)) for full in (0.85, 1.0, 0.75)]
     screened = [Screened("clock_jitter", {}, 100.0, np.zeros(1)), *shapes]
     tried = worth_fitting(screened, 1000.0, {"moving"})
     assert [s.start for s in tried if s.name == "blooming"] == [s.start for s in shapes]
+    assert other_shapes(shapes[1], screened, 1000.0) == [shapes[0], shapes[2]]
     assert [s.start for s in worth_fitting(screened, 1000.0) if s.name == "blooming"] == [{"full": 0.85}]
 
 

@@ -16,6 +16,9 @@ from spikecam_env.gap.statistics.reading import STILL, Reading, log
 
 BANDS = 8
 
+_SIDE = 25
+"""Bins to either side that a line has to stand above."""
+
 
 def spectrum(frame: NDArray[np.int32]) -> NDArray[np.float64]:
     """Periodogram of spikes a frame, relative to their mean; bin n is n cycles in the recording.
@@ -35,7 +38,7 @@ def bands(frames: int) -> NDArray[np.int64]:
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
-    """band n: log power.  line: log of the strongest bin over the median around it, below a quarter of the rate."""
+    """band n: log power.  line: log of the strongest bin over what is around it, below a quarter of the rate."""
     if reading.conditions[i].kind not in STILL:
         return {}
     o = reading.observations[i]
@@ -49,12 +52,16 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
 
 
 def strongest_line(power: NDArray[np.float64]) -> tuple[int, float]:
-    """(bin, power over the median of its neighbourhood) of the strongest bin above the slowest two."""
+    """(bin, power over the median of its neighbourhood) of the strongest bin above the slowest two.
+
+    The neighbourhood is the louder of the two sides: where dim pixels' own rates begin, power rises a thousandfold in
+    ten bins, and the first of them would stand out as a line.
+    """
     low = power[3 : max(len(power) // 2, 8)]
-    width = 25
-    padded = np.pad(low, width, mode="reflect") if len(low) > width else np.pad(low, width, mode="edge")
-    local = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1), axis=1)
-    ratio = low / np.maximum(local, 1e-30)
+    width = min(_SIDE, len(low) - 1)
+    padded = np.pad(low, width, mode="reflect")
+    sides = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
+    ratio = low / np.maximum(np.maximum(sides[: len(low)], sides[-len(low) :]), 1e-30)
     at = int(np.argmax(ratio))
     return at + 3, float(ratio[at])
 
