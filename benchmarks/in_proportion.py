@@ -1,6 +1,6 @@
 """Whether statistics go with the strength of an effect as far as `gap.strength.AS_LOUD` takes them to.
 
-    python -m benchmarks.in_proportion
+    python -m benchmarks.in_proportion [PRESET ...]      by default scsim and physical, whose noise is smaller
 
 Each effect as strong as its clearest statistic is PEAK noises off, and FURTHEST times as strong, TWINS of the same
 draws each.  of the effect: correlation of what both do to all statistics.  worst: what the stronger, scaled down, has
@@ -8,6 +8,8 @@ most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for
 """
 
 from __future__ import annotations
+
+import sys
 
 import numpy as np
 
@@ -22,8 +24,10 @@ from spikecam_env.sensor import CATALOGUE
 
 PEAK, TWINS = 15.0, 4
 
-if __name__ == "__main__":
-    case, model, null = standard_case(count=12)
+
+def report(preset: str) -> None:
+    """Print a line an effect."""
+    case, model, null = standard_case(preset=preset)
     base = within(model, case.base)
     has = {e.name for e in model.effects}
     names = [n for n in CANDIDATES if candidate(n).power == 1.0 and not (candidate(n).wanders or is_pattern(n))]
@@ -44,7 +48,13 @@ if __name__ == "__main__":
         at = int(np.argmax(wrong))
         k = null.keys[at]
         print(
-            f"{name:28s} of the effect {np.corrcoef(weak, scaled)[0, 1]:.3f}   worst {wrong[at]:5.1f}: {weak[at]:.1f} "
-            f"taken for {scaled[at]:.1f} ({k.group} {k.recording} {k.name}){'' if is_linear(name) else '   mixed'}",
+            f"{preset:8s} {name:28s} of the effect {np.corrcoef(weak, scaled)[0, 1]:.3f}   worst {wrong[at]:5.1f}: "
+            f"{weak[at]:.1f} taken for {scaled[at]:.1f} ({k.group} {k.recording} {k.name})"
+            f"{'' if is_linear(name) else '   mixed'}",
             flush=True,
         )
+
+
+if __name__ == "__main__":
+    for preset in sys.argv[1:] or ("scsim", "physical"):
+        report(preset)

@@ -30,8 +30,8 @@ class BlindTrial:
     """Folder for manifest, sealed keys, results, trial.json and trial.md."""
     set: Literal["quick", "full"] = "quick"
     """Which set of cases."""
-    part: Literal["tune", "report"] = "tune"
-    """Disjoint seeds and outside mechanisms: one to work on, one to judge by."""
+    part: Literal["tune", "report", "verify"] = "tune"
+    """Disjoint seeds: one to work on, two to judge by, of other outside mechanisms; `verify` was looked at last."""
     jobs: int = 1
     """Cases at once, each in a process of its own."""
     threads: int = 1

@@ -132,7 +132,7 @@ CANDIDATES: dict[str, Candidate] = {
     "column_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_even),
     "vignetting": Candidate("optics", ("falloff",), needs=_even),
     "optical_blur": Candidate("optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
-    "crosstalk": Candidate("coupling", ("kick",), needs=_steady),
+    "crosstalk": Candidate("coupling", ("kick",), mixed=True, needs=_steady),
     "blooming": Candidate("coupling", ("share", "full"), {"full": (0.75, 0.85, 1.0)}, needs=_bright, nudge=-0.1),
     "readout_skew": Candidate("readout", ("span",), needs=_moving, only_contrast=True),
     "missed_spikes": Candidate("readout", ("probability",), needs=_steady, events=True),

@@ -147,11 +147,13 @@ def save(templates: Templates, path: Path) -> None:
         np.savez_compressed(file, about=json.dumps(about), shift=shift, noise=templates.noise.astype(np.float32))
 
 
-def standard_case(jobs: int = 1, seed: int = SEED, count: int = 12) -> tuple[Case, SensorModel, Null]:
-    """A unit of the standard model in the standard design, as a measurement, and what its model predicts."""
+def standard_case(
+    jobs: int = 1, seed: int = SEED, count: int = 12, preset: str = MODEL
+) -> tuple[Case, SensorModel, Null]:
+    """A unit of a preset in the standard design, as a measurement, and what its model predicts."""
     from spikecam_env.gap.world import planned
 
-    model = SensorModel.preset(MODEL)
+    model = SensorModel.preset(preset)
     conditions = planned(standard_design(), SHAPE, FRAMES)
     unit = model.draw_unit(SHAPE, seed)
     base = unit_as_base(unit)

@@ -159,11 +159,11 @@ def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
 
 
 def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
-    """A row of the ranking."""
+    """A row of the ranking; the misfit of what was added is beside all that was found, in their noise."""
     before = turn.misfit
     parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
     worst = float(np.abs(found.rho).max())
-    reason = f"leaves {worst:.1f} noises at worst" if found.misfit < before else "explains nothing"
+    reason = f"leaves {worst:.1f} noises at worst" if accepted or found.misfit < before else "explains nothing"
     return Ranked(found.name, candidate(found.name).family, before, found.misfit, parameters, accepted, reason)
 
 

@@ -3,7 +3,8 @@
 Groups: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `base` (the base model's own effects,
 told `ideal`), `outside`, `left_out` (a catalogue effect, its name withheld), `pair`, `tricky`.
 
-The parts `tune` and `report` share no seed and no outside mechanism, nor do the sets `quick` and `full` share seeds.
+No two parts share a seed, nor do the sets `quick` and `full`; `tune` shares no outside mechanism with the others.  Of
+`report` cases have been looked at since, to find what was wrong; `verify` is as `report`, of seeds that were not.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from tests.hidden_world.outside import OUTSIDE, REPORT, TUNE
 from tests.hidden_world.world import MECHANISMS, Recipe, stream
 
 SETS = ("quick", "full")
-PARTS = ("tune", "report")
+PARTS = ("tune", "report", "verify")
 GROUPS = ("none", "strong", "weak", "base", "outside", "left_out", "pair", "tricky", "severe")
 BASE_CAMERAS = ("scsim", "physical")
 
@@ -76,6 +77,16 @@ COUNTS = {"full": Counts(60, 3, 2, 2, 3, 1, 30, 2, 1), "quick": Counts(6, 1, 1, 
 QUICK_SHARE = 4
 """Of the groups that go through mechanisms, `quick` takes every fourth."""
 
+MILLION = {
+    ("quick", "tune"): 1,
+    ("quick", "report"): 2,
+    ("full", "tune"): 3,
+    ("full", "report"): 4,
+    ("quick", "verify"): 5,
+    ("full", "verify"): 6,
+}
+"""Where the seeds of a set and part begin, in millions."""
+
 BENDS = ("dead_time", "photo_response_nonlinearity", "synchronous_reset", "ir_drop")
 """At the strengths drawn all take x^2 off the rate, see `score.INSEPARABLE`."""
 
@@ -109,8 +120,7 @@ def cases(which: str, part: str) -> list[Case]:
     """All cases of a set and part, group by group."""
     counts = COUNTS[which]
     every = QUICK_SHARE if which == "quick" else 1
-    start = {("quick", "tune"): 1, ("quick", "report"): 2, ("full", "tune"): 3, ("full", "report"): 4}[which, part]
-    seeds = itertools.count(1_000_000 * start)
+    seeds = itertools.count(1_000_000 * MILLION[which, part])
     shift = 0 if part == "tune" else 1
     known = list(CATALOGUE)[shift % every :: every]
     outside = list(TUNE if part == "tune" else REPORT)[:: max(1, every // 2)]

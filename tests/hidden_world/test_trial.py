@@ -12,7 +12,7 @@ import pytest
 
 from spikecam_env.cli.blind_trial import BlindTrial, hidden_world
 from spikecam_env.errors import InputError
-from tests.hidden_world.cases import Case, cases
+from tests.hidden_world.cases import PARTS, Case, cases
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 from tests.hidden_world.keys import BrokenSealError, key_text, open_key, seal
 from tests.hidden_world.outside import REPORT, TUNE
@@ -20,7 +20,7 @@ from tests.hidden_world.record import in_short, pack, unpack
 from tests.hidden_world.score import FAMILIES, binomial_90, confusion, family_of, figures, score_case
 from tests.hidden_world.trial import as_text, chosen, code, is_done, run_trial, score_trial
 
-FULL = {part: cases("full", part) for part in ("tune", "report")}
+FULL = {part: cases("full", part) for part in PARTS}
 TITLE = {"set": "full", "part": "tune"}
 
 
@@ -55,7 +55,7 @@ def test_full_set_has_the_numbers_that_are_asked():
 
 
 def test_parts_and_sets_share_no_seed_and_no_outside_mechanism():
-    every = [c for which in ("quick", "full") for part in ("tune", "report") for c in cases(which, part)]
+    every = [c for which in ("quick", "full") for part in PARTS for c in cases(which, part)]
     assert len({c.recipe.seed for c in every}) == len(every) == len({c.id for c in every})
     outside = [{c.what for c in FULL[part] if c.group == "outside"} for part in ("tune", "report")]
     assert outside == [set(TUNE), set(REPORT)]
