@@ -69,6 +69,9 @@ PROMISE = 15.0
 SEEN = 2.0
 """Noises by which an effect has to change a statistic to be added: twins of nothing may be luckier than others."""
 
+FREE = 2.0
+"""Misfit that a parameter of no meaning removes (Akaike)."""
+
 RETRIED, NEAR = 4, 0.5
 """Runners-up of an effect that are tried anew beside a later one: so many at most, and of what it removed the share
 that they have to have removed."""
@@ -322,7 +325,7 @@ def chosen_of(
     """(fits, the chosen one first; names of its rivals).  What may as well be true as the first, by the recordings to
     fit (`seen`), or leaves hardly more, is put in order by all recordings (`values`), and has to be a rival by them.
     A parameter more has to explain more: what has one is chosen where it leaves LEAST less, and is a rival where it
-    leaves less at all."""
+    leaves as much less as any parameter would (FREE)."""
     if not sure:
         return [], ()
     first = sure[0].prediction
@@ -341,7 +344,7 @@ def chosen_of(
     rivals = [
         f.name
         for f in close[1:]
-        if (free[f.name] <= free[best.name] or behind[f.name] < behind[best.name])
+        if ((more := free[f.name] - free[best.name]) <= 0 or behind[f.name] + FREE * more < behind[best.name])
         and is_rival(here, null.draws, values, best.prediction, f.prediction)
         and (
             alarmed(here, left, best.prediction)

@@ -14,7 +14,7 @@ from spikecam_env.gap.compare import Draw, Null, Prediction, judged
 from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
-from spikecam_env.gap.search import PROMISE, Round, chosen_of, instead_of, joined, revisited, settle
+from spikecam_env.gap.search import FREE, PROMISE, Round, chosen_of, instead_of, joined, revisited, settle
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.verdict import explains, harmless
 
@@ -82,6 +82,22 @@ def test_a_parameter_more_has_to_explain_more(better, first):
     richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
     fits, rivals = chosen_of(n, n, seen + nudge, values + nudge, [richer, simple])
     assert fits[0].name == first and rivals == ()
+
+
+def test_what_has_a_parameter_more_is_a_rival_where_it_leaves_more_than_that_less():
+    """An incomplete reset with the change of a dead time and ever more of what that lacks: any parameter leaves some."""
+    n, effect, values, seen = campaign()
+    told = []
+    for better in np.linspace(0.0, 1.0, 21):
+        nudge = np.where((np.arange(COUNT) >= 50) & (np.arange(COUNT) < 60), better * n.sd, 0.0)
+        simple = a_fit(n, "dead_time", effect, seen + nudge)
+        richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
+        ahead = lead(n, values + nudge, richer.prediction, simple.prediction)
+        if 0 < ahead < LEAST:
+            told.append((ahead, chosen_of(n, n, seen + nudge, values + nudge, [richer, simple])[1]))
+    print([(round(ahead, 2), rivals) for ahead, rivals in told])
+    assert {rivals for ahead, rivals in told if ahead < FREE} == {()}
+    assert {rivals for ahead, rivals in told if ahead > FREE} == {("incomplete_reset",)}
 
 
 def test_recordings_held_out_have_no_say_where_the_others_tell():
