@@ -85,7 +85,7 @@ def test_a_parameter_more_has_to_explain_more(better, first):
 
 
 def test_what_has_a_parameter_more_is_a_rival_where_it_leaves_more_than_that_less():
-    """An incomplete reset with the change of a dead time and ever more of what that lacks: any parameter leaves some."""
+    """An incomplete reset with the change of a dead time and ever more of what that lacks."""
     n, effect, values, seen = campaign()
     told = []
     for better in np.linspace(0.0, 1.0, 21):
