@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap.exhibits import by_loudness, exhibits
-from spikecam_env.gap.exhibits.spectrum import averaged
+from spikecam_env.gap.exhibits.spectrum import averaged, panels
 from spikecam_env.gap.exhibits.step import free_window
 from spikecam_env.gap.report import command_of, report, write_report
 from spikecam_env.gap.result import VERDICTS
@@ -202,6 +202,19 @@ def test_the_spectrum_of_independent_spikes_is_flat_at_one() -> None:
     assert abs(np.average(power, weights=count) - 1) < 0.05
     assert np.sqrt(np.mean(z**2)) < 1.4
     assert frequency[-1] <= 20_000
+
+
+def test_a_model_that_is_silent_in_the_dark_has_a_spectrum_to_draw() -> None:
+    """Power 0 beside what was measured: no infinite band of noise, no warning."""
+    seen = made_up.evidence(None)
+    silent = tuple(
+        replace(o, frame=np.zeros_like(o.frame)) if c.kind == "dark" else o
+        for c, o in zip(seen.conditions, seen.before, strict=True)
+    )
+    drawn = list(panels(replace(seen, before=silent), 40_000.0))
+    assert [p.title for p in drawn if "dark" in p.title]
+    for p in drawn:
+        assert np.isfinite(p.sd).all() and np.isfinite(p.before).all(), p.title
 
 
 def test_written_files_are_whole_and_the_model_loads_back(tmp_path: Path) -> None:

@@ -17,6 +17,9 @@ CAPTION = (
     "ripple: in lit recordings only, or in the dark too. Combs at multiples of the rate are the pixels' own beat."
 )
 
+NONE = 1e-12
+"""Power over white noise's that is none: a model without dark current is silent in the dark."""
+
 _SEGMENT = 1024
 """Frames of a window at most."""
 
@@ -32,19 +35,19 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             before = averaged(t.before.frame, frame_rate_hz)[1]
             after = averaged(t.after.frame, frame_rate_hz)[1] if t.after else None
             sd = before * np.sqrt(2 / count)
-            sd = np.maximum(sd, before * _local_scatter(measured / before))
+            sd = np.maximum(sd, before * _local_scatter(np.log(np.maximum(measured, NONE) / np.maximum(before, NONE))))
             made.append(Panel(f"Power spectrum, {t.shown.name}", "frequency [Hz]", "power over white noise's",
                                 frequency, measured, before, after, sd, log="xy"))  # fmt: skip
         yield from loudest(made, 1)
 
 
-def _local_scatter(ratio: Array) -> Array:
-    """Scatter of log(ratio) between adjacent frequencies.
+def _local_scatter(log_ratio: Array) -> Array:
+    """Scatter of the logarithm of a ratio between adjacent frequencies.
 
     Pixels that keep their beat make periodogram values depend on one another, more at some frequencies than at others;
     their scatter shows it, and sees neither a few lines nor a broad rise.
     """
-    jumps = np.abs(np.diff(np.log(ratio)))
+    jumps = np.abs(np.diff(log_ratio))
     local = ndimage.median_filter(jumps, 21, mode="nearest") * 1.4826 / np.sqrt(2)
     return np.append(local, local[-1])
 
