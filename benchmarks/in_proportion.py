@@ -2,9 +2,10 @@
 
     python -m benchmarks.in_proportion [PRESET ...]      by default scsim and physical, whose noise is smaller
 
-Each effect as strong as its clearest statistic is PEAK noises off, and FURTHEST times as strong, TWINS of the same
-draws each.  of the effect: correlation of what both do to all statistics.  worst: what the stronger, scaled down, has
-most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Those marked `mixed` are not scaled.
+Each effect as strong as its clearest statistic of recordings to fit is PEAK noises off, and FURTHEST times as strong,
+TWINS of the same draws each.  of the effect: correlation of what both do to all statistics.  worst: what the stronger,
+scaled down, has most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Those marked `mixed`
+are not scaled.
 """
 
 from __future__ import annotations
@@ -28,16 +29,18 @@ PEAK, TWINS = 15.0, 4
 def report(preset: str) -> None:
     """Print a line an effect."""
     case, model, null = standard_case(preset=preset)
+    templates = load()
+    told = [case.use(k.recording) == "fit" for k in templates.keys]
     base = within(model, case.base)
     has = {e.name for e in model.effects}
     names = [n for n in CANDIDATES if candidate(n).power == 1.0 and not (candidate(n).wanders or is_pattern(n))]
     for name in sorted((n for n in names if n not in has), key=lambda n: not is_linear(n)):
-        entries = [e for e in load().entries if e.name == name]
+        entries = [e for e in templates.entries if e.name == name]
         if not entries:
             continue
         entry = entries[len(entries) // 2]
         key = CATALOGUE[name].strength
-        one = entry.parameters[key] * PEAK / np.abs(entry.shift).max()
+        one = entry.parameters[key] * PEAK / np.abs(entry.shift[told]).max()
         change = []
         for strength in (one, FURTHEST * one):
             there = with_effect(model, name, bounded(name, {**entry.parameters, key: strength}))
