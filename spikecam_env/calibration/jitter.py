@@ -127,9 +127,13 @@ class _Fit(NamedTuple):
 
 
 def _fit(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array, *, slow: bool) -> _Fit:
-    """Gauss-Newton on weighted means."""
+    """Gauss-Newton on weighted means.
+
+    Weights follow the noise, by which steps may turn back by half of the one before, for twenty of them.  From two that
+    go to and fro, all that would follow are taken at once (Aitken).
+    """
     t2 = interval**2
-    white, b = 3e-5, 0.0
+    white, b, last = 3e-5, 0.0, np.inf
     for _ in range(_ITERATIONS):
         fraction, slope = _quantisation(steps, interval, white)
         expected = (2 * steps * white + steps**2 * b) * t2 + fraction
@@ -147,8 +151,15 @@ def _fit(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array,
         before = white
         white = float(np.clip(white + change[0], max(white / 4, _LEAST), 4 * white))
         b += change[1] if slow else 0.0
-        if abs(white - before) < 1e-6 * before:
+        step = white - before
+        if abs(step) < 1e-6 * before:
             break
+        back = step / last
+        if -1.0 < back < 0.0:
+            rest = back / (1.0 - back)
+            white = max(white + rest * step, _LEAST)
+            b += rest * change[1] if slow else 0.0
+        last = np.inf if -1.0 < back < 0.0 else step
     sd = np.sqrt(np.diag(inverse @ (scores @ scores.T) @ inverse.T))
     share = (weight * shapes[0] * shapes[0] * terms).sum(axis=(0, 2))
     return _Fit(white, float(sd[0]), b, float(sd[1]) if slow else 0.0, share / share.sum())
