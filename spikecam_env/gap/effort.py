@@ -1,4 +1,4 @@
-"""How much one diagnosis simulates: counted in recordings, and not in seconds, so that its answer is any machine's."""
+"""How much one diagnosis simulates: counted in recordings, and not in seconds, whatever the machine's speed."""
 
 from __future__ import annotations
 
