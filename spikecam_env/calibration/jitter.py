@@ -154,12 +154,11 @@ def _fit(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array,
         step = white - before
         if abs(step) < 1e-6 * before:
             break
-        back = step / last
+        back, last = step / last, step
         if -1.0 < back < 0.0:
             rest = back / (1.0 - back)
-            white = max(white + rest * step, _LEAST)
+            white, last = max(white + rest * step, _LEAST), np.inf
             b += rest * change[1] if slow else 0.0
-        last = np.inf if -1.0 < back < 0.0 else step
     sd = np.sqrt(np.diag(inverse @ (scores @ scores.T) @ inverse.T))
     share = (weight * shapes[0] * shapes[0] * terms).sum(axis=(0, 2))
     return _Fit(white, float(sd[0]), b, float(sd[1]) if slow else 0.0, share / share.sum())

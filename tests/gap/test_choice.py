@@ -14,7 +14,7 @@ from spikecam_env.gap.compare import Draw, Null, Prediction, judged
 from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
-from spikecam_env.gap.search import FREE, PROMISE, Round, chosen_of, instead_of, joined, revisited, settle
+from spikecam_env.gap.search import FREE, PROMISE, Round, chosen_of, instead_of, joined, revisited, settle, shows
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.verdict import explains, harmless
 
@@ -98,6 +98,14 @@ def test_what_has_a_parameter_more_is_a_rival_where_it_leaves_more_than_that_les
     print([(round(ahead, 2), rivals) for ahead, rivals in told])
     assert {rivals for ahead, rivals in told if ahead < FREE} == {()}
     assert {rivals for ahead, rivals in told if ahead > FREE} == {("incomplete_reset",)}
+
+
+def test_what_makes_campaigns_scatter_shows_though_their_mean_stays():
+    """A few hot pixels are in some units, and in most none: the spread is four times the null's, or as it was."""
+    n, effect, _values, seen = campaign()
+    still = a_fit(n, "hot_pixels", 0.0 * effect, seen)
+    wide = replace(still, prediction=replace(still.prediction, spread=4.0 * n.sd))
+    assert shows(n, wide) and not shows(n, still)
 
 
 def test_recordings_held_out_have_no_say_where_the_others_tell():

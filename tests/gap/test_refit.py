@@ -186,8 +186,8 @@ def test_noise_follows_the_swing_as_in_drawn_units_and_is_the_refits_in_the_mean
 
 @pytest.mark.parametrize("name", ["row_fixed_pattern", "column_fixed_pattern"])
 def test_the_swing_of_a_whole_line_is_all_of_its_response(name):
-    """Pixels of a line differ by other things too, their median hardly: its swing within 3 % of the drawn, 6 % to be
-    had where a share of every pixel's response was taken for swing."""
+    """Pixels of a line differ by other things too, their median hardly: its swing within 3 % of the drawn, and 5 %
+    off where a share of every pixel's response was taken for swing."""
     shape = (64, 64)
     model = MODEL.with_effect(effect(name, sigma_mV=100.0))
     true = model.draw_unit(shape, 4)
