@@ -15,7 +15,7 @@ import pytest
 from laws import jittered, with_effects
 
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit
+from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, decay
 from spikecam_env.sensor.agreement import compare, observe
 from spikecam_env.sensor.effects.base import Array, Charge, Exposure, Spikes, parameter
 from spikecam_env.sensor.kernels import block, draws, loop
@@ -241,6 +241,13 @@ def test_octave_field_keeps_unit_variance_and_its_correlation() -> None:
         product = (one * total[20]).mean()
         print(f"{name}: {product:.4f}, expected {expected:.4f}")
         assert abs(product - expected) < 4.5 * np.sqrt(2 / value.size)
+
+
+def test_the_kernel_names_the_decay_that_it_is_compiled_with() -> None:
+    now = zlib.crc32(inspect.getsource(decay).encode())
+    from spikecam_env.sensor.kernels import block_loop
+
+    assert now == block_loop.DECAY, f"the decay has changed: write DECAY = {now:#x} in {block_loop.__file__}"
 
 
 def test_kernels_name_the_draws_that_they_are_compiled_with() -> None:

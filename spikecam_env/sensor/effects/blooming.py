@@ -27,5 +27,12 @@ class Blooming(Effect):
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         x = light.values
-        spill = self.share * np.maximum(x - self.full, 0.0)
-        return Charge(x - spill + neighbour_sum(spill) / 4.0), dark, memory
+        spill = x - self.full
+        np.maximum(spill, 0.0, out=spill)
+        if not spill.any():
+            return light, dark, memory
+        spill *= self.share
+        arrives = neighbour_sum(spill)
+        arrives /= 4.0
+        arrives += x - spill
+        return Charge(arrives), dark, memory

@@ -10,11 +10,11 @@ Source: image lag of a soft reset (Pain et al. 1999, sub-threshold reset); expon
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
 
 
@@ -34,7 +34,7 @@ class IncompleteReset(Effect):
         over = np.clip(charge.flat[at] / np.maximum(rate.flat[at], 1e-12), 0.0, 1.0)
         crossing, last = now.number + 1.0 - over, memory.copy()
         left = charge.copy()
-        left.flat[at] -= self.fraction * _expm1(-(crossing - memory.flat[at]) / self.tau(now))
+        left.flat[at] -= self.fraction * (decayed(np.minimum((crossing - memory.flat[at]) / self.tau(now), LONG)) - 1.0)
         last.flat[at] = crossing
         return left, last
 
@@ -44,8 +44,3 @@ class IncompleteReset(Effect):
     def tau(self, now: Exposure) -> float:
         """Time constant of filling [frames]."""
         return self.tau_us * 1e-6 * now.frame_rate_hz
-
-
-def _expm1(x: Array) -> Array:
-    """exp(x) - 1 by the C library, as the compiled kernel has it; numpy's own differs in the last bit."""
-    return np.array([math.expm1(value) for value in x])

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,16 +21,21 @@ from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Few, Stage, parameter
 
+AHEAD = 4096
+"""Switches that are drawn at once."""
+
 
 class Traps(NamedTuple):
     """pixels: flat indices (n,) of those with a trap.  upper: (n,) which are in the upper state.
 
-    charge: (n,) thresholds a frame in that state.  rng: what switches them.
+    charge: (n,) thresholds a frame in that state.  switches: (k,) those to come, ascending, as places in the frames'
+    states (F, n), flat, from the next frame on; at least one.  rng: what draws more.
     """
 
     pixels: NDArray[np.intp]
     upper: NDArray[np.bool_]
     charge: Array
+    switches: NDArray[np.int64]
     rng: np.random.Generator
 
 
@@ -45,11 +51,23 @@ class RandomTelegraphNoise(Effect):
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Traps:
         pixels = np.flatnonzero(pattern.random(first.shape) < self.fraction)
         charge = first.charge_of(self.amplitude_pA).reshape(-1)[pixels]
-        return Traps(pixels, rng.random(pixels.size) < 0.5, charge, rng)
+        upper = rng.random(pixels.size) < 0.5
+        return Traps(pixels, upper, charge, self._after(-1, first.frame_rate_hz, rng), rng)
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Traps) -> tuple[Charge, Charge, Traps]:
-        leaves = -math.expm1(-2e3 / (self.dwell_ms * now.frame_rate_hz)) / 2.0
-        switches = memory.rng.random((now.frames, memory.upper.size)) < leaves
-        upper = np.logical_xor.accumulate(np.concatenate([memory.upper[None], switches]))[1:]
+        upper = np.zeros((now.frames, memory.pixels.size), np.bool_)
+        switches = memory.switches
+        while switches[-1] < upper.size:
+            more = self._after(switches[-1], now.frame_rate_hz, memory.rng)
+            switches = np.concatenate([switches, more])
+        here = np.searchsorted(switches, upper.size)
+        upper.reshape(-1)[switches[:here]] = True
+        for before, after in pairwise([memory.upper, *upper]):
+            np.logical_xor(before, after, out=after)
         raised = dark.plus(Few(memory.pixels, memory.charge * upper))
-        return light, raised, memory._replace(upper=upper[-1].copy())
+        return light, raised, memory._replace(upper=upper[-1].copy(), switches=switches[here:] - upper.size)
+
+    def _after(self, last: int, frame_rate_hz: float, rng: np.random.Generator) -> NDArray[np.int64]:
+        """(AHEAD,) places of the switches that follow one: each frame every trap switches with the same probability."""
+        leaves = -math.expm1(-2e3 / (self.dwell_ms * frame_rate_hz)) / 2.0
+        return np.asarray(last + np.cumsum(rng.geometric(leaves, AHEAD)))

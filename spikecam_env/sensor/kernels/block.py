@@ -37,8 +37,9 @@ allocator keeps; fresh pages cost up to four times the arithmetic."""
 
 _NOBODY = Few(np.empty(0, np.intp), np.empty((1, 0)))
 
-_FEWEST = 8
-"""Frames of a block, even of a large array: what a block costs besides is shared by so many."""
+_FEWEST, _LONGEST = 8, 256
+"""Frames of a block, even of a large array: what a block costs besides is shared by so many; and even of a small one:
+what rows and single pixels have of their own in each frame then stays in the cache."""
 
 
 def missing(effects: Sequence[Effect]) -> list[str]:
@@ -158,7 +159,7 @@ def _blocks(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[list[_Part]]
 
 def _most(light: Ramp) -> int:
     """Frames of a block in such light, at most."""
-    return max(_FEWEST, (_BLOCK if light.steady else _MOVING) // light.level.size)
+    return min(max(_FEWEST, (_BLOCK if light.steady else _MOVING) // light.level.size), _LONGEST)
 
 
 def _parts(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[_Part]:

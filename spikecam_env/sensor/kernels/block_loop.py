@@ -19,6 +19,7 @@ import math
 import numpy as np
 from numba import njit
 
+from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.light import GRAINS
 
@@ -28,20 +29,23 @@ BAND = 1024
 GROUP = 16
 """Pixels that are worked out together where one of them fires (LLVM would make no vector instructions of fewer)."""
 
-DRAWS = 0x3BD9BCE3
-"""Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
+DRAWS, DECAY = 0x3BD9BCE3, 0xFDEE1FA
+"""Checksums of the draws and of the decay compiled in: numba's cache sees a change of this file, not of those it
+imports from."""
+
+decay = njit(inline="always")(decayed)
 
 _U = np.uint32
 _Q = np.uint64
 _G = float(GRAINS)
 
 # Rows of a band's scratch: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
-_HELD, _LIMIT, _PHI, _ARRIVES, _STANDS, _MOVED, _FACTOR, _LOAD, _NOISE, _JITTER, _ELECTRONS = (
-    row * BAND for row in range(11)
+_HELD, _LIMIT, _PHI, _ARRIVES, _STANDS, _MOVED, _FACTOR, _LOAD, _NOISE, _JITTER, _ELECTRONS, _CROSSED = (
+    row * BAND for row in range(12)
 )
-_PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _AWAKE = ((22 + row) * BAND for row in range(6))  # of 32 bits
-_HIT = 8 * 14 * BAND  # of 8 bits
-_SCRATCH = 15 * BAND
+_PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _AWAKE = ((24 + row) * BAND for row in range(6))  # of 32 bits
+_HIT = 8 * 15 * BAND  # of 8 bits
+_SCRATCH = 16 * BAND
 _INSIDE = BAND - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
 
 
@@ -117,6 +121,7 @@ def advance(  # type: ignore[no-untyped-def]
     live = np.empty(BAND // GROUP, np.int64)
     around = np.empty(columns, np.uint8)
     place = np.empty(few.size, np.int64)
+    few_row = few // columns
     few_of = np.empty(together + 1, np.int64)
     for line0 in range(0, row_of.size, together * lines):
         stop = min(line0 + together * lines, row_of.size)
@@ -130,6 +135,7 @@ def advance(  # type: ignore[no-untyped-def]
             words = x.view(np.uint32)
             copy(charge[p0 : p0 + n], x[_HELD + h0 : _HELD + h0 + n])
             copy(threshold[p0 : p0 + n], x[_PHI + h0 : _PHI + h0 + n])
+            copy(crossing[p0 : p0 + n], x[_CROSSED + h0 : _CROSSED + h0 + n])
             copy(fired[p0 : p0 + n], words[_FIRED + h0 : _FIRED + h0 + n])
             for j in range(n):
                 words[_PIXEL + h0 + j] = _U(p0 + j)
@@ -147,13 +153,14 @@ def advance(  # type: ignore[no-untyped-def]
             for b in range(together):
                 x, words, hit = scratch[b], scratch[b].view(np.uint32), scratch[b].view(np.uint8)[_HIT : _HIT + BAND]
                 begin, end = line0 + b * lines, min(line0 + (b + 1) * lines, stop)
+                arrived = False
                 for line in range(begin, end if t == 0 or moves else begin):
                     r, p0, n, h0 = row_of[line], pixel_of[line], width_of[line], slot_of[line]
                     a, d, f, m = light_factor[t, r], dark_factor[t, r], factor[t, r], common[t, r]
                     load = 1.0 + droop * activity[r]
                     was = stood[b, line - begin]
                     if light_moves or dark_moves or a != was[0] or d != was[1]:
-                        was[0], was[1] = a, d
+                        was[0], was[1], arrived = a, d, True
                         arrive(lights[p0 : p0 + n], darks[p0 : p0 + n], a, d, x[_ARRIVES + h0 : _ARRIVES + h0 + n])
                     if f != was[2] or load != was[4]:
                         x[_FACTOR + h0 : _FACTOR + h0 + n] = f
@@ -172,8 +179,9 @@ def advance(  # type: ignore[no-untyped-def]
                             x[_LIMIT + h0 : _LIMIT + h0 + n],
                         )
                 for i in range(few_of[b], few_of[b + 1]):
-                    p = few[i]
-                    r = p // columns
+                    if not arrived and extra[t, i] == extra[t - 1, i]:
+                        continue
+                    p, r = few[i], few_row[i]
                     at_light, at_dark = lights[p] * light_factor[t, r], (darks[p] + extra[t, i]) * dark_factor[t, r]
                     x[_ARRIVES + place[i]] = (max(at_light, 0.0) + max(at_dark, 0.0)) * _G
                 used = (end - begin) * pitch
@@ -192,10 +200,10 @@ def advance(  # type: ignore[no-untyped-def]
                         p0, n, h0 = pixel_of[line], width_of[line], _HELD + slot_of[line]
                         couple(kick, around[p0 - r * columns :], scratch[line // lines, h0 : h0 + n])
             if left != 0.0:
-                for line in range(line0, stop):
-                    p0, n, x = pixel_of[line], width_of[line], scratch[(line - line0) // lines]
-                    end_of_frame = number + t + 1.0
-                    stay(x, slot_of[line], bits[p0 : p0 + n], crossing[p0 : p0 + n], end_of_frame, left, left_tau)
+                for b in range(together):
+                    x, hit = scratch[b], scratch[b].view(np.uint8)[_HIT : _HIT + BAND]
+                    groups = find_live(hit.view(np.uint64), BAND // GROUP, live)
+                    stay(x, hit, live, groups, number + t + 1.0, left, left_tau)
             if droop != 0.0:
                 for r in range(row_of[line0], row_of[stop - 1] + 1):
                     activity[r] = bits[r * columns : (r + 1) * columns].sum() / columns
@@ -205,6 +213,7 @@ def advance(  # type: ignore[no-untyped-def]
             words = x.view(np.uint32)
             copy(x[_HELD + h0 : _HELD + h0 + n], charge[p0 : p0 + n])
             copy(x[_PHI + h0 : _PHI + h0 + n], threshold[p0 : p0 + n])
+            copy(x[_CROSSED + h0 : _CROSSED + h0 + n], crossing[p0 : p0 + n])
             copy(words[_FIRED + h0 : _FIRED + h0 + n], fired[p0 : p0 + n])
 
 
@@ -331,21 +340,23 @@ def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-un
                 x[_LIMIT + j] = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
 
 
-@njit(inline="always")
-def stay(x, h0, bits, crossing, end, left, left_tau):  # type: ignore[no-untyped-def]
-    """What stays on the photodiode at the resets of a line's pixels that fired; h0: its first slot, end: of frame."""
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def stay(x, hit, live, groups, end, left, left_tau):  # type: ignore[no-untyped-def]
+    """What stays on the photodiode at the resets of the pixels that fired; end: of the frame."""
     draws = x.view(np.float32)
-    for j in range(bits.size):
-        if bits[j]:
-            h = h0 + j
-            rate = x[_ARRIVES + h] / _G
-            late = min(max(x[_HELD + h] / _G / max(rate, 1e-12), 0.0), 1.0)
-            crossed = end - late
-            stays = left * math.expm1(-(crossed - crossing[j]) / left_tau)
-            crossing[j] = crossed
-            x[_HELD + h] = (x[_HELD + h] / _G - stays) * _G
-            x[_PHI + h] = needed(x[_ELECTRONS + h] + stays, x[_NOISE + h], x[_JITTER + h], draws[_DRAW + h])
-            x[_LIMIT + h] = (x[_PHI + h] * x[_FACTOR + h] + x[_MOVED + h]) * x[_LOAD + h]
+    for g in range(groups):
+        q = live[g] & _INSIDE
+        for j in range(q, q + GROUP):
+            held, rate = x[_HELD + j] / _G, x[_ARRIVES + j] / _G
+            crossed = end - min(max(held / max(rate, 1e-12), 0.0), 1.0)
+            stays = left * (decay(min((crossed - x[_CROSSED + j]) / left_tau, LONG)) - 1.0)
+            phi = needed(x[_ELECTRONS + j] + stays, x[_NOISE + j], x[_JITTER + j], draws[_DRAW + j])
+            limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+            fires = hit[j] != 0
+            x[_CROSSED + j] = crossed if fires else x[_CROSSED + j]
+            x[_HELD + j] = (held - stays) * _G if fires else x[_HELD + j]
+            x[_PHI + j] = phi if fires else x[_PHI + j]
+            x[_LIMIT + j] = limit if fires else x[_LIMIT + j]
 
 
 @njit(inline="always")
