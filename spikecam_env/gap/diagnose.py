@@ -46,6 +46,7 @@ from spikecam_env.gap.search import Round, of_fit, search
 from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.verdict import concluded, grounded, harmless
 from spikecam_env.gap.words import sentence, unfinished
+from spikecam_env.gap.workers import sums_in_one_order
 from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
 
@@ -55,6 +56,7 @@ ALARM = 0.02
 """Adjusted p-value below which there is a discrepancy at all."""
 
 
+@sums_in_one_order
 def diagnose(
     campaign: Campaign | str | Path,
     model: SensorModel | str | Path = "scsim",
@@ -72,9 +74,9 @@ def diagnose(
 
     campaign: a folder in the format spikecam-campaign/1.  model: a SensorModel, a preset's name or a TOML path.
     candidates: names to try, default the whole catalogue; exclude: names to leave out.  Same seed, same answer.
-    jobs: threads.  effort: times the campaign may be simulated before nothing more is begun that an answer can do
-    without, such as a third effect; infinite for whatever it takes.  Raises InputError for an unreadable campaign, an
-    unknown name, no effort, or too few static recordings of known light to refit the unit by.
+    jobs: threads, which change no bit.  effort: times the campaign may be simulated before nothing more is begun that
+    an answer can do without, such as a third effect; infinite for whatever it takes.  Raises InputError for an
+    unreadable campaign, an unknown name, no effort, or too few static recordings of known light to refit the unit by.
     """
     if not effort > 0:
         raise InputError(f"effort {effort:g}: it must be above 0")

@@ -27,7 +27,7 @@ SHOWS = 8.0
 """Noises that a template has to show on the recordings at hand to bound its effect."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Screened:
     """A candidate as its template sees it.  start: parameters to fit from.  misfit: what it would leave.
 

@@ -8,7 +8,7 @@ that others leave open, and in whether anything is left to look for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -183,14 +183,15 @@ def compared(
     tried = worth_fitting(shapes, misfit(distance, here.weight), loud(here, distance))
     unit = replace(case, base=turn.base)
     confirm = partial(confirmed, unit, turn.model, here, seen)
-    fits, began = fits_of(unit, turn.model, here, seen, turn.misfit, tried)
+    fits, tries = fits_of(unit, turn.model, here, seen, turn.misfit, tried)
     sure, rest = settle([f for f in fits if shows(here, f)], confirm, enough=turn.misfit - GAIN)
     rest = [*rest, *(f for f in fits if not shows(here, f))]
     if sure and turn.misfit - sure[0].misfit > GAIN:
-        again = other_shapes(began[sure[0].name], shapes, turn.misfit)
+        began = min((s for s in tries if s.name == sure[0].name), key=lambda s: tries[s].misfit)
+        again = other_shapes(began, shapes, turn.misfit)
         if again and not case.effort.allows(f"{sure[0].name} of another shape"):
             again = []
-        anew = [confirm(f) for f in other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again)]
+        anew = [confirm(f) for f in other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again, tries)]
         sure[0] = min((sure[0], *anew), key=lambda f: f.misfit)
     sure, rivals = chosen_of(null, here, seen, values, sure)
     return replace(turn, fits=(*sure, *rest), rivals=rivals)
@@ -198,20 +199,16 @@ def compared(
 
 def fits_of(
     case: Case, model: SensorModel, null: Null, seen: Array, before: float, starts: Sequence[Screened]
-) -> tuple[list[Fit], dict[str, Screened]]:
-    """(candidates fitted from where their templates say, each from the best of its starts; which that was, by name).
+) -> tuple[list[Fit], dict[Screened, Fit]]:
+    """(candidates fitted from where their templates say, each from the best of its starts; the fit from each start).
     before: misfit of none."""
     with ThreadPoolExecutor(case.jobs) as pool:
-        from_all = list(pool.map(partial(fit_from, case, model, null, seen), starts))
-        fits, began = [], {}
-        for name in dict.fromkeys(f.name for f in from_all):
-            of_it = [i for i, f in enumerate(from_all) if f.name == name]
-            best = min(of_it, key=lambda i: from_all[i].misfit)
-            fits.append(from_all[best])
-            began[name] = starts[best]
+        tries = dict(zip(starts, pool.map(partial(fit_from, case, model, null, seen), starts), strict=True))
+        names = dict.fromkeys(s.name for s in starts)
+        fits = [min((f for f in tries.values() if f.name == name), key=lambda f: f.misfit) for name in names]
         worth = worth_shaping(null, before, fits)
         better = list(pool.map(partial(shaped, case, model, null, seen), worth))
-    return [*better, *(f for f in fits if f not in worth)], began
+    return [*better, *(f for f in fits if f not in worth)], tries
 
 
 def fit_from(case: Case, model: SensorModel, null: Null, seen: Array, start: Screened) -> Fit:
@@ -220,13 +217,21 @@ def fit_from(case: Case, model: SensorModel, null: Null, seen: Array, start: Scr
 
 
 def other_ends(
-    case: Case, model: SensorModel, null: Null, seen: Array, before: float, best: Fit, starts: Sequence[Screened]
+    case: Case,
+    model: SensorModel,
+    null: Null,
+    seen: Array,
+    before: float,
+    best: Fit,
+    starts: Sequence[Screened],
+    tries: Mapping[Screened, Fit],
 ) -> list[Fit]:
     """The best candidate from the best of its other shapes, if any removes ALIKE of what it does before they are fitted
-    too; starts: none for none."""
+    too; starts: none for none.  tries: fits from starts that were made before."""
     with ThreadPoolExecutor(case.jobs) as pool:
-        fits = pool.map(partial(fit_from, case, model, null, seen), starts)
-        alike = [f for f in fits if before - f.misfit > ALIKE * (before - best.misfit)]
+        new = [s for s in starts if s not in tries]
+        fits = {**tries, **dict(zip(new, pool.map(partial(fit_from, case, model, null, seen), new), strict=True))}
+    alike = [fits[s] for s in starts if before - fits[s].misfit > ALIKE * (before - best.misfit)]
     return [shaped(case, model, null, seen, f) for f in sorted(alike, key=lambda f: f.misfit)[:1]]
 
 

@@ -6,8 +6,11 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
+from threadpoolctl import threadpool_limits
+
+P = ParamSpec("P")
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -24,3 +27,10 @@ def at_once(work: Callable[[T], R], parts: Iterable[T], jobs: int) -> list[R]:
 def _pool(jobs: int, process: int) -> ThreadPoolExecutor:
     """Threads do not survive a fork, hence one pool a process."""
     return ThreadPoolExecutor(jobs, thread_name_prefix="simulates")
+
+
+def sums_in_one_order(what: Callable[P, R]) -> Callable[P, R]:
+    """The function with linear algebra on one thread: more would add up in another order, and a last bit that differs
+    can turn what is tried next."""
+    limited: Callable[P, R] = threadpool_limits.wrap(limits=1, user_api="blas")(what)
+    return limited

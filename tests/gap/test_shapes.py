@@ -69,6 +69,10 @@ def test_of_other_shapes_the_best_is_fitted_whole_where_it_removes_nearly_as_muc
     best = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
     tried = [{"fraction": 0.08, "tau_us": tau_us} for tau_us in (600.0, 8000.0)]
     starts = [Screened("photodiode_lag", there, best.misfit, np.full(len(measured), np.inf)) for there in tried]
-    found = other_ends(case, MODEL, null(), measured, before, best, starts)
+    found = other_ends(case, MODEL, null(), measured, before, best, starts, {})
     print(f"{before:.0f}, of the best {best.misfit:.0f}", [(f.parameters, round(f.misfit)) for f in found])
     assert [f.parameters["tau_us"] for f in found] == [pytest.approx(1000.0, rel=0.2)]
+    spent = case.effort.simulated
+    tries = {starts[0]: replace(best, misfit=before)}
+    assert other_ends(case, MODEL, null(), measured, before, best, starts[:1], tries) == []
+    assert case.effort.simulated == spent, "what was fitted from there before is not fitted again"
