@@ -30,7 +30,7 @@ from spikecam_env.gap.compare import (
     values_of,
 )
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.settle import FURTHEST, settled, shifted
+from spikecam_env.gap.settle import FURTHEST, moved_by, settled, shifted
 from spikecam_env.gap.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
 from spikecam_env.gap.traps import traps_of
 from spikecam_env.gap.units import drawn_banks
@@ -44,11 +44,16 @@ HOPE = 5.0
 TURNS = 5
 """Most twins that the fit of one candidate's strength takes."""
 
+STILL = 3e-4
+"""Relative move of a unit's gain up to which its twins say what an effect does: where pixels saturate, statistics are
+not those of a unit so much brighter, less what that adds."""
+
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
 WANDER, SEVERAL = 6, 3
-"""Twins of an effect that makes statistics scatter, and of one that is few events, or in few pixels."""
+"""Twins of an effect that makes statistics scatter; and of one that is few events, or in few pixels, or that cannot be
+simulated louder than it is to stand above one twin's noise."""
 
 APART = 0.05
 """Least step of a logarithm between two twins for a slope."""
@@ -88,7 +93,8 @@ def predict(
 
 def twins_of(name: str) -> int:
     """How many twins say what an effect does."""
-    return SEVERAL if candidate(name).events or candidate(name).strikes else 1
+    what = candidate(name)
+    return SEVERAL if what.events or what.strikes or what.mixed else 1
 
 
 def as_seen(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> BaseFit:
@@ -142,8 +148,9 @@ def _fit_twins(
     expected: Array | None,
     white: float,
 ) -> Fit:
-    """Twins at the start, made stronger until they show, scaled until the strength is right to a third and the unit has
-    settled; the last step is a scaling of what was simulated, without another twin."""
+    """Twins at the start, made stronger until they show, once more where the unit settles far off, scaled until the
+    strength is right to a third and the unit has settled; the last step is a scaling of what was simulated, without
+    another twin."""
     what = candidate(name)
     strength = what.fitted[0]
     power = what.power
@@ -155,6 +162,7 @@ def _fit_twins(
     only = concerned(case, [name], null, measured, expected * louder)
     last: tuple[float, Prediction] | None = None
     slope: Array | None = None
+    still = False
     for turn in range(TURNS):
         tried = with_effect(model, name, parameters)
         predicted = predict(case, tried, base, null, twins_of(name), only)
@@ -163,9 +171,13 @@ def _fit_twins(
             more = (2 * VISIBLE / max(seen, 0.2)) ** (1 / power)
             stronger = bounded(name, {**parameters, strength: parameters[strength] * more})
             if stronger != parameters:
+                base = shifted(bare, base, abs(stronger[strength] / parameters[strength]) ** power)
                 parameters, only = stronger, concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
                 continue
-        base = as_seen(tried, base, null, predicted)
+        assumed, base = base, as_seen(tried, base, null, predicted)
+        if not still and turn < TURNS - 1 and moved_by(assumed, base) > STILL:
+            still = True
+            continue
         scale, sd = scale_to(null, measured, predicted)
         if judged(null, measured, scaled(null, predicted, scale))[1] > before - HOPE:
             factor, near = 1e-3, True

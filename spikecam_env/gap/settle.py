@@ -41,6 +41,12 @@ def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Seque
     return within(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
 
 
+def moved_by(one: BaseFit, other: BaseFit) -> float:
+    """By how much pixels respond more in one of two units than in the other, relative; the median."""
+    there = (one.gain > 0) & (other.gain > 0)
+    return abs(float(np.median(np.log(other.gain[there] / one.gain[there])))) if there.any() else 0.0
+
+
 def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Array) -> Array:
     """(P,) least-squares polynomial of second order through y, of the pixels `known`, over their gain and dark level;
     outliers of y are cut."""

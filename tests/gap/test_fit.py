@@ -13,8 +13,10 @@ from spikecam_env.gap.candidates import CANDIDATES, candidate, chosen, is_patter
 from spikecam_env.gap.candidates import testable as split_testable
 from spikecam_env.gap.compare import Prediction, judged, misfit, scale_of, values_of
 from spikecam_env.gap.fit import concerned, fit, predict, slope_between, with_held_out
+from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.search import standing_on
+from spikecam_env.gap.settle import moved_by
 from spikecam_env.gap.strength import with_effect
 from spikecam_env.gap.units import spread_factor
 from spikecam_env.sensor import CATALOGUE
@@ -196,3 +198,21 @@ def test_pixels_that_do_not_respond_are_none_of_the_spread():
     factors = [spread_factor(m, "gain", 0.02, (64, 64), 3) for m in (MODEL, dead)]
     print(factors)
     assert factors[1] == pytest.approx(factors[0], rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [3, 8, 10])
+def test_a_weak_effect_on_rates_is_fitted_beside_light_that_saturates(seed):
+    """Crosstalk makes the refit 1 % brighter; bars of 1.4 thresholds a frame tell that from a unit so much brighter."""
+    case = recorded(effect("crosstalk", kick=0.0025), seed=seed)
+    without = model_null(case, MODEL, 12)
+    measured = values_of(case.bank, without.keys)
+    found = fit(case, MODEL, without, measured, "crosstalk", {"kick": 0.002})
+    print(found.parameters, judged(without, measured, without.prediction)[1], found.misfit)
+    assert found.parameters["kick"] == pytest.approx(0.0025, rel=0.2)
+
+
+def test_a_unit_has_moved_by_what_its_pixels_respond_more():
+    base = recorded().base
+    assert moved_by(base, base) == 0.0
+    assert moved_by(base, replace(base, gain=base.gain * 0.99)) == pytest.approx(-np.log(0.99))
+    assert moved_by(base, replace(base, gain=base.gain * 0.0)) == 0.0, "which do not respond at all tell nothing"

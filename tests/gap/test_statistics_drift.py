@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small import check_reveals, effect
+from small import CLEAR, check_reveals, effect, recorded, seen
 
 from spikecam_env.gap.observe import observe
+from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.statistics.drift import EVEN, PARTS, lateness
 from spikecam_env.streams import pack_frames
 
@@ -15,7 +16,7 @@ SHAPE, FRAMES = (16, 16), 8000
 CASES = [
     (effect("lamp_drift", sigma_per_root_s=0.02), "flat-0.65", ["trend", "bend"], ["dark", "intervals", "rows"]),
     (effect("dark_current_drift", rise=0.3, tau_ms=50.0), "dark", ["trend"], ["intervals", "step"]),
-    (effect("random_telegraph_noise", amplitude_pA=1.0, fraction=0.1, dwell_ms=20.0), "flat-0.08", ["pixel tail"], []),
+    (effect("random_telegraph_noise", amplitude_pA=1.0, fraction=0.1, dwell_ms=20.0), "flat-0.2", ["pixel tail"], []),
     (effect("threshold_flicker_noise", sigma_mV=2.0), "flat-0.4", ["pixels"], ["dark"]),
 ]
 
@@ -54,3 +55,12 @@ def test_in_the_dark_a_wave_hardly_passes_for_a_drift():
 
 def test_few_intervals_tell_nothing():
     assert lateness(at(np.array([10.0, 3000.0]))) == {}
+
+
+def test_what_all_pixels_do_is_no_variance_within_a_pixel():
+    drifting = seen(recorded(effect("lamp_drift", sigma_per_root_s=0.3)))
+    for flat in ("flat-0.2", "flat-0.65"):
+        trend, pixels = (drifting[Key("drift", flat, name)] for name in ("trend", "pixels"))
+        print(f"{flat}: trend {trend:.0f}, pixels {pixels:.1f}")
+        assert abs(trend) > 2 * CLEAR
+        assert abs(pixels) < CLEAR

@@ -25,8 +25,8 @@ UNEVEN = 2e-4
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """trend: relative change of the array from start to end.  bend: half against half, curvature.  wander: log
-    variance of what is left.  pixels: log variance of blocks within a pixel, over x.  pixel tail: of the
-    one pixel in 50 that varies most, by mean.  late 0 .. 7, in the dark: `lateness`."""
+    variance of what is left.  pixels: log variance of blocks within a pixel, about what all do.  pixel tail: of
+    the one pixel in 50 that varies most, by mean.  late 0 .. 7, in the dark: `lateness`."""
     if reading.conditions[i].kind not in STILL:
         return {}
     o = reading.observations[i]
@@ -40,7 +40,8 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     left = relative - found["trend"] * t - found["bend"] * (t**2 - np.mean(t**2))
     found["wander"] = log(float(np.mean(left**2)), 1e-14)
     own = blocks[:, reading.base.live].astype(np.float64)
-    variance = own.var(axis=0)
+    common = own.mean(axis=0) * (1.0 + relative[:, None])  # or a lamp that drifts would be seen once more, squared
+    variance = np.mean((own - common) ** 2, axis=0)
     found["pixels"] = log(float(variance.mean()), 1e-6)
     most = np.sort(variance)[-max(variance.size // 50, 1) :].mean()  # counts are whole: a quantile of them would jump
     found["pixel tail"] = log(float(most / max(variance.mean(), 1e-6)), 1e-6)
