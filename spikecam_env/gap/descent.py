@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate
 from spikecam_env.gap.compare import Null, Prediction, change_of, judged, own_variance, step_of
-from spikecam_env.gap.fit import as_seen
+from spikecam_env.gap.fit import STILL, as_seen
 from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.gap.settle import moved_by
 from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.sensor import SensorModel
 
@@ -81,7 +82,7 @@ def descend(
     leave more, the best of where they led, of those alike the first, and no step further that promises little and goes
     as far as one may.  jobs: threads.  worth: misfit that a step has to promise, and the one before it to have removed.
     """
-    at = probe(model, base)
+    at, base = settled_there(probe, null, model, base, free)
     columns, doubt = derivatives(probe, null, measured, model, base, at, free, jobs)
     before, longest = spans(free), longest_of(free)
     tried = []
@@ -90,12 +91,11 @@ def descend(
         step = np.clip(step, -longest, longest)
         left, promised = (judged(null, measured, p)[1] for p in (at, replace(at, mean=at.mean + columns @ step)))
         tried.append((left, Descent(model, base, at, columns, doubt, covariance)))
-        there = as_seen(model, within(model, base), null, at)
-        model, base = moved(model, replace(there, white=base.white) if WHITE in free else there, free, step)
+        model, base = moved(model, as_told(model, base, null, at, free), free, step)
         little = left - promised < worth or (turn > 0 and 0 <= tried[-2][0] - left < worth)
         if turn == TURNS - 1 or little or np.all(np.abs(step) < SETTLED):
             break
-        after = probe(model, base)
+        after, base = settled_there(probe, null, model, base, free)
         if np.abs(step).max() < FAR:
             noise = np.sqrt(own_variance(null, at) + own_variance(null, after))
             columns = broyden(columns, step, after.mean - at.mean, noise)
@@ -139,17 +139,33 @@ def derivatives(
     jobs: int = 1,
 ) -> tuple[Array, Array]:
     """(S, n) change of the statistics for one more of each parameter's logarithm, and its noise; at: what the model
-    gives.  What one parameter of an effect clearly moves says of its others that they do not, or how far."""
+    gives.  Each is taken under a unit that has settled: of one that has not, light that saturates tells more than there
+    is.  What one parameter of an effect clearly moves says of its others that they do not, or how far."""
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
     nudges = np.array([nudge_of(name, key, peak) for name, key in free])
     with ThreadPoolExecutor(jobs) as pool:
         steps = [moved(model, base, [what], np.array([nudge])) for what, nudge in zip(free, nudges, strict=True)]
-        there = list(pool.map(lambda step: probe(*step), steps))
+        there = [made for made, _ in pool.map(lambda step: settled_there(probe, null, *step, free), steps)]
     changes, doubt, clear = (
         np.stack(v, axis=1) for v in zip(*(change_of(null, measured, t, at) for t in there), strict=True)
     )
     alike = np.array([[name == other for name, _ in free] for other, _ in free])
     return np.where(clear @ alike, changes, 0.0) / nudges, doubt / nudges
+
+
+def settled_there(
+    probe: Probe, null: Null, model: SensorModel, base: BaseFit, free: Free
+) -> tuple[Prediction, BaseFit]:
+    """(what a model gives under a unit that has settled, that unit): probed once more where the unit was not STILL."""
+    made = probe(model, base)
+    there = as_told(model, base, null, made, free)
+    return (made, base) if moved_by(base, there) < STILL else (probe(model, there), there)
+
+
+def as_told(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:
+    """`fit.as_seen`, but for an s^2 that is fitted."""
+    there = as_seen(model, within(model, base), null, made)
+    return replace(there, white=base.white) if WHITE in free else there
 
 
 def spans(free: Free) -> Array:
