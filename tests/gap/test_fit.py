@@ -200,7 +200,7 @@ def test_pixels_that_do_not_respond_are_none_of_the_spread():
     assert factors[1] == pytest.approx(factors[0], rel=0.1)
 
 
-@pytest.mark.parametrize("seed", [3, 8, 10])
+@pytest.mark.parametrize("seed", range(3, 7))
 def test_a_weak_effect_on_rates_is_fitted_beside_light_that_saturates(seed):
     """Crosstalk makes the refit 1 % brighter; bars of 1.4 thresholds a frame tell that from a unit so much brighter."""
     case = recorded(effect("crosstalk", kick=0.0025), seed=seed)
