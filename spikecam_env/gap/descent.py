@@ -145,7 +145,7 @@ def derivatives(
     nudges = np.array([nudge_of(name, key, peak) for name, key in free])
     with ThreadPoolExecutor(jobs) as pool:
         steps = [moved(model, base, [what], np.array([nudge])) for what, nudge in zip(free, nudges, strict=True)]
-        there = [made for made, _ in pool.map(lambda step: settled_there(probe, null, *step, free), steps)]
+        there = [made for made, _ in pool.map(lambda step: settled_there(probe, null, step[0], step[1], free), steps)]
     changes, doubt, clear = (
         np.stack(v, axis=1) for v in zip(*(change_of(null, measured, t, at) for t in there), strict=True)
     )
