@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate
 from spikecam_env.gap.compare import Null, Prediction, change_of, judged, own_variance, step_of
-from spikecam_env.gap.fit import STILL, as_seen
+from spikecam_env.gap.fit import as_seen
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.settle import moved_by
+from spikecam_env.gap.settle import is_still
 from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.sensor import SensorModel
 
@@ -156,10 +156,10 @@ def derivatives(
 def settled_there(
     probe: Probe, null: Null, model: SensorModel, base: BaseFit, free: Free
 ) -> tuple[Prediction, BaseFit]:
-    """(what a model gives under a unit that has settled, that unit): probed once more where the unit was not STILL."""
+    """(what a model gives under a unit that has settled, that unit): probed once more where the unit was not still."""
     made = probe(model, base)
     there = as_told(model, base, null, made, free)
-    return (made, base) if moved_by(base, there) < STILL else (probe(model, there), there)
+    return (made, base) if is_still(base, there) else (probe(model, there), there)
 
 
 def as_told(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:

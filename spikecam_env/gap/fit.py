@@ -30,7 +30,7 @@ from spikecam_env.gap.compare import (
     values_of,
 )
 from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.settle import FURTHEST, moved_by, settled, shifted
+from spikecam_env.gap.settle import FURTHEST, is_still, settled, shifted
 from spikecam_env.gap.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
 from spikecam_env.gap.traps import traps_of
 from spikecam_env.gap.units import drawn_banks
@@ -44,16 +44,12 @@ HOPE = 5.0
 TURNS = 5
 """Most twins that the fit of one candidate's strength takes."""
 
-STILL = 3e-4
-"""Relative move of a unit's gain up to which its twins say what an effect does: where pixels saturate, statistics are
-not those of a unit so much brighter, less what that adds."""
-
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
 WANDER, SEVERAL = 6, 3
-"""Twins of an effect that makes statistics scatter; and of one that is few events, or in few pixels, or that cannot be
-simulated louder than it is to stand above one twin's noise."""
+"""Twins of an effect that makes statistics scatter; and of one that is few events, or in few pixels, or that is
+`mixed`, and so cannot be simulated louder to stand above one twin's noise."""
 
 APART = 0.05
 """Least step of a logarithm between two twins for a slope."""
@@ -175,7 +171,7 @@ def _fit_twins(
                 parameters, only = stronger, concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
                 continue
         assumed, base = base, as_seen(tried, base, null, predicted)
-        if not still and turn < TURNS - 1 and moved_by(assumed, base) > STILL:
+        if not still and turn < TURNS - 1 and not is_still(assumed, base):
             still = True
             continue
         scale, sd = scale_to(null, measured, predicted)

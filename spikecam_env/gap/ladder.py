@@ -29,6 +29,7 @@ from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import of_fit, search
 from spikecam_env.gap.templates import load
+from spikecam_env.gap.workers import sums_in_one_order
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.whole import whole_file, write_text_whole
 
@@ -92,6 +93,7 @@ class Ladder:
         write_text_whole(folder / "ladder.json", json.dumps(self.to_json(), indent=1))
 
 
+@sums_in_one_order
 def ladder(
     campaign: Campaign | str | Path,
     model: SensorModel | str = "ideal",

@@ -20,6 +20,10 @@ HIDDEN = 0.5
 """Share of a refit's s^2 that is the unit's own, below which it stays: beside so much noise of an effect, the refit of
 twins does not tell it (`polish` does, by all statistics)."""
 
+STILL = 3e-4
+"""Relative move of a unit's gain up to which its twins say what an effect does: where pixels saturate, statistics are
+not those of a unit so much brighter, less what that adds."""
+
 FURTHEST = 4.0
 """Times as far that a unit is shifted at once for a stronger effect: a straight line leads nowhere."""
 
@@ -39,6 +43,11 @@ def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Seque
     white = used.white + wanted.white - float(np.mean([s.white for s in simulated]))
     white = used.white if used.white < HIDDEN * wanted.white else max(white, 0.1 * used.white)
     return within(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
+
+
+def is_still(one: BaseFit, other: BaseFit) -> bool:
+    """Whether a unit has moved so little, from one to the other, that twins of it say what an effect does."""
+    return moved_by(one, other) <= STILL
 
 
 def moved_by(one: BaseFit, other: BaseFit) -> float:

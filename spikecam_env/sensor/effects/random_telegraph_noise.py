@@ -56,10 +56,10 @@ class RandomTelegraphNoise(Effect):
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Traps) -> tuple[Charge, Charge, Traps]:
         upper = np.zeros((now.frames, memory.pixels.size), np.bool_)
-        switches = memory.switches
-        while switches[-1] < upper.size:
-            more = self._after(switches[-1], now.frame_rate_hz, memory.rng)
-            switches = np.concatenate([switches, more])
+        to_come = [memory.switches]
+        while to_come[-1][-1] < upper.size:
+            to_come.append(self._after(to_come[-1][-1], now.frame_rate_hz, memory.rng))
+        switches = np.concatenate(to_come)
         here = np.searchsorted(switches, upper.size)
         upper.reshape(-1)[switches[:here]] = True
         for before, after in pairwise([memory.upper, *upper]):
