@@ -2,8 +2,8 @@
 
     read -> audit -> refit -> twins -> alarm -> search -> gate -> verdict
 
-Each step is a function of its own, usable by itself.  Held-out recordings take no part in alarm and search, but for
-what `search` says; the gate is on all, and the gap on them alone.
+Each step is a function of its own, usable by itself.  Held-out recordings take no part in the search, but for what
+`search` says and where they alone disagree (`alarm`); the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations
@@ -21,16 +21,11 @@ from tqdm import tqdm
 
 from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.errors import InputError
+from spikecam_env.gap.alarm import lent, rings
 from spikecam_env.gap.audit import Contradiction, audit, upheld
 from spikecam_env.gap.candidates import chosen, is_pattern, testable
 from spikecam_env.gap.case import Case, case_of
-from spikecam_env.gap.compare import (
-    Null,
-    adjusted,
-    deviates,
-    of_all_recordings,
-    values_of,
-)
+from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves
@@ -45,15 +40,12 @@ from spikecam_env.gap.screen import bounds
 from spikecam_env.gap.search import Round, of_fit, search
 from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.verdict import concluded, grounded, harmless
-from spikecam_env.gap.words import sentence, unfinished
+from spikecam_env.gap.words import HELD_OUT_ALONE, sentence, unfinished
 from spikecam_env.gap.workers import sums_in_one_order
 from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-ALARM = 0.02
-"""Adjusted p-value below which there is a discrepancy at all."""
 
 
 @sums_in_one_order
@@ -116,12 +108,13 @@ def diagnose(
         before = model_null(replace(case, base=off.nominal), assumed, 2) if as_given else null
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
-    z = deviates(null, of_fit(case, null, values))
-    if adjusted(np.append(z, of_all_recordings(null.keys, z, "intervals"))).min() < ALARM:
+    by_fit = rings(null, of_fit(case, null, values))
+    if by_fit or rings(null, values):
+        heard = case if by_fit else lent(case)
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
-            rounds = harmless(case, null, values, search(case, start, null, values, names, templates or load()))
+            rounds = harmless(case, null, values, search(heard, start, null, values, names, templates or load()))
     if rounds and not lacking:
         off = replace(
             off, parameters=off_nominal(case, patterned(assumed, rounds[-1].model), rounds[-1].base).parameters
@@ -143,7 +136,7 @@ def diagnose(
         gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
         evidence=evidence,
-        data=(*found.data, *unfinished(case.effort)),
+        data=(*found.data, *([] if by_fit or not rounds else [HELD_OUT_ALONE]), *unfinished(case.effort)),
         simulated=case.effort.simulated,
         **asked,  # type: ignore[arg-type]
     )

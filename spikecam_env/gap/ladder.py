@@ -21,10 +21,11 @@ from tqdm import tqdm
 
 from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.gap import plots
+from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.candidates import chosen, testable
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.compare import Null, adjusted, deviates, values_of
-from spikecam_env.gap.diagnose import ALARM, in_order, read_case
+from spikecam_env.gap.compare import Null, adjusted, values_of
+from spikecam_env.gap.diagnose import in_order, read_case
 from spikecam_env.gap.missing import Missing, missing
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import of_fit, search
@@ -131,7 +132,7 @@ def ladder(
         rungs.append(tried[best])
         left.pop(best)
     bar.close()
-    if adjusted(deviates(null, of_fit(case, null, values))).min() < ALARM:
+    if rings(null, of_fit(case, null, values)):
         rounds = search(case, full, null, values, names, load())
         for was, now in itertools.pairwise(rounds):
             if now.model is not was.model:

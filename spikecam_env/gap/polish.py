@@ -36,17 +36,19 @@ def polished(
     recordings were needed.
 
     seen, values: (S,) of the recordings to fit (NaN elsewhere), and of all.  Where the parameters that the former tell
-    suit the held-out ones within their errors only, those tell them too.  model, null: before any was added.
+    suit the held-out ones within their errors only, or others within these do, those tell them too.
+    model, null: before any was added.
     """
     sharp, errors, own2 = _refined(case, model, null, seen, found, names)
     error = np.sqrt(sharp.prediction.error**2 + own2 * np.isnan(seen))
     sure = replace(sharp, prediction=replace(sharp.prediction, error=error))
-    if leaves_nothing(null, values, sharp.prediction) or not leaves_nothing(null, values, sure.prediction):
+    if leaves_nothing(null, values, sharp.prediction) or not leaves_nothing(null, seen, sharp.prediction):
         return sure, errors, False
     if not case.effort.allows("parameters that the recordings held out tell"):
         return sure, errors, False
     whole, known, _ = _refined(case, model, null, values, sharp, names)
-    if not agree(sharp, whole, errors):
+    suit = leaves_nothing(null, values, sure.prediction) or leaves_nothing(null, values, whole.prediction)
+    if not (suit and agree(sharp, whole, errors)):
         return sure, errors, False
     return replace(whole, misfit=judged(null, seen, whole.prediction)[1]), known, True
 
@@ -100,11 +102,11 @@ def leaves_nothing(null: Null, values: Array, predicted: Prediction) -> bool:
 
 
 def agree(before: Fit, after: Fit, errors: Errors) -> bool:
-    """Whether parameters moved by no more than their errors allow."""
+    """Whether the logarithms of parameters moved by no more than their errors allow."""
     then = {e.name: e.parameters() for e in after.model.effects}
     here = {e.name: e.parameters() for e in before.model.effects}
-    moves = [abs(then[n][k] - here[n][k]) / sd for n, by in errors.items() for k, sd in by.items() if sd > 0]
-    return all(m < AGREE for m in moves)
+    known = [(here[n][k], then[n][k], sd) for n, by in errors.items() for k, sd in by.items() if sd > 0]
+    return all(a * b > 0 and abs(np.log(b / a)) < AGREE * sd / abs(a) for a, b, sd in known)
 
 
 def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:

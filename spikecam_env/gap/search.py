@@ -410,9 +410,9 @@ def worth_fitting(shapes: Sequence[Screened], before: float, loud: Collection[st
     """The best by their templates, FEWEST and those that explain half of what the best does; one that takes several
     twins a try is tried for that alone.  before: misfit of none.
 
-    loud: groups of statistics that stand out.  Where the pattern does, with the two best of those that only change it,
-    whose statistics are not in proportion to their strength; where motion does, with all that show by it alone, in
-    every shape, whatever it promises: templates are of other pictures.
+    loud: groups of statistics that stand out.  Where the pattern does, with all that only change it, whose statistics
+    are not in proportion to their strength; where motion does, with all that show by it alone, in every shape:
+    templates are of other pictures.
     """
     screened = best_of_each(shapes)
     if not screened:
@@ -420,7 +420,7 @@ def worth_fitting(shapes: Sequence[Screened], before: float, loud: Collection[st
     half = before - 0.5 * (before - screened[0].misfit)
     worth = [s for s in screened if s.misfit < half or not (candidate(s.name).wanders or candidate(s.name).strikes)]
     tried = [s for i, s in enumerate(worth[:TRIED]) if i < FEWEST or s.misfit < half]
-    also = [s for s in screened if is_pattern(s.name)][:2] if "pattern" in loud else []
+    also = [s for s in screened if is_pattern(s.name)] if "pattern" in loud else []
     if {"moving", "step"} & set(loud):
         also += [s for s in shapes if of_motion(s.name)]
     return tried + [s for s in also if s not in tried]

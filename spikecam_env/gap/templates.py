@@ -26,9 +26,10 @@ from spikecam_env.gap.campaign import standard_design
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.case import Case, case_of, twins
 from spikecam_env.gap.compare import Null, values_of
-from spikecam_env.gap.fit import predict, with_pattern
+from spikecam_env.gap.fit import as_seen, predict, with_pattern
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import unit_as_base, within
+from spikecam_env.gap.settle import is_still
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.twin import simulate
@@ -40,7 +41,7 @@ Array = NDArray[np.float64]
 SHAPE, FRAMES, SEED = (64, 64), 8000, 20
 MODEL = "scsim"
 PEAK = 40.0
-"""Templates are taken where the statistic that shows the effect best is this many noises off."""
+"""Templates are taken where the statistic of recordings to fit that shows the effect best is this many noises off."""
 
 TIMES = (8.0, 50.0)
 """Times as strong that severe effects are simulated."""
@@ -175,10 +176,11 @@ def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters:
     """A candidate's template on a campaign, at a strength where it shows clearly."""
     strength = CATALOGUE[name].strength
     power = candidate(name).power
+    to_fit = np.array([case.use(k.recording) == "fit" for k in null.keys])
     now = bounded(name, parameters)
     shift = _shift(case, model, null, name, now)
     for _ in range(4):
-        peak = float(np.abs(shift).max())
+        peak = float(np.abs(shift[to_fit]).max())
         if 0.5 * PEAK < peak < 2.5 * PEAK:
             break
         factor = np.clip((PEAK / max(peak - 3.0, 0.3)) ** (1 / power), 1e-3, 30.0)
@@ -215,11 +217,16 @@ def _shift(
     name: str,
     parameters: Mapping[str, float],
 ) -> Array:
+    """(S,) change of the statistics, in noise, that a candidate makes: by units drawn, or by a twin whose unit has
+    settled, since a refit takes up what bends rates, and saturation would show a unit too bright by as much."""
     there = with_effect(model, name, parameters)
     if is_pattern(name):
         made = with_pattern(case, there, null, null.prediction)
     else:
-        made = predict(case, there, within(there, case.base), null, 1)
+        base = within(there, case.base)
+        made = predict(case, there, base, null, 1)
+        then = as_seen(there, base, null, made)
+        made = made if is_still(base, then) else predict(case, there, then, null, 1)
     return np.nan_to_num((made.mean - null.mean) / null.noise)
 
 

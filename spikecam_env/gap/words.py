@@ -94,6 +94,12 @@ LENT = (
 )
 """A note on the data of a diagnosis: where the recordings to fit left something open."""
 
+HELD_OUT_ALONE = (
+    "The recordings to fit agree with the model, those held out do not. What moves among them was fitted: "
+    "the gap on it is a fit, and no check."
+)
+"""A note on the data of a diagnosis: where nothing else shows what is missing."""
+
 
 def unfinished(effort: Effort) -> list[str]:
     """A note on what was not begun because enough had been simulated; none where nothing was left out."""
@@ -186,7 +192,8 @@ def _removed(d: Diagnosis, what: str) -> str:
     gap = d.gap
     if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
         return ""
-    which = "the recordings held out, which told parameters too" if LENT in d.data else "recordings that were not used"
+    told = LENT in d.data or HELD_OUT_ALONE in d.data
+    which = "the recordings held out, which told parameters too" if told else "recordings that were not used"
     return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on {which}"
 
 

@@ -15,6 +15,7 @@ from spikecam_env.gap import Bars, Flat, Step, read_campaign, write_campaign
 from spikecam_env.gap.diagnose import diagnose, read_case
 from spikecam_env.gap.report import command_of
 from spikecam_env.gap.result import VERDICTS, Diagnosis
+from spikecam_env.gap.words import HELD_OUT_ALONE
 from spikecam_env.sensor import SensorModel
 
 pytestmark = pytest.mark.slow
@@ -113,6 +114,14 @@ def test_a_wrong_label_is_the_datas_fault(clean, tmp_path):
     assert found.verdict == "data"
     assert len(found.data) == 1 and found.data[0].startswith("flat-0.2")
     assert found.to_json()["data"] == list(found.data)
+
+
+def test_what_shows_in_nothing_but_motion_held_out_is_found_and_not_called_a_check(tmp_path):
+    design = [r for r in DESIGN if not isinstance(r, (Step, Bars))] + [Bars(high=1.4, period=16.0, use="holdout")]
+    found = asked(written(tmp_path / "held", MODEL.with_effect(LAG), design), candidates=ONLY)
+    assert found.verdict == "named" and [e.name for e in found.effects] == ["photodiode_lag"]
+    assert found.effects[0].parameters["fraction"].value == pytest.approx(0.08, rel=0.15)
+    assert HELD_OUT_ALONE in found.data and "which told parameters too" in found.sentence
 
 
 def test_a_parameter_that_is_off_is_set_and_shrinks_the_gap(tmp_path):

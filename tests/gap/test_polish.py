@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded, unit
 
-from spikecam_env.gap.compare import values_of
+from spikecam_env.gap.compare import Prediction, values_of
 from spikecam_env.gap.descent import derivatives, moved
-from spikecam_env.gap.fit import fit, predict
+from spikecam_env.gap.fit import Fit, fit, predict
 from spikecam_env.gap.null import model_null
-from spikecam_env.gap.polish import polished
+from spikecam_env.gap.polish import agree, polished
+
+NOTHING = Prediction(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 @pytest.mark.parametrize("seed", [1, 12])
@@ -44,3 +46,13 @@ def test_derivatives_are_of_a_unit_that_has_settled():
     most, most_unsettled = (np.abs(c[bars] / without.noise[bars]).max() for c in (columns[:, 0], unsettled))
     print(f"bars change by {most:.1f} noises a logarithm at most, unsettled by {most_unsettled:.1f}")
     assert most < 20.0 < most_unsettled
+
+
+@pytest.mark.parametrize("then, same", [(0.0076, True), (0.0019 / 4, True), (0.02, False), (-0.0019, False)])
+def test_parameters_agree_within_errors_of_their_logarithms(then, same):
+    """Half of it unknown: a factor of four is 2.6 errors, whichever way; of ten, 4.4."""
+    here, there = (
+        Fit("crosstalk", {}, {}, NOTHING, unit(), np.zeros(0), 0.0, MODEL.with_effect(effect("crosstalk", kick=k)))
+        for k in (0.0019, then)
+    )
+    assert agree(here, there, {"crosstalk": {"kick": 0.001}}) is same

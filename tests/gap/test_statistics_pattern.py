@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy import stats
-from small import CLEAR, MODEL, SHAPE, effect, quiet, recorded
+from small import CLEAR, FRAMES, MODEL, SHAPE, conditions, effect, quiet, recorded
 
+from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.statistics import Key, floor_of, pattern
 from spikecam_env.gap.units import drawn_banks
+from spikecam_env.sensor import SensorModel
 
 DRAWS = 40
 
@@ -75,3 +77,14 @@ def test_a_map_without_a_pattern_has_a_width_and_no_shape():
     steps = np.random.default_rng(0).integers(0, 3, (32, 32))
     found = pattern.statistics(0.2 + 2e-6 * steps)
     assert set(found) == {"width", "silent"} and found == pattern.statistics(np.full((32, 32), 0.2))
+
+
+def test_pixels_that_fire_once_or_twice_in_the_dark_differ_though_they_are_all_alike():
+    """1.6 spikes to be expected of each: four in ten have one and six two, 1 / F and an interval's 1.6 / F."""
+    model = SensorModel.preset("ideal").with_effect(effect("dark_current", mean_pA=0.04))
+    dark = [c for c in conditions() if c.kind == "dark"]
+    one = np.ones(SHAPE[0] * SHAPE[1])
+    base = BaseFit(one, 1.6 / FRAMES * one, 0 * one, 0 * one, 0.0, np.zeros((0, one.size)), one > 0)
+    banks = drawn_banks(model, base, dark, SHAPE, 4, 0)
+    widths = [np.exp(b[Key("pattern", "dark", "width")]) for b in banks]
+    assert widths == pytest.approx(4 * [0.3 / 1.6], rel=0.1)

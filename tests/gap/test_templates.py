@@ -83,3 +83,15 @@ def test_screening_starts_near_the_truth_weak_or_severe(hidden):
     [first] = [s for s in tried if s.name == hidden.name]
     key = type(hidden).strength
     assert first.start[key] == pytest.approx(hidden.parameters()[key], rel=0.6)
+
+
+def test_the_template_of_crosstalk_is_of_its_neighbours_and_not_of_a_unit_too_bright():
+    """What bends rates makes bars that saturate brighter, until the unit has settled: 46 noises, beside 14."""
+    templates = load()
+    [shift] = [e.shift for e in templates.weakest if e.name == "crosstalk"]
+    peak = {
+        group: np.abs(shift[[k.group == group for k in templates.keys]]).max() for group in ("neighbours", "moving")
+    }
+    [level] = [shift[i] for i, k in enumerate(templates.keys) if k == Key("moving", "bars", "level")]
+    print(peak, level)
+    assert abs(level) < 0.5 * peak["neighbours"]
