@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from tqdm import tqdm
 
+from spikecam_env.gap.alarm import ALARM
 from spikecam_env.gap.case import twins
 from spikecam_env.gap.compare import GATE, Null, adjusted, deviates, null_of
-from spikecam_env.gap.diagnose import ALARM
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.templates import standard_case
 

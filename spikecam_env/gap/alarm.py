@@ -25,7 +25,9 @@ def rings(null: Null, values: Array) -> bool:
 def lent(case: Case) -> Case:
     """The case with its recordings in motion to be fitted, those held out among them; the unit rests on none of these.
 
-    Where recordings to fit agree with the model and those held out do not, what is missing shows in nothing else.
+    Where recordings to fit agree with the model and those held out do not, what is missing shows in nothing else.  The
+    case itself where nothing in motion is held out.
     """
-    conditions = tuple(replace(c, use="fit") if c.moves else c for c in case.conditions)
-    return replace(case, conditions=conditions)
+    if not any(c.moves and c.use == "holdout" for c in case.conditions):
+        return case
+    return replace(case, conditions=tuple(replace(c, use="fit") if c.moves else c for c in case.conditions))

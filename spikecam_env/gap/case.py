@@ -50,6 +50,10 @@ class Case:
         """fit or holdout."""
         return next((c.use for c in self.conditions if c.name == recording), "fit")
 
+    def to_fit(self, keys: Sequence[Key]) -> NDArray[np.bool_]:
+        """(S,) which statistics are of recordings to fit."""
+        return np.array([self.use(k.recording) == "fit" for k in keys], bool)
+
     def held_out(self, keys: Sequence[Key]) -> NDArray[np.bool_]:
         """(S,) which statistics the gap is the mean of: those of recordings held out, or all where none is."""
         held = np.array([self.use(k.recording) == "holdout" for k in keys], bool)

@@ -109,8 +109,8 @@ def diagnose(
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
     by_fit = rings(null, of_fit(case, null, values))
+    heard = case if by_fit else lent(case)
     if by_fit or rings(null, values):
-        heard = case if by_fit else lent(case)
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
@@ -136,7 +136,11 @@ def diagnose(
         gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
         evidence=evidence,
-        data=(*found.data, *([] if by_fit or not rounds else [HELD_OUT_ALONE]), *unfinished(case.effort)),
+        data=(
+            *found.data,
+            *([HELD_OUT_ALONE] if rounds and heard is not case and found.verdict != "none" else []),
+            *unfinished(case.effort),
+        ),
         simulated=case.effort.simulated,
         **asked,  # type: ignore[arg-type]
     )

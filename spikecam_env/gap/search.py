@@ -96,7 +96,7 @@ class Round:
 
 def of_fit(case: Case, null: Null, values: Array) -> Array:
     """(S,) values of recordings of use fit; NaN for the held-out ones, which take no part in the search."""
-    return np.where([case.use(k.recording) == "fit" for k in null.keys], values, np.nan)
+    return np.where(case.to_fit(null.keys), values, np.nan)
 
 
 def search(

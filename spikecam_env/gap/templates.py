@@ -26,10 +26,10 @@ from spikecam_env.gap.campaign import standard_design
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.case import Case, case_of, twins
 from spikecam_env.gap.compare import Null, values_of
-from spikecam_env.gap.fit import as_seen, predict, with_pattern
+from spikecam_env.gap.descent import settled_there
+from spikecam_env.gap.fit import predict, with_pattern
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.refit import unit_as_base, within
-from spikecam_env.gap.settle import is_still
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.twin import simulate
@@ -176,7 +176,7 @@ def simulated(case: Case, model: SensorModel, null: Null, name: str, parameters:
     """A candidate's template on a campaign, at a strength where it shows clearly."""
     strength = CATALOGUE[name].strength
     power = candidate(name).power
-    to_fit = np.array([case.use(k.recording) == "fit" for k in null.keys])
+    to_fit = case.to_fit(null.keys)
     now = bounded(name, parameters)
     shift = _shift(case, model, null, name, now)
     for _ in range(4):
@@ -223,10 +223,7 @@ def _shift(
     if is_pattern(name):
         made = with_pattern(case, there, null, null.prediction)
     else:
-        base = within(there, case.base)
-        made = predict(case, there, base, null, 1)
-        then = as_seen(there, base, null, made)
-        made = made if is_still(base, then) else predict(case, there, then, null, 1)
+        made, _ = settled_there(partial(predict, case, null=null, count=1), null, there, within(there, case.base), [])
     return np.nan_to_num((made.mean - null.mean) / null.noise)
 
 

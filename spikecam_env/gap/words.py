@@ -111,7 +111,7 @@ def gap_line(gap: Gap) -> str:
     """What a model's patch did to the gap."""
     off = f"statistics are {gap.before:.3g} off the model (mean square, in noise)"
     chance = "1 is chance" if gap.floor == 1.0 else f"chance, by two halves of the measurement, {gap.floor:.3g}"
-    said = f"On recordings kept out of the fit, {off}; {chance}."
+    said = f"On the recordings held out, {off}; {chance}."
     if not math.isfinite(gap.removed) or gap.before <= 1.2 * gap.floor:
         return said
     removed = f"{100 * min(gap.removed, 1.0):.0f} % of the gap is removed"
