@@ -70,7 +70,7 @@ def _subject(d: Diagnosis) -> str:
         held = sum(c.use == "holdout" for c in shown)
         said += (
             f": {shape[0]} × {shape[1]} pixels at {d.patched.frame_rate_hz:g} Hz, {len(shown)} recordings, "
-            f"{held} of them kept out of the fit"
+            f"{held} of them held out"
         )
     return f"{said}. {sum(d.stages.values()):.0f} s, spikecam-env {__version__}."
 

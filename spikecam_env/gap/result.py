@@ -62,7 +62,7 @@ class Statistic:
 
     group: what it looks at (rates, noise, spectrum ...).  before, after: mean over twins under the model as given and
     as patched; sd: of one campaign, under the model as given.  z: (measured - before) / sd, as a normal deviate.
-    z_after: the same of what is left.  holdout: whether its recordings were kept out of the fit.
+    z_after: the same of what is left.  holdout: whether its recordings were held out.
     """
 
     name: str

@@ -285,7 +285,7 @@ def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, 
     n, effect, values, _ = campaign()
     found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
     faded = replace(found, prediction=n.prediction, misfit=judged(n, values, n.prediction)[1])
-    case = SimpleNamespace(base=unit(), use=lambda _: "fit", effort=Effort())
+    case = SimpleNamespace(base=unit(), to_fit=lambda keys: np.ones(len(keys), bool), effort=Effort())
 
     def polished(*given):
         *before, last = given[5]
