@@ -33,7 +33,7 @@ def as_they_scatter(null: Null, values: Array) -> Null:
 
 
 if __name__ == "__main__":
-    case, model, _ = standard_case(count=2)
+    case, model = standard_case(count=2)[:2]
     base = within(model, case.base)
     banks = [twins(case, model, base, [n])[0].bank for n in tqdm(range(TWINS), "twins", unit="twin")]
     whole = null_of(banks, list(case.bank))

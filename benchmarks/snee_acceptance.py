@@ -16,7 +16,9 @@ import tyro
 from spikecam_env.calibration import Calibration, calibrate, write_flats
 from spikecam_env.calibration.response import SATURATION, best_possible
 from spikecam_env.calibration.snee import Z90, Setting
-from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
+from spikecam_env.sensor import SensorModel, SpikeSensor
+from spikecam_env.sensor.effects.dead_pixels import DeadPixels
+from spikecam_env.sensor.effects.hot_pixels import HotPixels
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,8 @@ def cases() -> list[Case]:
     """The issue's: a plain unit, one with a second V_d, one with dead and hot pixels and two saturated levels."""
     physical = SensorModel.preset("physical")
     levels = tuple(np.linspace(0.0, 0.75, 25).round(4).tolist())
-    odd = physical.with_effect(CATALOGUE["hot_pixels"](fraction=0.005, mean_pA=10.0))
-    odd = odd.with_effect(CATALOGUE["dead_pixels"](fraction=0.005))
+    odd = physical.with_effect(HotPixels(fraction=0.005, mean_pA=10.0))
+    odd = odd.with_effect(DeadPixels(fraction=0.005))
     return [
         Case("physical, one V_d", physical, levels),
         Case("physical, two V_d", physical, levels, second_v_d=0.7),

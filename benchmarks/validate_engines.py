@@ -17,21 +17,23 @@ import numpy as np
 from scipy import stats
 from tqdm import tqdm
 
-from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.agreement import compare, neighbours, observe
+from spikecam_env.sensor.effects.reset_noise import ResetNoise
+from spikecam_env.sensor.effects.shot_noise import ShotNoise
 
 
 def model_of(electrons: float, reset_share: float) -> SensorModel:
     """The ideal pixel with shot noise of `electrons`, and reset noise of `reset_share` of its variance."""
     ideal = SensorModel.preset("ideal")
     sigma_mV = 1e3 * ideal.circuit.swing_V * np.sqrt(reset_share / electrons)
-    shot = CATALOGUE["shot_noise"](quanta=electrons)
-    return ideal.with_effect(shot).with_effect(CATALOGUE["reset_noise"](sigma_mV=sigma_mV))
+    shot = ShotNoise(quanta=electrons)
+    return ideal.with_effect(shot).with_effect(ResetNoise(sigma_mV=sigma_mV))
 
 
 def light_of(interval: float, moving: bool, shape: tuple[int, int], frames: int) -> Keyframes:
     """Mean interval [frames], steady or swinging by 60 % between keys 64 frames apart."""
-    frame = np.arange(0, frames + 65, 64)
+    frame = np.arange(0.0, frames + 65, 64)
     level = (1.0 + 0.6 * np.sin(1.7 * np.arange(frame.size)) * moving) / interval
     return Keyframes(frame, np.broadcast_to(level[:, None, None], (frame.size, *shape)).astype(np.float32))
 

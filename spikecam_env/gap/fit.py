@@ -47,6 +47,9 @@ TURNS = 5
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
+FAINT = 1e-3
+"""Least factor by which a strength is multiplied at once; and of one without hope."""
+
 WANDER, SEVERAL = 6, 3
 """Twins of an effect that makes statistics scatter; and of one that is few events, or in few pixels, or that is
 `mixed`, and so cannot be simulated louder to stand above one twin's noise."""
@@ -147,47 +150,41 @@ def _fit_twins(
     """Twins at the start, made stronger until they show, once more where the unit settles far off, scaled until the
     strength is right to a third and the unit has settled; the last step is a scaling of what was simulated, without
     another twin."""
-    what = candidate(name)
-    strength = what.fitted[0]
-    power = what.power
-    expected = np.full(len(null.keys), np.inf) if expected is None else expected
+    strength, power = candidate(name).fitted[0], candidate(name).power
+    everywhere = np.full(len(null.keys), np.inf)
+    expected = everywhere if expected is None else expected
     parameters, louder = as_loud(name, bounded(name, parameters), size_of(null, measured, expected))
     bare = within(with_effect(model, name, parameters), within(model, case.base))
     base = replace(bare, white=white**louder * bare.white)
-    before = judged(null, measured, null.prediction)[1]
+    hopeless = judged(null, measured, null.prediction)[1] - HOPE
     only = concerned(case, [name], null, measured, expected * louder)
     last: tuple[float, Prediction] | None = None
     slope: Array | None = None
     still = False
     for turn in range(TURNS):
+        at_last = turn == TURNS - 1
         tried = with_effect(model, name, parameters)
         predicted = predict(case, tried, base, null, twins_of(name), only)
         seen = size_of(null, measured, predicted.mean - null.mean)
-        if seen < VISIBLE and turn < TURNS - 1:
-            more = (2 * VISIBLE / max(seen, 0.2)) ** (1 / power)
-            stronger = bounded(name, {**parameters, strength: parameters[strength] * more})
-            if stronger != parameters:
-                base = shifted(bare, base, abs(stronger[strength] / parameters[strength]) ** power)
-                parameters, only = stronger, concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
-                continue
+        stronger = parameters if at_last else until_seen(name, parameters, seen)
+        if stronger != parameters:
+            base = shifted(bare, base, abs(stronger[strength] / parameters[strength]) ** power)
+            parameters, only = stronger, concerned(case, [name], null, measured, everywhere)
+            continue
         assumed, base = base, as_seen(tried, base, null, predicted)
-        if not still and turn < TURNS - 1 and not is_still(assumed, base):
+        if not still and not at_last and not is_still(assumed, base):
             still = True
             continue
         scale, sd = scale_to(null, measured, predicted)
-        if judged(null, measured, scaled(null, predicted, scale))[1] > before - HOPE:
-            factor, near = 1e-3, True
+        if judged(null, measured, scaled(null, predicted, scale))[1] > hopeless:
+            factor, near = FAINT, True
             break
-        factor = float(np.sign(scale) * np.clip(abs(scale) ** (1 / power), 1e-3, 1e3)) if scale else 1e-3
-        slope = slope_between(null, measured, last, (parameters[strength], predicted)) if power == 2.0 else None
-        if slope is not None:
-            factor = float(np.exp(np.clip(step_of(null, measured, predicted, slope[:, None])[0][0], -1.0, 1.0)))
-        last = parameters[strength], predicted
-        if factor < 0 and not may_be_negative(name):
-            factor = 0.1
+        now = parameters[strength], predicted
+        slope = slope_between(null, measured, last, now) if power == 2.0 else None
+        factor, last = factor_to(name, null, measured, predicted, scale, slope), now
         weak = abs(scale) * seen < VISIBLE or (is_linear(name) and 1 / FURTHEST < scale < 1 and scale * seen < AS_LOUD)
         near = weak or 0.7 < factor < 1.4
-        if (near and turn) or turn == TURNS - 1:
+        if at_last or (near and turn):
             break
         if weak:
             continue
@@ -201,9 +198,32 @@ def _fit_twins(
     else:
         predicted = scaled(null, predicted, moved)
     rho, left = judged(null, measured, predicted)
-    relative = sd / max(abs(scale), 1e-9) / power
-    sds, there = {strength: abs(final[strength]) * relative}, with_effect(model, name, final)
+    sds = {strength: abs(final[strength]) * (sd / max(abs(scale), 1e-9) / power)}
+    there = with_effect(model, name, final)
     return Fit(name, final, sds, predicted, shifted(bare, base, moved), rho, left, there)
+
+
+def until_seen(name: str, parameters: dict[str, float], seen: float) -> dict[str, float]:
+    """The parameters at a strength that shows by twice VISIBLE, or where its bounds end; as they are where it shows.
+    seen: noises that it shows by."""
+    if seen >= VISIBLE:
+        return parameters
+    strength = candidate(name).fitted[0]
+    more = (2 * VISIBLE / max(seen, 0.2)) ** (1 / candidate(name).power)
+    return bounded(name, {**parameters, strength: parameters[strength] * more})
+
+
+def factor_to(
+    name: str, null: Null, measured: Array, predicted: Prediction, scale: float, slope: Array | None
+) -> float:
+    """By how much to multiply a strength: along its slope where there is one, else by what scales its change best; a
+    tenth where that is negative and the strength cannot be."""
+    if slope is not None:
+        return float(np.exp(np.clip(step_of(null, measured, predicted, slope[:, None])[0][0], -1.0, 1.0)))
+    if scale < 0 and not may_be_negative(name):
+        return 0.1
+    size = float(np.clip(abs(scale) ** (1 / candidate(name).power), FAINT, 1 / FAINT))
+    return -size if scale < 0 else size
 
 
 def slope_between(
