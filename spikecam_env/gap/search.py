@@ -124,7 +124,7 @@ def search(
             break
         together = joined(case, model, null, seen, values, rounds, chance)
         best = together[-1].fits[0]
-        if judged(null, seen, prediction)[1] - best.misfit < GAIN:
+        if not helped(null, judged(null, seen, prediction)[1], best, len(rounds) > 1):
             break
         rounds = together
         now, base, prediction = best.model, best.base, best.prediction
@@ -135,6 +135,14 @@ def search(
     rho, left_over = judged(null, seen, prediction)
     last = Round(now, base, prediction, rho, left_over)
     return cancelling(case, model, null, seen, values, names, [*rounds, last]) or [*rounds, last]
+
+
+def helped(null: Null, before: float, best: Fit, later: bool) -> bool:
+    """Whether a fit of all that was found together leaves GAIN less misfit than `before`; a later one (beside others)
+    that leaves nothing to hear has but to leave no more.  How widely effects scatter is told by other twins each time,
+    and its price with it is known to some ten."""
+    silent = later and not alarmed(null, best.rho, best.prediction)
+    return before - best.misfit >= (0.0 if silent else GAIN)
 
 
 def cancelling(

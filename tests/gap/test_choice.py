@@ -14,7 +14,19 @@ from spikecam_env.gap.compare import Draw, Null, Prediction, judged
 from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
-from spikecam_env.gap.search import FREE, PROMISE, Round, chosen_of, instead_of, joined, revisited, settle, shows
+from spikecam_env.gap.search import (
+    FREE,
+    GAIN,
+    PROMISE,
+    Round,
+    chosen_of,
+    helped,
+    instead_of,
+    joined,
+    revisited,
+    settle,
+    shows,
+)
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.verdict import explains, harmless
 
@@ -65,6 +77,18 @@ def test_what_loses_little_and_wins_all_recordings_is_chosen():
     assert LEAST < loss < CLOSE and not is_rival(n, n.draws, seen, twin.prediction, true.prediction)
     fits, rivals = chosen_of(n, n, seen, values, [twin, true])
     assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
+
+
+def test_a_later_effect_that_leaves_nothing_to_hear_has_but_to_leave_no_more():
+    """Beside a drift of the lamp a skew explained 12 noises, and the price of the drift's scatter was told anew."""
+    n, effect, _, seen = campaign()
+    seen = seen + 4.0 * effect
+    all_of_it, some = a_fit(n, "dead_time", 5.0 * effect, seen), a_fit(n, "dead_time", effect, seen)
+    for found, silent in ((all_of_it, True), (some, False)):
+        assert helped(n, found.misfit + GAIN, found, later=False)
+        assert not helped(n, found.misfit + GAIN - 1.0, found, later=False)
+        assert helped(n, found.misfit + 1.0, found, later=True) is silent
+        assert not helped(n, found.misfit - 1.0, found, later=True)
 
 
 def test_what_all_recordings_together_cannot_tell_apart_are_rivals():
