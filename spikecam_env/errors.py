@@ -10,6 +10,7 @@ Both are subclasses of the built-in a caller would expect, so `except ValueError
 from __future__ import annotations
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 
 class InputError(ValueError):
@@ -21,5 +22,7 @@ class NotReadyError(RuntimeError):
 
 
 def unknown_name(kind: str, name: object, allowed: Iterable[str]) -> InputError:
-    """Error for a name that is not in a list: `unknown preset 'scs'; choose one of ideal, scsim`."""
-    return InputError(f"unknown {kind} {name!r}; choose one of {', '.join(sorted(allowed))}")
+    """Error for a name that is not in a list: `unknown scene 'fun'; choose one of ball, fan, train (fan?)`."""
+    names = sorted(allowed)
+    nearest = "".join(f" ({near}?)" for near in get_close_matches(str(name), names, n=1))
+    return InputError(f"unknown {kind} {name!r}; choose one of {', '.join(names)}{nearest}")

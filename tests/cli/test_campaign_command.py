@@ -85,6 +85,7 @@ def test_effects_explains_one(capsys) -> None:
     ("options", "message"),
     [
         (("--effect", "dead_tme"), "unknown effect 'dead_tme'; choose one of afterpulsing"),
+        (("--effect", "dead_tme"), "vignetting (dead_time?)"),
         (("--effect", "dead_time:tau=1"), "unknown parameter of dead_time 'tau'; choose one of tau_us"),
         (("--effect", "dead_time:tau_us"), "tau_us has no value"),
         (("--effect", "dead_time:tau_us=far"), "dead_time.tau_us = 'far'; it must be a number"),
