@@ -96,9 +96,8 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
     lengths = np.zeros(LENGTHS + 1, np.int64)
     late, scatter = np.zeros((2, len(packed)))
     timed, odd = np.zeros((2, len(packed)), np.int32)
-    through_pixels(
-        as_words(packed), np.array(STEPS), ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd
-    )
+    words = as_words(packed)
+    through_pixels(words, np.array(STEPS), ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd)
     by_row = _rows_in_words(packed, shape)
     row = np.zeros((len(packed), shape[0]), np.int32)
     coincidences = np.zeros((LAGS, 2))
@@ -117,7 +116,7 @@ def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = F
         row,
         _columns(by_row, shape),
         coincidences,
-        _film(unpack_frames(packed, shape)) if film else None,
+        _film(words, pixels) if film else None,
         late,
         scatter,
         timed,
@@ -146,6 +145,10 @@ def _columns(by_row: NDArray[np.uint64], shape: tuple[int, int]) -> NDArray[np.i
     return parts[0].astype(np.int32) if len(parts) == 1 else parts.sum(axis=0, dtype=np.int32)
 
 
-def _film(spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    bins = len(spikes) // BIN
-    return spikes[: bins * BIN].reshape(bins, BIN, -1).sum(axis=1, dtype=np.uint8)
+def _film(words: NDArray[np.uint64], pixels: int) -> NDArray[np.uint8]:
+    """(F // BIN, P) spikes of each pixel in bins of BIN frames; words: (F, n) its bits."""
+    bins = len(words) // BIN
+    octets = words[: bins * BIN].view(np.uint8).reshape(bins, -1)
+    sums = np.zeros((1, bins, octets.shape[1] // BIN), np.uint64)
+    add_rows(octets, BIN, _SPREAD, sums)
+    return sums[0].view(np.uint8)[:, :pixels]

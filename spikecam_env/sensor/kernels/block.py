@@ -25,7 +25,7 @@ from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Fe
 from spikecam_env.sensor.kernels import block_loop, fast
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.kernels.threads import together
-from spikecam_env.sensor.light import GRAINS, Ramp, Segment, ramp
+from spikecam_env.sensor.light import GRAINS, Ramp, Segment
 from spikecam_env.sensor.unit import Unit
 
 _BLOCK = 1 << 22
@@ -166,7 +166,8 @@ def _parts(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[_Part]:
     last, light = None, None
     for s in segments:
         if last is None or light is None or s.length != last.length or not _same_light(s, last):
-            light = ramp(s, law.gain, law.dark)
+            ends = fast.compilable(s.radiance0), fast.compilable(s.radiance1)
+            light = Ramp(*block_loop.ramp(*ends, law.gain, law.dark, s.length))
         last = s
         most = _most(light)
         for done in range(0, s.count, most):

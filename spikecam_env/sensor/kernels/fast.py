@@ -135,8 +135,8 @@ def _advance(
     tickets[:, 0] = bands * np.arange(threads) // threads
     work = (
         tickets,
-        _compilable(segment.radiance0),
-        _compilable(segment.radiance1),
+        compilable(segment.radiance0),
+        compilable(segment.radiance1),
         np.int32(segment.length),
         np.int32(segment.first),
         np.int32(segment.count),
@@ -186,7 +186,7 @@ def _padded(values: NDArray[Any], fill: int = 0) -> NDArray[Any]:
     return np.pad(values, (0, -values.size % loop.TILE), constant_values=fill)
 
 
-def _compilable(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+def compilable(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
     """A read-only or strided array would be compiled for anew: seconds, against microseconds for a copy."""
     plain = radiance.flags.c_contiguous and radiance.flags.writeable
     return radiance if plain else radiance.copy()
