@@ -21,7 +21,7 @@ from numba import njit
 
 from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
-from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME
+from spikecam_env.sensor.light import GRAINS
 
 BAND = 1024
 """Pixels of a band: what is worked on frame after frame stays in the processor's cache."""
@@ -47,23 +47,6 @@ _PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _AWAKE = ((24 + row) * BAND for row in r
 _HIT = 8 * 15 * BAND  # of 8 bits
 _SCRATCH = 16 * BAND
 _INSIDE = BAND - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
-
-
-@njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def ramp(radiance0, radiance1, gain, dark, length):  # type: ignore[no-untyped-def]
-    """(level, curve, rest), each (P,) int32, as `light.ramp`."""
-    pixels = radiance0.size
-    level, curve, rest = np.empty((3, pixels), np.int32)
-    twice = np.int32(2 * length)
-    share, per = np.float32(1.0 / twice), np.int32(-(-(1 << 18) // twice))
-    most, half = np.float32(MAX_GRAINS_PER_FRAME), np.float32(0.5)
-    for p in range(pixels):
-        i0 = np.int32(min(radiance0[p] * gain[p] + dark[p], most) + half)
-        d = np.int32(np.int32(min(radiance1[p] * gain[p] + dark[p], most) + half) - i0)
-        bend = np.int32(np.floor(np.float32(d) * share))
-        level[p], curve[p] = i0, bend
-        rest[p] = np.int32(np.int32(d - np.int32(bend * twice)) * per)
-    return level, curve, rest
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)

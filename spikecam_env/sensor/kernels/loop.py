@@ -143,6 +143,26 @@ def transpose_bits(words: Any) -> None:
 
 
 @njit(inline="always")
+def ramp_of(light0: Any, light1: Any, gain: Any, dark: Any, twice: Any, per_twice: Any, per: Any) -> Any:
+    """(level, curve, rest) of one pixel: `light.ramp`."""
+    i0 = _I(min(light0 * gain + dark, _CAP) + _F(0.5))
+    rise = _I(_I(min(light1 * gain + dark, _CAP) + _F(0.5)) - i0)
+    curve = _I(np.floor(_F(rise) * per_twice))
+    return i0, curve, _I(_I(rise - _I(curve * twice)) * per)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
+def ramp(light0: Any, light1: Any, gain: Any, dark: Any, length: Any) -> Any:
+    """(level, curve, rest) of all pixels, each (P,) int32: `light.ramp`."""
+    level, curve, rest = np.empty((3, light0.size), np.int32)
+    twice = _I(2 * length)
+    per_twice, per = _F(1.0 / twice), _I(((1 << 18) + twice - 1) // twice)
+    for p in range(light0.size):
+        level[p], curve[p], rest[p] = ramp_of(light0[p], light1[p], gain[p], dark[p], twice, per_twice, per)
+    return level, curve, rest
+
+
+@njit(inline="always")
 def integrate(s: Any, light0: Any, light1: Any, gain: Any, dark: Any, n: Any, length: Any) -> None:
     """Rows LEVEL, CURVE, REST of a tile of n pixels: `light.ramp`.  Pixels beyond the array get no light."""
     twice = _I(2 * length)
@@ -153,12 +173,9 @@ def integrate(s: Any, light0: Any, light1: Any, gain: Any, dark: Any, n: Any, le
         s[_CURVE + j] = 0
         s[_REST + j] = 0
     for j in range(n):
-        i0 = _I(min(light0[j] * gain[j] + dark[j], _CAP) + _F(0.5))
-        rise = _I(_I(min(light1[j] * gain[j] + dark[j], _CAP) + _F(0.5)) - i0)
-        curve = _I(np.floor(_F(rise) * per_twice))
-        s[_LEVEL + j] = i0
-        s[_CURVE + j] = curve
-        s[_REST + j] = _I(_I(rise - _I(curve * twice)) * per)
+        s[_LEVEL + j], s[_CURVE + j], s[_REST + j] = ramp_of(
+            light0[j], light1[j], gain[j], dark[j], twice, per_twice, per
+        )
 
 
 @njit(inline="always")
