@@ -43,9 +43,9 @@ _G = float(GRAINS)
 _HELD, _LIMIT, _PHI, _ARRIVES, _STANDS, _MOVED, _FACTOR, _LOAD, _NOISE, _JITTER, _ELECTRONS, _CROSSED = (
     row * BAND for row in range(12)
 )
-_PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _AWAKE = ((24 + row) * BAND for row in range(6))  # of 32 bits
-_HIT = 8 * 15 * BAND  # of 8 bits
-_SCRATCH = 16 * BAND
+_PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _DUE, _AWAKE = ((24 + row) * BAND for row in range(7))  # of 32 bits
+_HIT = 8 * 16 * BAND  # of 8 bits
+_SCRATCH = 17 * BAND
 _INSIDE = BAND - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
 
 
@@ -189,7 +189,8 @@ def advance(  # type: ignore[no-untyped-def]
                 groups = find_live(hit.view(np.uint64), (used + GROUP - 1) // GROUP, live)
                 wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_high)
                 if groups and fire(x, words, hit, live, groups, reset, polynomial):
-                    fire_again(x, words, live, groups, reset, polynomial)
+                    while groups:
+                        groups = fire_again(x, words, live, groups, reset, polynomial)
                 for line in range(begin, end):
                     p0, n, h0 = pixel_of[line], width_of[line], slot_of[line]
                     copy(hit[h0 : h0 + n], bits[p0 : p0 + n])
@@ -321,23 +322,36 @@ def fire(x, words, hit, live, groups, reset, polynomial):  # type: ignore[no-unt
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-untyped-def]
-    """Further spikes of one frame: each passes a threshold, and is seen as one."""
+    """One further spike of a frame, seen as one with those before, of the pixels that are at their limit already; what
+    is kept of the others is as it was.  Lists the groups in which some are again, and returns their number."""
     per_root_rate, per_rate, kept = reset
+    whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
     floats = words.view(np.float32)
+    still = 0
     for g in range(groups):
-        for j in range(live[g], live[g] + GROUP):
-            while x[_HELD + j] >= x[_LIMIT + j]:
-                draw = drawn(words[_FIRST + j], words[_SECOND + j], words[_FIRED + j], polynomial)
-                words[_FIRED + j] = _U(words[_FIRED + j] + _U(1))
-                over, electrons = after_reset(
-                    x[_HELD + j] - x[_LIMIT + j], x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept
-                )
-                phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], draw)
-                floats[_DRAW + j] = draw
-                x[_ELECTRONS + j] = electrons
-                x[_HELD + j] = over
-                x[_PHI + j] = phi
-                x[_LIMIT + j] = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+        q = live[g] & _INSIDE
+        for j in range(q, q + GROUP):
+            words[_DUE + j] = _U(x[_HELD + j] >= x[_LIMIT + j])
+        for j in range(q, q + GROUP):
+            draw = drawn(words[_FIRST + j], words[_SECOND + j], words[_FIRED + j], polynomial)
+            floats[_DRAW + j] = draw if words[_DUE + j] != 0 else floats[_DRAW + j]
+            words[_FIRED + j] = _U(words[_FIRED + j] + words[_DUE + j])
+        again = 0
+        for j in range(q, q + GROUP):
+            over, electrons = x[_HELD + j] - x[_LIMIT + j], x[_STANDS + j] * (1.0 / _G)
+            if not whole:
+                over, electrons = after_reset(over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept)
+            phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
+            limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+            fires = words[_DUE + j] != 0
+            x[_ELECTRONS + j] = electrons if fires else x[_ELECTRONS + j]
+            x[_HELD + j] = over if fires else x[_HELD + j]
+            x[_PHI + j] = phi if fires else x[_PHI + j]
+            x[_LIMIT + j] = limit if fires else x[_LIMIT + j]
+            again += fires & (over >= limit)
+        live[still] = q
+        still += again != 0
+    return still
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
