@@ -3,7 +3,7 @@
     read -> audit -> refit -> twins -> alarm -> search -> gate -> verdict
 
 Each step is a function of its own, usable by itself.  Held-out recordings take no part in the search, but for what
-`search` says and where they alone disagree (`alarm`); the gate is on all, and the gap on them alone.
+`search` says; the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.errors import InputError
-from spikecam_env.gap.alarm import lent, rings
+from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.audit import Contradiction, audit, upheld
 from spikecam_env.gap.candidates import chosen, is_pattern, testable
 from spikecam_env.gap.case import Case, case_of
@@ -40,7 +40,7 @@ from spikecam_env.gap.screen import bounds
 from spikecam_env.gap.search import Round, of_fit, search
 from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.verdict import concluded, grounded, harmless
-from spikecam_env.gap.words import HELD_OUT_ALONE, sentence, unfinished
+from spikecam_env.gap.words import sentence, unfinished
 from spikecam_env.gap.workers import sums_in_one_order
 from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
@@ -108,13 +108,11 @@ def diagnose(
         before = model_null(replace(case, base=off.nominal), assumed, 2) if as_given else null
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
-    by_fit = rings(null, of_fit(case, null, values))
-    heard = case if by_fit else lent(case)
-    if by_fit or rings(null, values):
+    if rings(null, of_fit(case, null, values)) or rings(null, values):
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
-            rounds = harmless(case, null, values, search(heard, start, null, values, names, templates or load()))
+            rounds = harmless(case, null, values, search(case, start, null, values, names, templates or load()))
     if rounds and not lacking:
         off = replace(
             off, parameters=off_nominal(case, patterned(assumed, rounds[-1].model), rounds[-1].base).parameters
@@ -136,11 +134,7 @@ def diagnose(
         gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
         evidence=evidence,
-        data=(
-            *found.data,
-            *([HELD_OUT_ALONE] if rounds and heard is not case and found.verdict != "none" else []),
-            *unfinished(case.effort),
-        ),
+        data=(*found.data, *unfinished(case.effort)),
         simulated=case.effort.simulated,
         **asked,  # type: ignore[arg-type]
     )

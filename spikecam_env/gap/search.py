@@ -3,7 +3,8 @@
     [screen -> fit -> shape -> confirm -> add -> revisit the earlier ones -> polish all]*
 
 Held-out recordings take no part but in the choice between what others cannot tell apart, within errors in parameters
-that others leave open, and in whether anything is left to look for.
+that others leave open, and in whether anything is left to look for: where they alone disagree, what moves among them is
+fitted from there on.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.alarm import lent, rings
 from spikecam_env.gap.candidates import candidate, is_pattern, of_motion
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import (
@@ -81,7 +83,8 @@ that they have to have removed."""
 class Round:
     """One turn of the search: the model it started from, what that left, and the candidates that were fitted.
 
-    rivals: names that may as well be true as the best of them.  lent: whether held-out recordings were fitted too.
+    rivals: names that may as well be true as the best of them.  lent: whether recordings held out told parameters too.
+    alone: whether what moves among these was fitted, since nothing else disagreed any more.
     """
 
     model: SensorModel
@@ -92,6 +95,7 @@ class Round:
     fits: tuple[Fit, ...] = ()
     rivals: tuple[str, ...] = ()
     lent: bool = False
+    alone: bool = False
 
 
 def of_fit(case: Case, null: Null, values: Array) -> Array:
@@ -107,18 +111,24 @@ def search(
     values: (S,) of all recordings; those held out decide between rivals, and tell parameters that others leave open.
     """
     rounds: list[Round] = []
-    seen = of_fit(case, null, values)
-    chance = float(np.sum(null.weight * np.isfinite(seen)))
+    given, seen = case, of_fit(case, null, values)
     now, base, prediction = model, within(model, case.base), null.prediction
     while len(rounds) < MOST:
         rho = residual(null, seen, prediction)
-        if rounds and not any(alarmed(null, r, prediction) for r in (rho, residual(null, values, prediction))):
+        by_fit = alarmed(null, rho, prediction) if rounds else rings(null, seen)
+        if rounds and not (by_fit or alarmed(null, residual(null, values, prediction), prediction)):
             break
         if len(rounds) > 1 and not case.effort.allows("a third effect"):
             break
+        if not by_fit:
+            case = lent(case)
+            seen = of_fit(case, null, values)
+            rho = residual(null, seen, prediction)
+        chance = float(np.sum(null.weight * np.isfinite(seen)))
         here = standing_on(null, prediction)
         left_over = judged(here, seen, here.prediction)[1]
-        turn = compared(case, null, here, seen, values, names, templates, Round(now, base, prediction, rho, left_over))
+        turn = Round(now, base, prediction, rho, left_over, alone=case is not given)
+        turn = compared(case, null, here, seen, values, names, templates, turn)
         rounds.append(turn)
         if not turn.fits or left_over - turn.fits[0].misfit < GAIN or not shows(here, turn.fits[0]):
             break

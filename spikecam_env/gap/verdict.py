@@ -28,7 +28,7 @@ from spikecam_env.gap.place import when, where
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.search import Round
 from spikecam_env.gap.structure import structure
-from spikecam_env.gap.words import LENT
+from spikecam_env.gap.words import HELD_OUT_ALONE, LENT
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -113,6 +113,8 @@ def concluded(
         verdict = "named"
     else:
         verdict = "parameter" if off.parameters else "none"
+    told = [LENT] if any(r.lent for r in turns) else []
+    told += [HELD_OUT_ALONE] if any(r.alone for r in rounds) and verdict != "none" else []
     return Diagnosis(
         verdict=verdict,
         sentence="",
@@ -120,7 +122,7 @@ def concluded(
         unknown=unknown,
         class_=class_,
         parameters=off.parameters,
-        data=(*(c.text for c in contradictions), *([LENT] if any(r.lent for r in turns) else [])),
+        data=(*(c.text for c in contradictions), *told),
         gap=gap_of(case, null, values, given, last.prediction if last else null.prediction),
         statistics=table(case, null, values, given, z, p, predicted, rho),
         ranking=tuple(ranked(f, r, f is r.fits[0] and any(r is t for t in turns)) for r in rounds for f in r.fits),

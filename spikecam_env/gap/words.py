@@ -95,8 +95,8 @@ LENT = (
 """A note on the data of a diagnosis: where the recordings to fit left something open."""
 
 HELD_OUT_ALONE = (
-    "The recordings to fit agree with the model, those held out do not. What moves among them was fitted: "
-    "the gap on it is a fit, and no check."
+    "The recordings to fit agree with the model, as given or with what was found first, and those held out do not. "
+    "What moves among them was fitted: the gap on it is a fit, and no check."
 )
 """A note on the data of a diagnosis: where nothing else shows what is missing."""
 

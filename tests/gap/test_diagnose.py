@@ -124,6 +124,15 @@ def test_what_shows_in_nothing_but_motion_held_out_is_found_and_not_called_a_che
     assert HELD_OUT_ALONE in found.data and "which told parameters too" in found.sentence
 
 
+def test_so_it_is_beside_an_effect_that_the_others_have_shown(tmp_path):
+    design = [r for r in DESIGN if not isinstance(r, (Step, Bars))] + [Bars(high=1.4, period=16.0, use="holdout")]
+    both = MODEL.with_effect(LAG).with_effect(effect("dead_time", tau_us=0.5))
+    found = asked(written(tmp_path / "held", both, design), candidates=("dead_time", *ONLY))
+    assert found.verdict == "named" and [e.name for e in found.effects] == ["dead_time", "photodiode_lag"]
+    assert found.effects[1].parameters["fraction"].value == pytest.approx(0.08, rel=0.15)
+    assert HELD_OUT_ALONE in found.data
+
+
 def test_a_parameter_that_is_off_is_set_and_shrinks_the_gap(tmp_path):
     found = asked(written(tmp_path / "noisy", MODEL.with_effect(effect("reset_noise", sigma_mV=19.1))))
     assert found.verdict == "parameter" and list(found.parameters) == ["reset_noise"]
