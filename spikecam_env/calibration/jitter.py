@@ -23,7 +23,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_HARMONICS = 12
+_WEIGHTS = 1.0 / (2 * np.pi**2 * np.arange(1, 13) ** 2)
+"""Of the harmonics of r_k."""
+
 _ITERATIONS = 30
 _LEAST = 1e-10
 
@@ -51,38 +53,46 @@ class Jitter:
 def second_difference(k: ArrayLike, interval: ArrayLike, white: float, slow: float = 0.0) -> Array:
     """A_k of steady pixels; k and interval T [frames] broadcast against each other."""
     steps, t = np.asarray(k), np.asarray(interval, dtype=np.float64)
-    return (2 * steps * white + steps**2 * slow) * t**2 + _quantisation(steps, t, white)[0]
+    return (2 * steps * white + steps**2 * slow) * t**2 + _quantisation(_Read.of(steps, t), white)[0]
 
 
-def _quantisation(k: NDArray[np.int64], interval: Array, white: float) -> tuple[Array, Array]:
+class _Read(NamedTuple):
+    """Of intervals of k spikes read in whole frames, whatever their noise: cos(2 pi k T), and 2 pi^2 k T^2, by which
+    s^2 makes the first harmonic die."""
+
+    cosine: Array
+    rate: Array
+
+    @classmethod
+    def of(cls, k: NDArray[np.int64], interval: Array) -> _Read:
+        return cls(np.cos(2 * np.pi * (k * interval % 1.0)), 2 * np.pi**2 * k * interval**2)
+
+
+def _quantisation(read: _Read, white: float) -> tuple[Array, Array]:
     """1/2 - 8 r_k + 2 r_2k, what reading in whole frames adds to A_k, and its derivative in s^2."""
-    steps, t = np.broadcast_arrays(k, interval)
-    out = np.empty((2, steps.size))
-    _sum_harmonics(steps.ravel().astype(np.float64), t.ravel(), white, out)
-    return out[0].reshape(steps.shape), out[1].reshape(steps.shape)
+    out = np.empty((2, *read.rate.shape))
+    _sum_harmonics(read.cosine.ravel(), read.rate.ravel(), white, _WEIGHTS, *out.reshape(2, -1))
+    return out[0], out[1]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sum_harmonics(k, interval, white, out):  # type: ignore[no-untyped-def]
+def _sum_harmonics(cosines, rates, white, weights, values, slopes):  # type: ignore[no-untyped-def]
     """cos(m x) and exp(-m^2 y) by recurrence over m."""
-    for i in range(k.size):
-        now = np.cos(2 * np.pi * (k[i] * interval[i] % 1.0))
-        rate = 2 * np.pi**2 * k[i] * interval[i] ** 2
-        first = np.exp(-rate * white)
-        before, cosine, decayed, factor = 1.0, now, first, first
+    for i in range(rates.size):
+        first = np.exp(-rates[i] * white)
+        before, cosine, decayed, factor = 1.0, cosines[i], first, first
         value, slope = 0.5, 0.0
-        for m in range(1, _HARMONICS + 1):
+        for m in range(1, weights.size + 1):
             if decayed < 1e-13:
                 break
-            near = 8 * cosine * decayed / (2 * np.pi**2 * m * m)
-            far = 2 * (2 * cosine * cosine - 1) * decayed * decayed / (2 * np.pi**2 * m * m)
+            near = 8 * cosine * decayed * weights[m - 1]
+            far = 2 * (2 * cosine * cosine - 1) * decayed * decayed * weights[m - 1]
             value += far - near
-            slope += m * m * rate * (near - 2 * far)
+            slope += m * m * (near - 2 * far)
             factor *= first * first
             decayed *= factor
-            before, cosine = cosine, 2 * now * cosine - before
-        out[0, i] = value
-        out[1, i] = slope
+            before, cosine = cosine, 2 * cosines[i] * cosine - before
+        values[i], slopes[i] = value, slope * rates[i]
 
 
 def fit_jitter(steps: NDArray[np.int64], square: Array, terms: Array, rate: Array) -> Jitter | None:
@@ -108,7 +118,7 @@ def fit_jitter(steps: NDArray[np.int64], square: Array, terms: Array, rate: Arra
 
 def _by_step(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array, fit: _Fit) -> tuple[Array, Array]:
     """What each k alone gives for s^2 + k b / 2, and its standard error, (K,)."""
-    fraction = _quantisation(steps, interval, fit.white)[0]
+    fraction = _quantisation(_Read.of(steps, interval), fit.white)[0]
     shape = 2 * steps * interval**2
     weight = shape / np.maximum((fit.white + steps * fit.slow / 2) * shape + fraction, 0.05) ** 2
     above = (weight * np.where(terms > 0, square - terms * fraction, 0.0)).sum(axis=0)
@@ -132,10 +142,10 @@ def _fit(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array,
     Weights follow the noise, by which steps may turn back by half of the one before, for twenty of them.  From two that
     go to and fro, all that would follow are taken at once (Aitken).
     """
-    t2 = interval**2
+    t2, read = interval**2, _Read.of(steps, interval)
     white, b, last = 3e-5, 0.0, np.inf
     for _ in range(_ITERATIONS):
-        fraction, slope = _quantisation(steps, interval, white)
+        fraction, slope = _quantisation(read, white)
         expected = (2 * steps * white + steps**2 * b) * t2 + fraction
         # The fraction's own slope is left out of the weights: it is large where kT happens to be near a whole number.
         shapes = [2 * steps * t2] + ([steps**2 * t2] if slow else [])

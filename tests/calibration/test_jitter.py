@@ -94,10 +94,11 @@ def test_a_fit_whose_steps_go_to_and_fro_ends_soon_and_where_plain_ones_would(sl
     square = terms * np.stack([second_difference(steps, t, w) for t, w in zip(interval, noise, strict=True)])
     asked: list[float] = []
     law = jitter._quantisation
-    monkeypatch.setattr(jitter, "_quantisation", lambda k, t, white: asked.append(white) or law(k, t, white))
+    monkeypatch.setattr(jitter, "_quantisation", lambda read, white: asked.append(white) or law(read, white))
     found = jitter._fit(steps, square, terms, interval, slow=slow)
     turns = len(asked)
-    expected = (2 * steps * found.white + steps**2 * found.slow) * interval**2 + law(steps, interval, found.white)[0]
+    monkeypatch.undo()
+    expected = second_difference(steps, interval, found.white, found.slow)
     weight = 1.0 / (steps * np.maximum(expected, 0.05) ** 2)
     shape = 2 * steps * interval**2
     score = float((weight * shape * (square - terms * expected)).sum() / (weight * shape * shape * terms).sum())
