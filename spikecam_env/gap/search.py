@@ -58,8 +58,9 @@ MOST = 3
 ALIKE = 0.8
 """Share of what the best removes, that it has to remove with another of its shapes for the other end of a valley."""
 
-GAIN = 12.0
-"""Misfit that an effect has to remove to be added."""
+GAIN, HINT = 12.0, 4.0
+"""Misfit that an effect has to remove to be added; and that a later one has to, while those before it stay as they were
+fitted without it, to be joined with them: they may have taken its share."""
 
 LITTLE = (0.2, 0.5)
 """Share of what is beyond chance that the first effect, and each later one of what the others left, has to remove for
@@ -85,6 +86,7 @@ class Round:
 
     rivals: names that may as well be true as the best of them.  lent: whether recordings held out told parameters too.
     alone: whether what moves among these was fitted, since nothing else disagreed any more.
+    least: misfit that its effect has to remove to be joined with what was found.
     """
 
     model: SensorModel
@@ -96,6 +98,7 @@ class Round:
     rivals: tuple[str, ...] = ()
     lent: bool = False
     alone: bool = False
+    least: float = GAIN
 
 
 def of_fit(case: Case, null: Null, values: Array) -> Array:
@@ -127,10 +130,10 @@ def search(
         chance = float(np.sum(null.weight * np.isfinite(seen)))
         here = standing_on(null, prediction)
         left_over = judged(here, seen, here.prediction)[1]
-        turn = Round(now, base, prediction, rho, left_over, alone=case is not given)
+        turn = Round(now, base, prediction, rho, left_over, alone=case is not given, least=HINT if rounds else GAIN)
         turn = compared(case, null, here, seen, values, names, templates, turn)
         rounds.append(turn)
-        if not turn.fits or left_over - turn.fits[0].misfit < GAIN or not shows(here, turn.fits[0]):
+        if not turn.fits or left_over - turn.fits[0].misfit < turn.least or not shows(here, turn.fits[0]):
             break
         together = joined(case, model, null, seen, values, rounds, chance)
         best = together[-1].fits[0]
@@ -202,9 +205,9 @@ def compared(
     unit = replace(case, base=turn.base)
     confirm = partial(confirmed, unit, turn.model, here, seen)
     fits, tries = fits_of(unit, turn.model, here, seen, turn.misfit, tried)
-    sure, rest = settle([f for f in fits if shows(here, f)], confirm, enough=turn.misfit - GAIN)
+    sure, rest = settle([f for f in fits if shows(here, f)], confirm, enough=turn.misfit - turn.least)
     rest = [*rest, *(f for f in fits if not shows(here, f))]
-    if sure and turn.misfit - sure[0].misfit > GAIN:
+    if sure and turn.misfit - sure[0].misfit > turn.least:
         began = min((s for s in tries if s.name == sure[0].name), key=lambda s: tries[s].misfit)
         again = other_shapes(began, shapes, turn.misfit)
         if again and not case.effort.allows(f"{sure[0].name} of another shape"):
@@ -272,7 +275,7 @@ def joined(
             if turn.fits[0].name in {e.name for e in best.model.effects}:
                 best, before[i] = revisited(case, model, null, seen, values, best, turn)
     names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
-    if is_little(last, best.misfit, chance, bool(before)) and alarmed(null, best.rho, best.prediction):
+    if not before and is_little(last, best.misfit, chance, False) and alarmed(null, best.rho, best.prediction):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
     best = made_sure(case, model, null, seen, values, best)

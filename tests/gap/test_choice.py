@@ -14,9 +14,11 @@ from spikecam_env.gap.compare import Draw, Null, Prediction, judged
 from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
+from spikecam_env.gap.screen import Screened
 from spikecam_env.gap.search import (
     FREE,
     GAIN,
+    HINT,
     PROMISE,
     Round,
     chosen_of,
@@ -183,6 +185,44 @@ def test_a_round_in_which_nothing_promises_enough_is_one_without_a_choice(monkey
     turn = Round(MODEL, unit(), n.prediction, rho, before)
     after = search.compared(recorded(), n, n, seen, values, [], {}, turn)
     assert after.fits == (poor,) and after.rivals == ()
+
+
+def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
+    """What came first may have taken the share of what comes later: how much both remove, only both together tell."""
+    n, _effect, values, seen = campaign()
+    rho, before = judged(n, seen, n.prediction)
+    hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (GAIN + HINT) / 2)
+    asked = []
+    monkeypatch.setattr(search, "screen", lambda *_: [])
+    monkeypatch.setattr(search, "fits_of", lambda *_: ([hint], {Screened("crosstalk", {}, 0.0, rho): hint}))
+    monkeypatch.setattr(search, "confirmed", lambda _case, _model, _null, _seen, found: asked.append(found) or found)
+    first = Round(MODEL, unit(), n.prediction, rho, before)
+    search.compared(recorded(), n, n, seen, values, [], {}, first)
+    assert not asked
+    search.compared(recorded(), n, n, seen, values, [], {}, replace(first, least=HINT))
+    assert asked == [hint]
+
+
+def test_a_later_effect_of_little_is_polished_together_with_the_first(monkeypatch):
+    n, change, values, seen = campaign()
+    values, seen = values + 9 * change, seen + 9 * change
+    little = of_two(n, "crosstalk", 0.02 * change, seen)
+    left = judged(n, seen, n.prediction)[1]
+    first = Round(MODEL, unit(), n.prediction, seen, left + 500.0, (a_fit(n, "dead_time", 0.0 * change, seen),))
+    asked = []
+
+    def polish(case, model, here, measured, everything, found, names):
+        asked.append(list(names))
+        return found, {}, False
+
+    monkeypatch.setattr(search, "polished", polish)
+    monkeypatch.setattr(search, "rejoined", lambda case, model, here, measured, best, earlier: best)
+    monkeypatch.setattr(search, "revisited", lambda case, model, here, measured, everything, best, turn: (best, turn))
+    joined(recorded(), MODEL, n, seen, values, [first, replace(first, misfit=left, fits=(little,))], 0.0)
+    assert asked == [["dead_time", "crosstalk"]]
+    asked.clear()
+    joined(recorded(), MODEL, n, seen, values, [replace(first, misfit=left, fits=(little,))], 0.0)
+    assert asked == [], "alone it is a stand-in"
 
 
 def test_one_confirmed_before_is_among_those_that_others_are_measured_by():
