@@ -62,6 +62,9 @@ GAIN, HINT = 12.0, 4.0
 """Misfit that an effect has to remove to be added; and that a later one has to, while those before it stay as they were
 fitted without it, to be joined with them: they may have taken its share."""
 
+BENDS = ("saturation", "reset")
+"""Families of what bends the rate curve: beside one, others of them fit in its error, and a hint is none."""
+
 LITTLE = (0.2, 0.5)
 """Share of what is beyond chance that the first effect, and each later one of what the others left, has to remove for
 another to be looked for beside them: less is a stand-in's."""
@@ -133,7 +136,7 @@ def search(
         turn = Round(now, base, prediction, rho, left_over, alone=case is not given, least=HINT if rounds else GAIN)
         turn = compared(case, null, here, seen, values, names, templates, turn)
         rounds.append(turn)
-        if not turn.fits or left_over - turn.fits[0].misfit < turn.least or not shows(here, turn.fits[0]):
+        if not turn.fits or not promises(turn, here):
             break
         together = joined(case, model, null, seen, values, rounds, chance)
         best = together[-1].fits[0]
@@ -148,6 +151,19 @@ def search(
     rho, left_over = judged(null, seen, prediction)
     last = Round(now, base, prediction, rho, left_over)
     return cancelling(case, model, null, seen, values, names, [*rounds, last]) or [*rounds, last]
+
+
+def promises(turn: Round, here: Null) -> bool:
+    """Whether a round's best is worth to be joined with what was found."""
+    best = turn.fits[0]
+    least = GAIN if is_another_bend(turn, best) else turn.least
+    return turn.misfit - best.misfit >= least and shows(here, best)
+
+
+def is_another_bend(turn: Round, found: Fit) -> bool:
+    """Whether a fit bends the rate curve beside an effect that does."""
+    families = {candidate(e.name).family for e in turn.model.effects}
+    return candidate(found.name).family in BENDS and bool(families & set(BENDS))
 
 
 def helped(null: Null, before: float, best: Fit, later: bool) -> bool:
@@ -265,7 +281,7 @@ def joined(
     case: Case, model: SensorModel, null: Null, seen: Array, values: Array, rounds: Sequence[Round], chance: float
 ) -> list[Round]:
     """The rounds with the last one's best together with what was found before, and all of it polished, unless it is
-    a stand-in: has little to say and leaves something."""
+    a stand-in: the first, or one more bend, that has little to say and leaves something."""
     *before, last = rounds
     best = last.fits[0]
     if before:
@@ -275,7 +291,8 @@ def joined(
             if turn.fits[0].name in {e.name for e in best.model.effects}:
                 best, before[i] = revisited(case, model, null, seen, values, best, turn)
     names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
-    if not before and is_little(last, best.misfit, chance, False) and alarmed(null, best.rho, best.prediction):
+    alone = not before or is_another_bend(last, best)
+    if alone and is_little(last, best.misfit, chance, bool(before)) and alarmed(null, best.rho, best.prediction):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
     best = made_sure(case, model, null, seen, values, best)

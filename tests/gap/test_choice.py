@@ -25,6 +25,7 @@ from spikecam_env.gap.search import (
     helped,
     instead_of,
     joined,
+    promises,
     revisited,
     settle,
     shows,
@@ -223,6 +224,20 @@ def test_a_later_effect_of_little_is_polished_together_with_the_first(monkeypatc
     asked.clear()
     joined(recorded(), MODEL, n, seen, values, [replace(first, misfit=left, fits=(little,))], 0.0)
     assert asked == [], "alone it is a stand-in"
+    bend = replace(little, name="comparator_delay")
+    beside = replace(first, model=MODEL.with_effect(DEAD_TIME), misfit=left, fits=(bend,))
+    joined(recorded(), MODEL, n, seen, values, [first, beside], 0.0)
+    assert asked == [], "and so is another bend"
+
+
+def test_a_hint_of_another_bend_is_none():
+    n, change, _, seen = campaign()
+    hint = a_fit(n, "crosstalk", change, seen)
+    beside = MODEL.with_effect(DEAD_TIME)
+    turn = Round(beside, unit(), n.prediction, seen, hint.misfit + (GAIN + HINT) / 2, (hint,), least=HINT)
+    bend = replace(turn, fits=(replace(hint, name="comparator_delay"),))
+    assert promises(turn, n) and not promises(bend, n)
+    assert promises(replace(bend, model=MODEL), n), "it is the first"
 
 
 def test_one_confirmed_before_is_among_those_that_others_are_measured_by():
