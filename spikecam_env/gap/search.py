@@ -140,7 +140,8 @@ def search(
             break
         together = joined(case, model, null, seen, values, rounds, chance)
         best = together[-1].fits[0]
-        if not helped(null, judged(null, seen, prediction)[1], best, len(rounds) > 1):
+        hint = turn.misfit - turn.fits[0].misfit < GAIN
+        if not helped(null, judged(null, seen, prediction)[1], best, len(rounds) > 1, hint):
             break
         rounds = together
         now, base, prediction = best.model, best.base, best.prediction
@@ -166,11 +167,13 @@ def is_another_bend(turn: Round, found: Fit) -> bool:
     return candidate(found.name).family in BENDS and bool(families & set(BENDS))
 
 
-def helped(null: Null, before: float, best: Fit, later: bool) -> bool:
+def helped(null: Null, before: float, best: Fit, later: bool, hint: bool = False) -> bool:
     """Whether a fit of all that was found together leaves GAIN less misfit than `before`; a later one (beside others)
-    that leaves nothing to hear has but to leave no more.  How widely effects scatter is told by other twins each time,
-    and its price with it is known to some ten."""
+    that leaves nothing to hear has but to leave no more, and one that there was but a hint of has to.  How widely
+    effects scatter is told by other twins each time, and its price with it is known to some ten."""
     silent = later and not alarmed(null, best.rho, best.prediction)
+    if hint and not silent:
+        return False
     return before - best.misfit >= (0.0 if silent else GAIN)
 
 

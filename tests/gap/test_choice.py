@@ -92,6 +92,7 @@ def test_a_later_effect_that_leaves_nothing_to_hear_has_but_to_leave_no_more():
         assert not helped(n, found.misfit + GAIN - 1.0, found, later=False)
         assert helped(n, found.misfit + 1.0, found, later=True) is silent
         assert not helped(n, found.misfit - 1.0, found, later=True)
+        assert helped(n, found.misfit + GAIN, found, later=True, hint=True) is silent
 
 
 def test_what_all_recordings_together_cannot_tell_apart_are_rivals():
