@@ -29,6 +29,7 @@ from spikecam_env.gap.compare import (
     step_of,
     values_of,
 )
+from spikecam_env.gap.false_spikes import false_spikes_of
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.settle import FURTHEST, is_still, settled, shifted
 from spikecam_env.gap.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
@@ -87,7 +88,8 @@ def predict(
     made = twins(case, model, base, numbers, only, {d.number: d.refit for d in null.draws})
     draws = [Draw(n, values_of(t.bank, null.keys), t.base) for n, t in zip(numbers, made, strict=True)]
     predicted = paired(null, draws)
-    return with_pattern(case, model, null, predicted) if traps_of(model) else predicted
+    patterned = traps_of(model) or false_spikes_of(model)
+    return with_pattern(case, model, null, predicted) if patterned else predicted
 
 
 def twins_of(name: str) -> int:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.false_spikes import read_with_false_spikes
 from spikecam_env.gap.refit import BaseFit, responds
 from spikecam_env.gap.statistics import Key, pattern
 from spikecam_env.gap.traps import drawn_traps, level_of
@@ -87,7 +88,7 @@ def _bank(
 ) -> dict[Key, float]:
     gain, dark = drawn(model, base, shape, seed)
     charge = drawn_traps(model, shape, seed)
-    rng, phase = np.random.default_rng([seed, 1]), np.random.default_rng([seed, 2])
+    rng, phases, false = (np.random.default_rng([seed, n]) for n in (1, 2, 3))
     found = {}
     for c in shown:
         if c.kind not in ("dark", "flat") or c.light is None:
@@ -95,9 +96,11 @@ def _bank(
         rate = gain * c.picture + dark + level_of(model, charge, c.frames, rng)
         spikes = np.maximum(rate * c.frames, 1.0)
         noise = np.sqrt(base.white / spikes + 1.0 / (6.0 * c.frames**2))  # first and last spike, each read to a frame
-        count = np.floor(rate * c.frames + phase.random(rate.size))
-        rate = np.clip(rate * (1.0 + noise * rng.standard_normal(rate.size)), 0.0, 1.0)
-        rate = np.where(count > 1, rate, count / c.frames)  # as `Observation.rate`: one spike has no interval
-        for name, value in pattern.statistics(rate.reshape(shape)).items():
+        phase = phases.random(rate.size)
+        count = np.floor(rate * c.frames + phase)
+        read = np.clip(rate * (1.0 + noise * rng.standard_normal(rate.size)), 0.0, 1.0)
+        read = np.where(count > 1, read, count / c.frames)  # as `Observation.rate`: one spike has no interval
+        read = read_with_false_spikes(model, read, rate, phase, c.frames, false)
+        for name, value in pattern.statistics(read.reshape(shape)).items():
             found[Key("pattern", c.name, name)] = value
     return found

@@ -1,0 +1,46 @@
+"""False spikes in a drawn unit: what they do to the rates of its slowest pixels.
+
+A rate is read between a pixel's first spike and its last.  Where one of two is false, it is of nothing but how far they
+lie apart: few units have such a pixel, and it is far out in the pattern of all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor.effects.spurious_spikes import SpuriousSpikes
+
+Array = NDArray[np.float64]
+
+
+def false_spikes_of(model: SensorModel) -> SpuriousSpikes | None:
+    """The model's spurious spikes."""
+    return next((e for e in model.effects if isinstance(e, SpuriousSpikes)), None)
+
+
+def read_with_false_spikes(
+    model: SensorModel, read: Array, rate: Array, phase: Array, frames: int, rng: np.random.Generator
+) -> Array:
+    """(P,) rates as read from a recording, `read`, where a model reports spikes that were none as well.
+
+    rate: (P,) spikes a frame.  phase: (P,) share of an interval that had passed when the recording began.
+    """
+    spurious = false_spikes_of(model)
+    if spurious is None:
+        return read
+    struck = rng.poisson(spurious.probability * frames, rate.size)
+    at = np.flatnonzero(struck)
+    more, rate, phase = struck[at], np.maximum(rate[at], 1e-12), phase[at]
+    lowest = frames * (1.0 - rng.random(at.size) ** (1.0 / more))
+    others = (frames - lowest) * rng.random(at.size) ** (1.0 / np.maximum(more - 1, 1))
+    highest = lowest + np.where(more > 1, others, 0.0)
+    count = np.floor(rate * frames + phase)
+    first, last = (1.0 - phase) / rate, (count - phase) / rate
+    own = count > 0
+    span = np.where(own, np.maximum(last, highest), highest) - np.where(own, np.minimum(first, lowest), lowest)
+    count = count + more
+    out = read.copy()
+    out[at] = np.where(count > 1, (count - 1.0) / np.maximum(span, 1.0), count / frames)
+    return out
