@@ -323,7 +323,10 @@ def fire(x, words, hit, live, groups, reset, polynomial):  # type: ignore[no-unt
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-untyped-def]
     """One further spike of a frame, seen as one with those before, of the pixels that are at their limit already; what
-    is kept of the others is as it was.  Lists the groups in which some are again, and returns their number."""
+    is kept of the others is as it was.  Lists the groups in which some are again, and returns their number.
+
+    The law is that of `fire`, written out: of a function that returned it LLVM would make no vector instructions.
+    """
     per_root_rate, per_rate, kept = reset
     whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
     floats = words.view(np.float32)
