@@ -42,5 +42,5 @@ def read_with_false_spikes(
     span = np.where(own, np.maximum(last, highest), highest) - np.where(own, np.minimum(first, lowest), lowest)
     count = count + more
     out = read.copy()
-    out[at] = np.where(count > 1, (count - 1.0) / np.maximum(span, 1.0), count / frames)
+    out[at] = np.minimum(np.where(count > 1, (count - 1.0) / np.maximum(span, 1.0), count / frames), 1.0)
     return out

@@ -183,8 +183,7 @@ def cancelling(
     """Rounds that find two bends that cancel, where those of the search leave something and began with a bend; empty
     where the two leave no less."""
     first, last = rounds[0], rounds[-1]
-    bends = {candidate(name).family for name in (*PAIR, "synchronous_reset")}
-    if not first.fits or candidate(first.fits[0].name).family not in bends:
+    if not first.fits or candidate(first.fits[0].name).family not in BENDS:
         return []
     if not alarmed(null, residual(null, values, last.prediction), last.prediction):
         return []
@@ -197,7 +196,8 @@ def cancelling(
     one, other = (next(e for e in found.model.effects if e.name == name).parameters() for name in PAIR)
     alone = replace(found, name=PAIR[0], parameters={"tau_us": one["tau_us"]}, sd=errors[PAIR[0]])
     found = replace(found, parameters={"beta": other["beta"]}, sd=errors[PAIR[1]])
-    between = replace(first, model=found.model.without(PAIR[1]), fits=(found,), rivals=(), lent=lent)
+    without = found.model.without(PAIR[1])
+    between = replace(first, model=without, fits=(found,), rivals=(), lent=lent, alone=any(r.alone for r in rounds))
     rest = [f for f in first.fits if f.name != PAIR[0]]
     return [
         replace(first, fits=(alone, *rest), rivals=()),

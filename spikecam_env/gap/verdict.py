@@ -114,7 +114,7 @@ def concluded(
     else:
         verdict = "parameter" if off.parameters else "none"
     told = [LENT] if any(r.lent for r in turns) else []
-    told += [HELD_OUT_ALONE] if any(r.alone for r in rounds) and verdict != "none" else []
+    told += [HELD_OUT_ALONE] if any(r.alone for r in turns) else []
     return Diagnosis(
         verdict=verdict,
         sentence="",

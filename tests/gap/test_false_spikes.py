@@ -18,7 +18,7 @@ FALSE = MODEL.with_effect(effect("spurious_spikes", probability=1e-4))
 
 
 def test_rates_of_slow_pixels_are_those_of_a_simulation():
-    """A spike of its own or two in a pixel, and nearly one that is false: and their rates."""
+    """Pixels with one spike of their own or two, and nearly one that is false."""
     rng = np.random.default_rng(0)
     law = MODEL.draw_unit(SHAPE, 0)
     law = replace(law, dark=rng.uniform(0.5, 2.0, law.dark.size) / FRAMES)
