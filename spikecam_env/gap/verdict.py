@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -77,26 +77,16 @@ def concluded(
     untestable: Sequence[tuple[str, str]],
 ) -> Diagnosis:
     """From the search to a verdict.  given: (S,) predictions of the model as it was given."""
-    z = deviates(replace(null, mean=given), values)
-    p = adjusted(z)
-    before = residual(null, values, null.prediction)
-    last = rounds[-1] if rounds else None
-    kept = {e.name: e for e in last.model.effects} if last else {}
-    turns = [r for r, after in itertools.pairwise(rounds) if after.model is not r.model and r.fits[0].name in kept]
-    found = [replace(r.fits[0], parameters={k: kept[r.fits[0].name].parameters()[k] for k in r.fits[0].parameters})
-             for r in turns]  # fmt: skip
-    rho = residual(null, values, last.prediction) if last else before
-    predicted = last.prediction.mean if last else null.mean
-    explained = explains(null, before, rho, last.prediction if last else null.prediction)
-    chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
-    place, time_ = where(case), when(case)
-    share = lambda f: gap_of(case, null, values, given, f.prediction).removed  # noqa: E731
-    others = lambda r: {o.name: share(o) for o in r.fits[1:] if len(o.prediction.draws) > 1}  # noqa: E731
+    last = rounds[-1].prediction if rounds else null.prediction
+    before, rho = residual(null, values, null.prediction), residual(null, values, last)
+    found = accepted(rounds)
+    there, then = where(case), when(case)
     effects = tuple(
-        replace(named(f, r, null, values), where=place, when=time_, instead=others(r))
-        for f, r in zip(found, turns, strict=True)
+        replace(named(f, r, instead_of(case, null, values, given, r)), where=there, when=then) for f, r in found
     )
-    unsure = [(f.name, r.rivals) for f, r in zip(found, turns, strict=True) if r.rivals]
+    rivals = next(((f.name, *r.rivals) for f, r in found if r.rivals), ())
+    explained = explains(null, before, rho, last)
+    chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     if explained or chance or not rounds:
         effects = (*(named_missing(m) for m in lacking), *effects)
     unknown, class_ = None, None
@@ -104,17 +94,15 @@ def concluded(
         verdict = "data"
     elif rounds and not chance and not (found and explained):
         verdict, effects = "unknown", ()
-        unknown = {**structure(case, null, before), "best_candidate": found[0].name if found else None}
-    elif unsure and not lacking:
+        unknown = {**structure(case, null, before), "best_candidate": found[0][0].name if found else None}
+    elif rivals and not lacking:
         verdict = "class"
-        name, rivals = unsure[0]
-        class_ = {"members": [name, *rivals], "experiment": candidate(name).experiment}
+        class_ = {"members": list(rivals), "experiment": candidate(rivals[0]).experiment}
     elif found or lacking:
         verdict = "named"
     else:
         verdict = "parameter" if off.parameters else "none"
-    told = [LENT] if any(r.lent for r in turns) else []
-    told += [HELD_OUT_ALONE] if any(r.alone for r in turns) else []
+    z = deviates(replace(null, mean=given), values)
     return Diagnosis(
         verdict=verdict,
         sentence="",
@@ -122,18 +110,38 @@ def concluded(
         unknown=unknown,
         class_=class_,
         parameters=off.parameters,
-        data=(*(c.text for c in contradictions), *told),
-        gap=gap_of(case, null, values, given, last.prediction if last else null.prediction),
-        statistics=table(case, null, values, given, z, p, predicted, rho),
-        ranking=tuple(ranked(f, r, f is r.fits[0] and any(r is t for t in turns)) for r in rounds for f in r.fits),
+        data=(*(c.text for c in contradictions), *told_of(found)),
+        gap=gap_of(case, null, values, given, last),
+        statistics=table(case, null, values, given, z, adjusted(z), last.mean, rho),
+        ranking=tuple(ranked(f, r, f is r.fits[0] and any(r is t for _, t in found)) for r in rounds for f in r.fits),
         not_testable=tuple(untestable),
         bounds=(),
-        patched=with_strengths(last.model if last else model, off.parameters),
+        patched=with_strengths(rounds[-1].model if rounds else model, off.parameters),
         model_name=model.name,
         campaign="",
         seed=case.seed,
         stages={},
     )
+
+
+def accepted(rounds: Sequence[Round]) -> list[tuple[Fit, Round]]:
+    """The best of each round that was kept, with its parameters as they are in the end, and the round."""
+    kept = {e.name: e.parameters() for e in rounds[-1].model.effects} if rounds else {}
+    added = [r for r, after in itertools.pairwise(rounds) if after.model is not r.model]
+    found = [(r.fits[0], r) for r in added if r.fits[0].name in kept]
+    return [(replace(f, parameters={k: kept[f.name][k] for k in f.parameters}), r) for f, r in found]
+
+
+def instead_of(case: Case, null: Null, values: Array, given: Array, turn: Round) -> dict[str, float]:
+    """Share of the gap that the others of a round would remove alone, of those that were confirmed."""
+    sure = [f for f in turn.fits[1:] if len(f.prediction.draws) > 1]
+    return {f.name: gap_of(case, null, values, given, f.prediction).removed for f in sure}
+
+
+def told_of(found: Sequence[tuple[Fit, Round]]) -> list[str]:
+    """What to know of how it was found."""
+    lent = [LENT] if any(r.lent for _, r in found) else []
+    return lent + ([HELD_OUT_ALONE] if any(r.alone for _, r in found) else [])
 
 
 def named_missing(found: Missing) -> NamedEffect:
@@ -146,8 +154,8 @@ def named_missing(found: Missing) -> NamedEffect:
     return NamedEffect(effect.name, candidate(effect.name).family, share, estimate, rivals)
 
 
-def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
-    """A candidate as the diagnosis names it, with its rivals and the share of the gap that each would remove."""
+def named(found: Fit, turn: Round, instead: Mapping[str, float]) -> NamedEffect:
+    """A candidate as the diagnosis names it, with its rivals; instead: share of the gap that some of these remove."""
     rivals = [(f, float(np.exp(-max(f.misfit - found.misfit, 0.0) / 2))) for f in turn.fits if f.name != found.name]
     total = 1.0 + sum(w for _, w in rivals)
     parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
@@ -157,6 +165,7 @@ def named(found: Fit, turn: Round, null: Null, values: Array) -> NamedEffect:
         min(1.0 / total, 0.99),
         parameters,
         tuple((f.name, w / total) for f, w in rivals),
+        instead=dict(instead),
     )
 
 
