@@ -82,7 +82,7 @@ def concluded(
     found = accepted(rounds)
     there, then = where(case), when(case)
     effects = tuple(
-        replace(named(f, r, instead_of(case, null, values, given, r)), where=there, when=then) for f, r in found
+        replace(named(f, r, removed_instead(case, null, values, given, r)), where=there, when=then) for f, r in found
     )
     rivals = next(((f.name, *r.rivals) for f, r in found if r.rivals), ())
     explained = explains(null, before, rho, last)
@@ -132,7 +132,7 @@ def accepted(rounds: Sequence[Round]) -> list[tuple[Fit, Round]]:
     return [(replace(f, parameters={k: kept[f.name][k] for k in f.parameters}), r) for f, r in found]
 
 
-def instead_of(case: Case, null: Null, values: Array, given: Array, turn: Round) -> dict[str, float]:
+def removed_instead(case: Case, null: Null, values: Array, given: Array, turn: Round) -> dict[str, float]:
     """Share of the gap that the others of a round would remove alone, of those that were confirmed."""
     sure = [f for f in turn.fits[1:] if len(f.prediction.draws) > 1]
     return {f.name: gap_of(case, null, values, given, f.prediction).removed for f in sure}

@@ -85,7 +85,8 @@ MILLION = {
     ("quick", "verify"): 5,
     ("full", "verify"): 10,
 }
-"""Where the seeds of a set and part begin, in millions; `verify` goes on to others once its cases were looked at."""
+"""Where the seeds of a set and part begin, in millions; `verify` goes on to others once its cases were looked at,
+or the code has changed."""
 
 BENDS = ("dead_time", "photo_response_nonlinearity", "synchronous_reset", "ir_drop")
 """At the strengths drawn all take x^2 off the rate, see `score.INSEPARABLE`."""
