@@ -22,6 +22,7 @@ def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, 
     t = np.empty(frames + 1, np.int32)
     d = np.empty(frames + 1, np.int32)
     block = (frames + blocks.shape[0] - 1) // blocks.shape[0]
+    counts = np.zeros((4, lengths.size), np.int64)
     for column in range(words.shape[1]):
         by_pixel(words, column, bits)
         known, means, variances = np.uint64(0), np.zeros(64), np.zeros(64)
@@ -50,7 +51,7 @@ def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, 
             for i in range(n - 1):
                 d[i] = t[i + 1] - t[i]
                 least, most = min(least, d[i]), max(most, d[i])
-            _count(d[: n - 1], least, most, lengths)
+            _count(d[: n - 1], least, most, counts)
             if n < 4:
                 continue
             mean = (t[n - 1] - t[0]) / (n - 1)
@@ -64,12 +65,13 @@ def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, 
             inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
             moments[p, 0], moments[p, 1] = variance, (products - mean * inner) / (n - 2) + mean * mean
             below, above = np.int32(np.ceil(0.6 * mean - 1.0)), np.int32(np.floor(1.5 * mean + 1.0))
-            moments[p, 2], moments[p, 3] = 0.0, 0.0
+            short, long = np.int64(0), np.int64(0)
             if least < below or most > above:
                 for i in range(n - 1):
-                    moments[p, 2] += d[i] < below
-                    moments[p, 3] += d[i] > above
-                    odd[t[i + 1]] += d[i] < below or d[i] > above
+                    too_short, too_long = d[i] < below, d[i] > above
+                    short += too_short
+                    long += too_long
+                    odd[t[i + 1]] += too_short | too_long
             elif n < SPARSE * frames:
                 for i in range(n - 1):
                     late[t[i + 1]] += d[i] - mean
@@ -83,8 +85,10 @@ def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, 
                 late[t[0]] += mean  # no interval ends with the first spike
                 scatter[t[0]] -= variance
                 timed[t[0]] -= 1
+            moments[p, 2], moments[p, 3] = short, long
         if known:
             _add_to_spikes(words[:, column].copy(), known, means, variances, late, scatter, timed)
+    lengths += counts.sum(axis=0)
     for f in range(frames):
         if timed[f] == 0:
             late[f], scatter[f] = 0.0, 0.0  # but for rounding
@@ -92,16 +96,19 @@ def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, 
 
 @njit(cache=True, nogil=True, boundscheck=False)
 def _count(d, least, most, lengths):  # type: ignore[no-untyped-def]
-    """Add the intervals d, of least to most, to those of their length: length by length where these are few."""
+    """Add the intervals d, of least to most, to those of their length: length by length where these are few.
+
+    lengths: (4, n), for intervals in turn: a count that is added to at once again waits for itself.
+    """
     if most - least < ALIKE:
         for length in range(least, most + 1):
             count = 0
             for i in range(d.size):
                 count += d[i] == length
-            lengths[min(length, lengths.size - 1)] += count
+            lengths[0, min(length, lengths.shape[1] - 1)] += count
     else:
         for i in range(d.size):
-            lengths[min(d[i], lengths.size - 1)] += 1
+            lengths[i & 3, min(d[i], lengths.shape[1] - 1)] += 1
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
