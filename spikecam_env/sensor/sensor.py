@@ -178,9 +178,16 @@ class SpikeSensor:
         if not self._optics or not isinstance(light, Keyframes):
             return imaged(segment, self._optics, self.shape)
         if self._seen is None or self._seen[0] is not light or self._seen[1:3] != (begin, segment.length):
-            self._seen = (light, begin, segment.length, imaged(segment, self._optics, self.shape))
+            self._seen = (light, begin, segment.length, self._through_optics(segment, light, begin))
         ends = self._seen[3]
         return replace(segment, radiance0=ends.radiance0, radiance1=ends.radiance1)
+
+    def _through_optics(self, segment: Segment, light: Keyframes, begin: int) -> Segment:
+        """Where one interval ends the next begins: that picture is there already."""
+        seen = self._seen
+        if seen is None or seen[0] is not light or seen[1] + seen[2] != begin:
+            return imaged(segment, self._optics, self.shape)
+        return imaged(segment, self._optics, self.shape, seen[3].radiance1)
 
     def _names_of_effects(self) -> tuple[str, ...]:
         return tuple(e.name for e in self._frame_effects)
@@ -189,14 +196,23 @@ class SpikeSensor:
         return Exposure(0, self.model.frame_rate_hz, self.shape, self.unit)
 
 
-def imaged(segment: Segment, optics: Sequence[Effect], shape: tuple[int, int]) -> Segment:
-    """Light as it reaches the pixels: optics are linear, so they act on the ramp's two ends."""
+def imaged(
+    segment: Segment, optics: Sequence[Effect], shape: tuple[int, int], start: NDArray[np.float32] | None = None
+) -> Segment:
+    """Light as it reaches the pixels: optics are linear, so they act on the ramp's two ends.
+
+    start: (H*W,) of its first end, where that is known.
+    """
+    if start is None:
+        start = _image(segment.radiance0, optics, shape)
+    held = segment.radiance1 is segment.radiance0
+    return replace(segment, radiance0=start, radiance1=start if held else _image(segment.radiance1, optics, shape))
+
+
+def _image(radiance: NDArray[np.float32], optics: Sequence[Effect], shape: tuple[int, int]) -> NDArray[np.float32]:
     for effect in optics:
-        start = effect.image(segment.radiance0.reshape(shape)).reshape(-1)
-        held = segment.radiance1 is segment.radiance0
-        end = start if held else effect.image(segment.radiance1.reshape(shape)).reshape(-1)
-        segment = replace(segment, radiance0=start, radiance1=end)
-    return segment
+        radiance = effect.image(radiance.reshape(shape)).reshape(-1)
+    return radiance
 
 
 def _recycled(out: NDArray[np.uint8] | None, shape: tuple[int, int, int]) -> NDArray[np.uint8]:

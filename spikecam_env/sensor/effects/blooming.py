@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import njit
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, neighbour_sum, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,24 @@ class Blooming(Effect):
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         x = light.values
-        spill = x - self.full
-        np.maximum(spill, 0.0, out=spill)
-        if not spill.any():
+        if not (x > self.full).any():
             return light, dark, memory
-        spill *= self.share
-        arrives = neighbour_sum(spill)
-        arrives /= 4.0
-        arrives += x - spill
-        return Charge(arrives), dark, memory
+        spread = np.empty(x.shape)
+        _spill_over(np.ascontiguousarray(x), self.share, self.full, spread)
+        return Charge(spread), dark, memory
+
+
+@njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
+def _spill_over(x, share, full, out):  # type: ignore[no-untyped-def]
+    """out (F, H, W), overwritten: the charge x with what flows over."""
+    frames, rows, columns = x.shape
+    spill = np.zeros((rows + 2, columns + 2))  # beyond the edge there is nothing
+    for f in range(frames):
+        for r in range(rows):
+            for c in range(columns):
+                spill[r + 1, c + 1] = max(x[f, r, c] - full, 0.0) * share
+        for r in range(rows):
+            above, here, below = spill[r], spill[r + 1], spill[r + 2]
+            for c in range(columns):
+                around = above[c + 1] + below[c + 1] + here[c] + here[c + 2]
+                out[f, r, c] = around / 4.0 + (x[f, r, c] - here[c + 1])

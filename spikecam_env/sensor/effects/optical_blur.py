@@ -13,6 +13,7 @@ Source: Gaussian approximation of a lens' point spread; diffraction alone gives 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +37,13 @@ class OpticalBlur(Effect):
         return convolve1d(convolve1d(radiance, kernel, axis=0, mode="nearest"), kernel, axis=1, mode="nearest")
 
 
+@lru_cache(maxsize=64)
 def gaussian_weights(sigma: float) -> NDArray[np.float64]:
     """Normalised weights (2 n + 1,) of variance sigma^2 [pixels^2]; n reaches 5 sigma."""
     reach = int(np.ceil(5.0 * sigma)) + 1
     square = np.arange(-reach, reach + 1, dtype=np.float64) ** 2
     weights = lambda v: np.exp(-square / (2.0 * v)) / np.exp(-square / (2.0 * v)).sum()  # noqa: E731
     v = brentq(lambda v: float(weights(v) @ square) - sigma**2, 1e-3, sigma**2 + 1.0)
-    return np.asarray(weights(v), np.float64)
+    found = np.asarray(weights(v), np.float64)
+    found.setflags(write=False)  # kept, and given to whoever asks again
+    return found

@@ -14,6 +14,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
 
@@ -38,9 +39,18 @@ class PhotodiodeLag(Effect):
             return light, dark, slow
         tau = self.tau_us * 1e-6 * now.frame_rate_hz
         kept = math.exp(-1.0 / tau)
-        late = np.empty((now.frames, *now.shape))
-        for frame, level in zip(late, np.broadcast_to(x, late.shape), strict=True):
-            behind = slow - level
-            frame[:] = level + behind * (self.fraction * tau * (1.0 - kept))
-            slow = level + behind * kept
-        return Charge(late), dark, slow
+        late, slow = np.empty((now.frames, now.shape[0] * now.shape[1])), slow.flatten()
+        _follow(np.ascontiguousarray(x).reshape(len(x), -1), self.fraction * tau * (1.0 - kept), kept, slow, late)
+        return Charge(late.reshape(-1, *now.shape)), dark, slow.reshape(now.shape)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
+def _follow(x, late, kept, slow, out):  # type: ignore[no-untyped-def]
+    """out (F, P), overwritten: charge of which a part is late.  x: (F or 1, P).  slow: (P,) what lags, updated."""
+    moves = x.shape[0] > 1
+    for f in range(out.shape[0]):
+        now, row = x[f * moves], out[f]
+        for p in range(slow.size):
+            behind = slow[p] - now[p]
+            row[p] = now[p] + behind * late
+            slow[p] = now[p] + behind * kept
