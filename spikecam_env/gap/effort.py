@@ -25,9 +25,9 @@ class Effort:
         """Recordings so far."""
         return sum(self.spent)
 
-    def allows(self, what: str) -> bool:
-        """Whether `what` may be begun; noted where it may not."""
-        if self.simulated < self.most:
+    def allows(self, what: str, recordings: int = 0) -> bool:
+        """Whether `what`, which takes so many recordings at least, may be begun; noted where it may not."""
+        if self.simulated + recordings < self.most:
             return True
         if what not in self.left_out:
             self.left_out.append(what)

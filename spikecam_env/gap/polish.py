@@ -59,9 +59,9 @@ def _refined(
     """The fit, its errors, and (S,) by what variance statistics are unknown for them: where derivatives are in doubt,
     two parameters may be open that make up for each other, but not what both do.
 
-    What wanders is left as it was fitted, since one twin has no direction of it.
+    What is not refined (`to_refine`) is left as it was fitted, and then no error is smaller than its fit's.
     """
-    free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
+    free = to_refine(case, null, measured, found, names)
     free += [WHITE] if 0 < found.base.white < SHARED * case.base.white else []
     now, base = found.model, found.base
     columns, covariance, told = np.zeros((len(measured), 0)), np.zeros((0, 0)), np.zeros((0, 0))
@@ -80,9 +80,29 @@ def _refined(
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
         if (name, key) != WHITE:
             errors[name][key] = float(abs(values[name][key]) * e)
+    errors[found.name] = no_surer(errors[found.name], found.sd)
     own: Mapping[str, float] = values[found.name]
     best = replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name])
     return best, errors, np.einsum("sn,nm,sm->s", columns, told, columns)
+
+
+def to_refine(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> list[tuple[str, str]]:
+    """Parameters, by effect and name: all that are fitted of those effects that do not wander, since one twin has no
+    direction of these.  Where enough was simulated, of several effects, and of one that leaves something, the strengths
+    alone: derivatives by every shape cost the most, and what effects take from each other is in their strengths."""
+    free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
+    strengths = [(name, key) for name, key in free if key == candidate(name).fitted[0]]
+    last = len(names) == 1 and leaves_nothing(null, measured, found.prediction)
+    if last or len(strengths) == len(free) or case.effort.allows("finer shapes of what was found"):
+        return free
+    return strengths
+
+
+def no_surer(known: Mapping[str, float], before: Mapping[str, float]) -> dict[str, float]:
+    """Errors of an effect's parameters, no smaller than those before where not all of them were refined."""
+    if set(known) >= set(before):
+        return dict(known)
+    return {key: max(known.get(key, 0.0), sd) for key, sd in before.items()}
 
 
 def _stepped(null: Null, measured: Array, best: Fit, free: Free, columns: Array, step: Array) -> Fit:

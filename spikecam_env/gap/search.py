@@ -32,9 +32,9 @@ from spikecam_env.gap.compare import (
     residual,
 )
 from spikecam_env.gap.confirm import confirmed, made_sure, of_any_dark, rejoined, resettled
-from spikecam_env.gap.fit import Fit, fit
+from spikecam_env.gap.fit import Fit, concerned, fit, twins_of
 from spikecam_env.gap.opposed import PAIR, opposed
-from spikecam_env.gap.polish import Errors, polished
+from spikecam_env.gap.polish import Errors, no_surer, polished
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.screen import Screened, screen
@@ -229,7 +229,8 @@ def compared(
     if sure and turn.misfit - sure[0].misfit > turn.least:
         began = min((s for s in tries if s.name == sure[0].name), key=lambda s: tries[s].misfit)
         again = other_shapes(began, shapes, turn.misfit)
-        if again and not case.effort.allows(f"{sure[0].name} of another shape"):
+        price = price_of(unit, here, seen, sure[0], again, tries)
+        if again and not case.effort.allows(f"{sure[0].name} of another shape", price):
             again = []
         anew = [confirm(f) for f in other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again, tries)]
         sure[0] = min((sure[0], *anew), key=lambda f: f.misfit)
@@ -273,6 +274,14 @@ def other_ends(
         fits = {**tries, **dict(zip(new, pool.map(partial(fit_from, case, model, null, seen), new), strict=True))}
     alike = [fits[s] for s in starts if before - fits[s].misfit > ALIKE * (before - best.misfit)]
     return [shaped(case, model, null, seen, f) for f in sorted(alike, key=lambda f: f.misfit)[:1]]
+
+
+def price_of(
+    case: Case, null: Null, seen: Array, best: Fit, starts: Sequence[Screened], tries: Collection[Screened]
+) -> int:
+    """Recordings that one twin, or as many as it takes, of each new start takes."""
+    only = concerned(case, [best.name], null, seen, best.prediction.mean - null.mean)
+    return len(only) * twins_of(best.name) * sum(s not in tries for s in starts)
 
 
 def is_little(turn: Round, left: float, chance: float, later: bool) -> bool:
@@ -344,7 +353,7 @@ def shows(here: Null, found: Fit) -> bool:
 def with_errors(turn: Round, errors: Errors) -> Round:
     """The round with its effect's errors as they were found last, together with all others."""
     best = turn.fits[0]
-    return replace(turn, fits=(replace(best, sd=errors.get(best.name) or best.sd), *turn.fits[1:]))
+    return replace(turn, fits=(replace(best, sd=no_surer(errors.get(best.name, {}), best.sd)), *turn.fits[1:]))
 
 
 def settle(

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from spikecam_env.cli.diagnose import Diagnose
+from spikecam_env.gap import polish
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.search import revisited
 from spikecam_env.gap.words import unfinished
@@ -26,6 +27,39 @@ def test_what_is_left_out_is_said_once():
     assert unfinished(effort) == [
         "To save time, not looked for: a third effect and photodiode lag of another shape. A larger --effort does."
     ]
+
+
+def test_what_takes_more_than_is_left_is_not_begun():
+    effort = Effort(20, [13])
+    assert effort.allows("photodiode_lag of another shape", 6) and effort.left_out == []
+    assert not effort.allows("photodiode_lag of another shape", 7)
+    assert effort.left_out == ["photodiode_lag of another shape"]
+
+
+@pytest.mark.parametrize(
+    "most, names, silent, shapes",
+    [
+        (1, ["photodiode_lag"], False, True),
+        (0, ["photodiode_lag"], True, True),
+        (0, ["photodiode_lag"], False, False),
+        (1, ["photodiode_lag", "crosstalk"], True, True),
+        (0, ["photodiode_lag", "crosstalk"], True, False),
+    ],
+)
+def test_of_several_effects_strengths_alone_are_refined_when_enough_was_simulated(
+    most: int, names: list[str], silent: bool, shapes: bool, monkeypatch
+):
+    monkeypatch.setattr(polish, "leaves_nothing", lambda *_: silent)
+    case, found = SimpleNamespace(effort=Effort(most)), SimpleNamespace(prediction=None)
+    free = polish.to_refine(case, None, None, found, names)
+    assert (("photodiode_lag", "tau_us") in free) == shapes == (not case.effort.left_out)
+    assert {name for name, _ in free} == set(names)
+
+
+def test_what_was_not_refined_is_known_no_better_than_before():
+    assert polish.no_surer({"fraction": 0.1}, {"fraction": 0.3, "tau_us": 5.0}) == {"fraction": 0.3, "tau_us": 5.0}
+    assert polish.no_surer({"fraction": 0.4}, {"fraction": 0.3, "tau_us": 5.0}) == {"fraction": 0.4, "tau_us": 5.0}
+    assert polish.no_surer({"fraction": 0.1, "tau_us": 2.0}, {"fraction": 0.3}) == {"fraction": 0.1, "tau_us": 2.0}
 
 
 def test_without_a_most_there_is_no_end():

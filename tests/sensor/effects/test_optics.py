@@ -7,7 +7,7 @@ import pytest
 from laws import camera, check, population, rates
 from scipy.special import erf
 
-from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effects.base import Charge, Exposure
 
 
@@ -74,6 +74,21 @@ def test_optical_blur_has_its_variance_however_small(sigma) -> None:
     variance = float(spread.sum(axis=0) @ (np.arange(61) - 30.0) ** 2)
     check("variance [pixels^2]", variance, sigma**2, 1e-6 + 1e-5 * sigma**2)
     check("light", float(spread.sum()), 1.0, 1e-9)
+
+
+@pytest.mark.parametrize("engine", ["fast", "reference"])
+def test_every_picture_of_a_film_goes_through_the_lens_once(engine, monkeypatch) -> None:
+    """Also where a step begins within a key interval; and the bits are those of a film that was blurred before."""
+    film = Keyframes(np.arange(6) * 4.0, np.random.default_rng(0).random((6, 8, 9), dtype=np.float32))
+    blur, seen = CATALOGUE["optical_blur"](sigma_pixels=0.8), []
+    image = type(blur).image
+    blurred = Keyframes(film.frame, np.stack([image(blur, picture) for picture in film.radiance]))
+    monkeypatch.setattr(type(blur), "image", lambda self, picture: seen.append(1) or image(self, picture))
+    ideal = SensorModel.preset("ideal")
+    one, other = (SpikeSensor(m, (8, 9), 0, engine=engine) for m in (ideal.with_effect(blur), ideal))
+    for frames in (3, 6, 11):
+        assert np.array_equal(one.step(film, frames), other.step(blurred, frames))
+    assert len(seen) == 6
 
 
 def test_optical_blur_leaves_flat_light_alone() -> None:
