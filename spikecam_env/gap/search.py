@@ -279,7 +279,7 @@ def other_ends(
 def price_of(
     case: Case, null: Null, seen: Array, best: Fit, starts: Sequence[Screened], tries: Collection[Screened]
 ) -> int:
-    """Recordings that one twin, or as many as it takes, of each new start takes."""
+    """Recordings that fits from the starts that were not tried yet simulate at least."""
     only = concerned(case, [best.name], null, seen, best.prediction.mean - null.mean)
     return len(only) * twins_of(best.name) * sum(s not in tries for s in starts)
 
