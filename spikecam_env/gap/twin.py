@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.observe import Observation, observe
 from spikecam_env.gap.refit import BaseFit, unit_of
-from spikecam_env.gap.world import Shown
+from spikecam_env.gap.world import LABELS, Shown
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.streams import pack_frames
@@ -35,7 +35,7 @@ def simulate(
     """
     unit = unit_of(model, base, shape)
     return [
-        observe(expose(model, between_grains(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
+        observe(expose(model, as_known(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
         for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
     ]
 
@@ -56,15 +56,19 @@ def expose(
     return np.concatenate(parts)
 
 
-def between_grains(unit: Unit, seed: int, take: int) -> Unit:
-    """A unit of pixels that are all alike, its dark level up to half a grain higher or lower, drawn for one recording.
+def as_known(unit: Unit, seed: int, take: int) -> Unit:
+    """A unit of pixels that are all alike, in light and with a dark level no surer than they are known, drawn for one
+    recording: light to LABELS, dark to half a grain.
 
-    The sensor counts charge in whole grains: relative to dim light, one is a hundred thousandth.  Where all pixels fire
-    alike and without noise, the beat with the read-out's clock shows what was rounded; drawn, it is no law.
+    Where all pixels fire alike and without noise, the beat with the read-out's clock shows a hundred thousandth of the
+    rate: of the dark level what the sensor rounds, since it counts charge in whole grains, and of light what no label
+    says.  Drawn, it is no law.
     """
-    if np.ptp(unit.gain) > 0 or unit.dark.min() < 1.0 / GRAINS:
+    if np.ptp(unit.gain) > 0:
         return unit
-    return replace(unit, dark=unit.dark + np.random.default_rng([seed, take, 4]).uniform(-0.5, 0.5) / GRAINS)
+    rng = np.random.default_rng([seed, take, 4])
+    grains = rng.uniform(-0.5, 0.5) if unit.dark.min() >= 1.0 / GRAINS else 0.0
+    return replace(unit, gain=unit.gain * (1.0 + LABELS * rng.standard_normal()), dark=unit.dark + grains / GRAINS)
 
 
 def at_any_phase(model: SensorModel, seed: int, take: int) -> SensorModel:

@@ -23,6 +23,9 @@ KNOWN = ("dark", "flat", "picture")
 
 STATIC = (*KNOWN, "unknown")
 
+LABELS = 2e-5
+"""Relative error that labels of light, and first-order laws of it, are known to: a standard deviation."""
+
 
 @dataclass(frozen=True)
 class Shown:

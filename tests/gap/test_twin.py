@@ -9,7 +9,8 @@ import pytest
 from small import MODEL, SHAPE, unit
 
 from spikecam_env.gap.refit import unit_of
-from spikecam_env.gap.twin import FIRST, at_any_phase, between_grains
+from spikecam_env.gap.twin import FIRST, as_known, at_any_phase
+from spikecam_env.gap.world import LABELS
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
@@ -40,14 +41,17 @@ def test_a_model_without_waves_is_left_alone():
     assert at_any_phase(PLAIN, 0, 0) == PLAIN
 
 
-def test_alike_pixels_are_not_known_better_than_the_sensor_counts():
-    """Up to half a grain of dark charge, another in every recording, the same in all pixels; spread pixels as given."""
+def test_alike_pixels_are_known_no_better_than_labels_say_and_the_sensor_counts():
+    """Light, and up to half a grain of dark charge, another in every recording, the same in all pixels; spread pixels
+    as given."""
     every = np.ones(SHAPE[0] * SHAPE[1])
     alike = replace(unit_of(MODEL, unit(), SHAPE), gain=0.8 * every, dark=3e-4 * every)
-    moved = [(between_grains(alike, 17, take).dark - alike.dark) * GRAINS for take in range(8)]
-    assert all(np.ptp(m) < 1e-6 and abs(m[0]) <= 0.5 for m in moved) and len({float(m[0]) for m in moved}) == 8
-    assert np.array_equal(between_grains(alike, 17, 3).dark, between_grains(alike, 17, 3).dark)
+    drawn = [as_known(alike, 17, take) for take in range(200)]
+    moved = np.array([(d.dark - alike.dark) * GRAINS for d in drawn])
+    assert np.ptp(moved, axis=1).max() < 1e-6 and np.abs(moved).max() <= 0.5 and len(np.unique(moved[:, 0])) == 200
+    brighter = np.array([d.gain / alike.gain - 1.0 for d in drawn])
+    assert np.ptp(brighter, axis=1).max() < 1e-12 and brighter[:, 0].std() == pytest.approx(LABELS, rel=0.2)
+    assert np.array_equal(as_known(alike, 17, 3).gain, drawn[3].gain)
     spread = replace(alike, gain=np.linspace(0.7, 0.9, alike.gain.size))
-    assert between_grains(spread, 17, 0) is spread
-    dark = replace(alike, dark=np.zeros(alike.gain.size))
-    assert between_grains(dark, 17, 0) is dark
+    assert as_known(spread, 17, 0) is spread
+    assert not as_known(replace(alike, dark=np.zeros(alike.gain.size)), 17, 0).dark.any()

@@ -23,6 +23,7 @@ from spikecam_env.gap.statistics import (
     timing,
 )
 from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.world import LABELS
 
 GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
     module.__name__.rsplit(".", 1)[1]: module.statistics
@@ -31,7 +32,7 @@ GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
 
 
 FLOORS: dict[tuple[str, str], float] = {
-    ("rates", ""): 2e-5,
+    ("rates", ""): LABELS,
     ("rates", "scatter"): 0.05,
     ("noise", "variance"): 1e-3,
     ("noise", "lag-1"): 2e-3,
