@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, unit
 
+from spikecam_env.gap import twin
 from spikecam_env.gap.refit import unit_of
 from spikecam_env.gap.twin import FIRST, as_known, at_any_phase
-from spikecam_env.gap.world import LABELS
-from spikecam_env.sensor import SensorModel
+from spikecam_env.gap.world import LABELS, Shown
+from spikecam_env.sensor import Keyframes, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
 from spikecam_env.sensor.light import GRAINS
@@ -55,3 +56,25 @@ def test_alike_pixels_are_known_no_better_than_labels_say_and_the_sensor_counts(
     spread = replace(alike, gain=np.linspace(0.7, 0.9, alike.gain.size))
     assert as_known(spread, 17, 0) is spread
     assert not as_known(replace(alike, dark=np.zeros(alike.gain.size)), 17, 0).dark.any()
+
+
+@pytest.mark.parametrize("known", [0.0, LABELS])
+def test_the_beat_of_alike_pixels_is_no_surer_than_labels(known: float, monkeypatch):
+    """64 intervals of 30.1222 frames: a light brighter by what labels leave open moves the mean square of their second
+    differences by hundreds of what twins in one light scatter; drawn, it is within their scatter."""
+    monkeypatch.setattr(twin, "LABELS", known)
+    light = Keyframes(np.zeros(1), np.full((1, *SHAPE), 0.029, np.float32))
+    flat, model = Shown("flat", "flat", 0.029, light, 8000, "fit"), SensorModel.preset("ideal")
+    every = np.ones(SHAPE[0] * SHAPE[1])
+    dark = 3.4e-4 * every
+
+    def squares(brighter: float) -> np.ndarray:
+        gain = (1.0 / 30.1222 - dark) / float(light.radiance[0, 0, 0]) * (1.0 + brighter)
+        alike = replace(unit(model), gain=gain, dark=dark)
+        seen = [twin.simulate(model, alike, [flat], SHAPE, FIRST + n, [2])[0].times for n in range(8)]
+        return np.array([t.square[:, 3].sum() / t.terms[:, 3].sum() for t in seen])
+
+    here, there = squares(0.0), squares(LABELS)
+    moved, scatter = abs(there.mean() - here.mean()), here.std(ddof=1)
+    print(f"{here.mean():.4f}, in light {LABELS:g} brighter {there.mean():.4f}; twins scatter by {scatter:.4f}")
+    assert (moved > 100 * scatter) if known == 0.0 else (moved < 2 * scatter)
