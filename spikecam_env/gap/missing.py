@@ -22,6 +22,10 @@ from spikecam_env.sensor.effects.base import build
 LEAST_WIDTH = 5e-4
 """Relative spread of pixels that is more than the refit's own error."""
 
+KNOWN_ALIKE = 2.0
+"""Times the usual error of a dark level up to which it tells how pixels differ: of alike pixels with a spike or two in
+the dark some have a rate there, and others thirty times the error."""
+
 LEAST_JITTER = 1e-7
 """s^2 that is more than none: a pixel of 10 million electrons."""
 
@@ -40,6 +44,7 @@ def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missin
     has = {e.name for e in model.effects}
     live = case.base.live
     gain, dark, white = case.base.gain[live], case.base.dark[live], case.base.white
+    known = case.base.dark_sd[live] < KNOWN_ALIKE * np.median(case.base.dark_sd[live])
     count = float(np.sqrt(2 * live.sum()))
     to_pA = model.circuit.capacitance_fF * model.circuit.swing_V * model.frame_rate_hz * 1e-3
     found: list[Missing] = []
@@ -57,7 +62,7 @@ def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missin
     if not has & set(DARK) and level > 5 * error / count and fires_in_the_dark(case, level):
         add("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
     if not has & set(DARK_PATTERN) and level > 0:
-        own = float(np.sqrt(max(scatter(dark) ** 2 - (level * width(gain)) ** 2 - error**2, 0.0)))
+        own = float(np.sqrt(max(scatter(dark[known]) ** 2 - (level * width(gain)) ** 2 - error**2, 0.0)))
         if own > error:
             add("dark_current_spread", own * to_pA, own * to_pA / count)
     if not has & set(NOISE) and white > LEAST_JITTER:

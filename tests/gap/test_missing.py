@@ -93,6 +93,15 @@ def test_dark_levels_that_differ_by_their_errors_alone_are_no_spread():
         assert found == ["conversion_gain_spread"]
 
 
+def test_dark_levels_that_are_not_known_alike_are_no_spread():
+    """Of alike pixels that fire once or twice in the dark, two fifths have no rate there: thirty times the error."""
+    case, rng = recorded(model=IDEAL.with_effect(effect("dark_current", mean_pA=0.1))), np.random.default_rng(0)
+    sd = np.where(np.arange(PIXELS) % 5 < 2, 6e-7, 2e-8)
+    base = replace(case.base, dark=2e-4 + sd * rng.standard_normal(PIXELS), dark_sd=sd)
+    found = [m.effect.name for m in missing(replace(case, base=base), IDEAL, NAMES)]
+    assert found == ["dark_current"]
+
+
 def test_only_names_that_are_asked_for_are_added():
     found = lacking(SensorModel.preset("scsim"), names=("dark_current", "shot_noise"))
     assert list(found) == ["dark_current", "shot_noise"]
