@@ -177,17 +177,12 @@ class SpikeSensor:
         """Optics act once a key interval, not once a step; `begin` is the interval's first frame."""
         if not self._optics or not isinstance(light, Keyframes):
             return imaged(segment, self._optics, self.shape)
-        if self._seen is None or self._seen[0] is not light or self._seen[1:3] != (begin, segment.length):
-            self._seen = (light, begin, segment.length, self._through_optics(segment, light, begin))
-        ends = self._seen[3]
+        seen = self._seen if self._seen is not None and self._seen[0] is light else None
+        if seen is None or seen[1:3] != (begin, segment.length):
+            last_end = seen[3].radiance1 if seen is not None and seen[1] + seen[2] == begin else None
+            self._seen = seen = (light, begin, segment.length, imaged(segment, self._optics, self.shape, last_end))
+        ends = seen[3]
         return replace(segment, radiance0=ends.radiance0, radiance1=ends.radiance1)
-
-    def _through_optics(self, segment: Segment, light: Keyframes, begin: int) -> Segment:
-        """Where one interval ends the next begins: that picture is there already."""
-        seen = self._seen
-        if seen is None or seen[0] is not light or seen[1] + seen[2] != begin:
-            return imaged(segment, self._optics, self.shape)
-        return imaged(segment, self._optics, self.shape, seen[3].radiance1)
 
     def _names_of_effects(self) -> tuple[str, ...]:
         return tuple(e.name for e in self._frame_effects)
