@@ -44,7 +44,7 @@ def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missin
     has = {e.name for e in model.effects}
     live = case.base.live
     gain, dark, white = case.base.gain[live], case.base.dark[live], case.base.white
-    known = case.base.dark_sd[live] < KNOWN_ALIKE * np.median(case.base.dark_sd[live])
+    known = case.base.dark_sd[live] <= KNOWN_ALIKE * np.median(case.base.dark_sd[live])
     count = float(np.sqrt(2 * live.sum()))
     to_pA = model.circuit.capacitance_fF * model.circuit.swing_V * model.frame_rate_hz * 1e-3
     found: list[Missing] = []

@@ -76,7 +76,7 @@ def _refined(
         step, told = step_of(null, measured, best.prediction, columns, before=spans(free))
         best = _stepped(null, measured, best, free, columns, step)
     values = {e.name: e.parameters() for e in best.model.effects}
-    errors: Errors = {name: dict(found.sd) if name == found.name else {} for name in names}
+    errors: Errors = {name: {} for name in names}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
         if (name, key) != WHITE:
             errors[name][key] = float(abs(values[name][key]) * e)

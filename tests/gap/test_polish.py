@@ -1,11 +1,15 @@
 """The last touch: all parameters refined together, and the unit with them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded, unit
 
+from spikecam_env.gap import polish
 from spikecam_env.gap.compare import Prediction, values_of
 from spikecam_env.gap.descent import derivatives, moved
+from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.fit import Fit, fit, predict
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.polish import agree, polished
@@ -26,6 +30,19 @@ def test_noise_of_the_unit_is_found_beside_common_noise(seed):
     print(best.parameters, errors, f"s^2 {before:.2f}, then {own:.2f} of the unit's")
     assert own == pytest.approx(1.0, abs=0.1) and abs(own - 1.0) < abs(before - 1.0)
     assert best.parameters["sigma_mV"] == pytest.approx(3.0, abs=3 * errors[name]["sigma_mV"])
+
+
+def test_strengths_refined_alone_are_known_no_better_than_with_their_shapes(monkeypatch):
+    """A fit that says its strength is open by half, and enough simulated to leave its time constant alone."""
+    name = "photodiode_lag"
+    case = replace(recorded(effect(name, fraction=0.05, tau_us=600.0), seed=2), effort=Effort(0))
+    values = values_of(case.bank, null().keys)
+    seen = np.where([case.use(k.recording) == "fit" for k in null().keys], values, np.nan)
+    first = fit(case, MODEL, null(), seen, name, {"fraction": 0.05, "tau_us": 600.0})
+    open_ = {"fraction": 0.025, "tau_us": 200.0}
+    monkeypatch.setattr(polish, "leaves_nothing", lambda *_: False)
+    best, errors, _ = polished(case, MODEL, null(), seen, values, replace(first, sd=open_), [name])
+    assert errors[name] == best.sd == open_ and case.effort.left_out == ["finer shapes of what was found"]
 
 
 def test_derivatives_are_of_a_unit_that_has_settled():
