@@ -12,12 +12,12 @@ from denoiser.window import Window
 
 def rates(network: nn.Module, window: Window, number_type: torch.dtype) -> NDArray[np.float32]:
     """(count, H, W) float32 rates in the frames the window covers, cut to [0, 1] [spikes/frame]."""
-    layout = torch.channels_last
-    spikes = torch.from_numpy(np.ascontiguousarray(window.spikes))[None].to(number_type)
-    planes = torch.from_numpy(window.planes)[None]
-    with torch.inference_mode(), torch.autocast("cpu", number_type, enabled=number_type != torch.float32):
+    layout, device = torch.channels_last, next(network.parameters()).device
+    spikes = torch.from_numpy(np.ascontiguousarray(window.spikes))[None].to(device, number_type)
+    planes = torch.from_numpy(window.planes)[None].to(device)
+    with torch.inference_mode(), torch.autocast(device.type, number_type, enabled=number_type != torch.float32):
         rate = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout))
-    return np.ascontiguousarray(rate[0, : window.count].float().clamp(0.0, 1.0).numpy())
+    return np.ascontiguousarray(rate[0, : window.count].float().clamp(0.0, 1.0).cpu().numpy())
 
 
 def number_type(precision: str) -> torch.dtype:

@@ -148,22 +148,25 @@ def _texture_bank(seed: int, count: int = 96, size: int = 256) -> list[NDArray[n
 
 
 class ClipFeed:
-    """Clips first, first + 1, ... in order, simulated ahead of use in a process of its own.
+    """Clips first, first + 1, ... in order, simulated ahead of use in `workers` processes.
 
     `weights` may be set to a checkpoint: the clips that are begun from then on carry the gain its network finds.
     """
 
-    def __init__(self, recipe: Recipe, seed: int, first: int = 0, weights: Path | None = None) -> None:
+    def __init__(
+        self, recipe: Recipe, seed: int, first: int = 0, weights: Path | None = None, *, workers: int = 1
+    ) -> None:
         self.weights = weights
         self._recipe, self._seed, self._next = recipe, seed, first
-        self._workers = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_one_thread)
+        self._ahead = CLIPS_AHEAD * workers
+        self._workers = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread)
         self._waiting: deque[Future[list[Sample]]] = deque()
 
     def __iter__(self) -> Iterator[list[Sample]]:
         return self
 
     def __next__(self) -> list[Sample]:
-        while len(self._waiting) < CLIPS_AHEAD:
+        while len(self._waiting) < self._ahead:
             job = self._workers.submit(_draw_with, self._recipe, self._seed, self._next, self.weights)
             self._waiting.append(job)
             self._next += 1
@@ -193,36 +196,3 @@ def _one_thread() -> None:
     cv2.setNumThreads(1)
     numba.set_num_threads(1)
     torch.set_num_threads(1)
-
-
-class SamplePool:
-    """The windows of the last `clips` clips, from which patches are drawn."""
-
-    def __init__(self, clips: int) -> None:
-        self._clips: deque[list[Sample]] = deque(maxlen=clips)
-
-    def add(self, clip: list[Sample]) -> None:
-        """Take a clip in; the oldest leaves when the pool is full."""
-        self._clips.append(clip)
-
-    def batch(self, rng: np.random.Generator, size: int, patch: int) -> Sample:
-        """(size, channels, patch, patch) arrays: random windows, places, quarter turns and flips."""
-        return stack([self._patch(rng, patch) for _ in range(size)])
-
-    def _patch(self, rng: np.random.Generator, patch: int) -> Sample:
-        clip = self._clips[rng.integers(len(self._clips))]
-        sample = clip[rng.integers(len(clip))]
-        y, x = (int(rng.integers(n - patch + 1)) for n in sample.spikes.shape[1:])
-        turns, flip = int(rng.integers(4)), bool(rng.integers(2))
-
-        def cut(a: NDArray) -> NDArray:
-            a = np.rot90(a[:, y : y + patch, x : x + patch], turns, axes=(1, 2))
-            return a[:, :, ::-1] if flip else a
-
-        return Sample(*(cut(a) for a in (sample.spikes, sample.planes, sample.light, sample.target)))
-
-
-def stack(samples: list[Sample]) -> Sample:
-    """Samples of one shape -> one Sample with a leading axis."""
-    fields = ("spikes", "planes", "light", "target")
-    return Sample(*(np.stack([getattr(s, name) for s in samples]) for name in fields))

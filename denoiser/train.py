@@ -28,12 +28,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm import tqdm
 
 from denoiser import infer
-from denoiser.pairs import ClipFeed, Sample, SamplePool, draw_clip
+from denoiser.pairs import ClipFeed, draw_clip
+from denoiser.pool import Batch, SamplePool
 from denoiser.recipe import Recipe, recipe_of
 from denoiser.weights import read_plain, save_weights, write_whole
 from denoiser.window import Window
@@ -53,7 +53,8 @@ class TrainConfig:
 
     batch: patches a step.  patch: their side [pixels].  lr: highest rate of learning.  steps_per_clip: steps between
     new clips.  refresh_every: steps between validations, and between new networks for the gain.  threads: for the
-    network; the simulation has one process of its own.  resume: go on from out/last.pt.
+    network.  device: where it is, and the pool; a GPU wants larger batches.  workers: processes that simulate; how many
+    there are decides how far ahead of a new network clips are begun.  resume: go on from out/last.pt.
     """
 
     mode: str = "best"
@@ -69,13 +70,21 @@ class TrainConfig:
     steps_per_clip: int = 8
     save_every_s: float = 60.0
     refresh_every: int = 1000
+    device: str = "cpu"
+    workers: int = 1
 
     def __post_init__(self) -> None:
-        if self.steps < 1 or self.batch < 1 or not 4 <= self.patch <= 96 or self.lr <= 0 or self.steps_per_clip < 1:
+        counts = (self.steps, self.batch, self.steps_per_clip, self.refresh_every, self.workers)
+        if min(counts) < 1 or not 4 <= self.patch <= 96 or self.lr <= 0:
             raise InputError(
                 f"steps {self.steps}, batch {self.batch}, patch {self.patch}, lr {self.lr}, steps_per_clip "
-                f"{self.steps_per_clip}; all must be positive and the patch 4 to 96 pixels"
+                f"{self.steps_per_clip}, refresh_every {self.refresh_every}, workers {self.workers}; all must be "
+                "positive and the patch 4 to 96 pixels"
             )
+        if self.device.partition(":")[0] not in ("cpu", "cuda"):
+            raise InputError(f"device {self.device!r}; give cpu, cuda or cuda:1")
+        if self.device.startswith("cuda") and not torch.cuda.is_available():
+            raise InputError(f"device {self.device!r}, but this torch finds no CUDA device; train on cpu")
 
 
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
@@ -88,8 +97,9 @@ def train(config: TrainConfig, *, progress: bool = True) -> Path:
     if config.resume and (config.out / "last.pt").exists():
         run.load(config.out / "last.pt")
     newest = FIRST_CLIPS + run.step // config.steps_per_clip
-    pool = SamplePool(POOL_CLIPS)
-    feed = ClipFeed(recipe, config.seed, max(0, newest - POOL_CLIPS), _rollout(config, recipe, run.step))
+    pool = SamplePool(POOL_CLIPS, config.device)
+    first, rollout = max(0, newest - POOL_CLIPS), _rollout(config, recipe, run.step)
+    feed = ClipFeed(recipe, config.seed, first, rollout, workers=config.workers)
     try:
         for _ in range(min(newest, POOL_CLIPS)):
             pool.add(next(feed))
@@ -112,7 +122,7 @@ class _Run:
 
     @classmethod
     def begin(cls, config: TrainConfig, recipe: Recipe) -> _Run:
-        network = recipe.network().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        network = recipe.network().to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         optimiser = torch.optim.Adam(network.parameters(), config.lr)
         return cls(network, optimiser, np.random.default_rng([config.seed, 1]), 0, 0.0, [], [])
 
@@ -153,7 +163,7 @@ def _loop(
     loss_of = _clean_interval_loss if recipe.target == "clean_inverse_interval" else _light_loss
     before, began, saved = run.seconds, time.monotonic(), time.monotonic()
     bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
-    losses: list[float] = []
+    losses: list[Tensor] = []
     while (done := _done(config, run)) < 1.0:
         if run.step and run.step % config.steps_per_clip == 0:
             pool.add(next(feed))
@@ -165,9 +175,10 @@ def _loop(
         if run.step % config.refresh_every == 0:
             knows_gain = run.step > config.refresh_every
             scores = validate(recipe, run.network, config.seed + VALIDATION_SEED, knows_gain)
-            run.curve.append({"step": run.step, "seconds": run.seconds, "loss": float(np.mean(losses)), **scores})
+            loss = float(torch.stack(losses).mean())
+            run.curve.append({"step": run.step, "seconds": run.seconds, "loss": loss, **scores})
             losses.clear()
-            bar.set_postfix(loss=run.curve[-1]["loss"], light_db=scores["network_vs_light_db"])
+            bar.set_postfix(loss=loss, light_db=scores["network_vs_light_db"])
             feed.weights = _refresh(config, recipe, run)
             _save(config, recipe, run)
             saved = time.monotonic()
@@ -189,15 +200,16 @@ def _set_rate(optimiser: torch.optim.Optimizer, lr: float, step: int, done: floa
         group["lr"] = rate
 
 
-def _step(run: _Run, batch: Sample, loss_of: Callable[[Tensor, Tensor], Tensor]) -> float:
-    with torch.autocast("cpu", torch.bfloat16):
-        predicted = run.network(*network_inputs(batch.spikes, batch.planes))
-    loss = loss_of(predicted.float(), torch.from_numpy(batch.target.astype(np.float32)))
+def _step(run: _Run, batch: Batch, loss_of: Callable[[Tensor, Tensor], Tensor]) -> Tensor:
+    """One step of the network; its loss, which a GPU need not have worked out yet."""
+    with torch.autocast(batch.spikes.device.type, torch.bfloat16):
+        predicted = run.network(batch.spikes.to(torch.bfloat16), batch.planes.float())
+    loss = loss_of(predicted.float(), batch.target.float())
     run.optimiser.zero_grad(set_to_none=True)
     loss.backward()
     nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
     run.optimiser.step()
-    return loss.item()
+    return loss.detach()
 
 
 def _clean_interval_loss(predicted: Tensor, target: Tensor) -> Tensor:
@@ -206,15 +218,6 @@ def _clean_interval_loss(predicted: Tensor, target: Tensor) -> Tensor:
 
 def _light_loss(predicted: Tensor, target: Tensor) -> Tensor:
     return ((predicted - target).square() / (target + 0.05)).mean()
-
-
-def network_inputs(spikes: NDArray[np.uint8], planes: NDArray) -> tuple[Tensor, Tensor]:
-    """(N, span, H, W) and (N, layers, H, W) arrays -> bfloat16 and float32 tensors, channels last."""
-    layout = torch.channels_last
-    return (
-        torch.from_numpy(np.ascontiguousarray(spikes)).to(torch.bfloat16).contiguous(memory_format=layout),
-        torch.from_numpy(planes.astype(np.float32)).contiguous(memory_format=layout),
-    )
 
 
 def validate(recipe: Recipe, network: nn.Module, seed: int, knows_gain: bool = True) -> dict[str, float]:

@@ -12,6 +12,7 @@ class Train:
     """Train DnSS on noisy and clean streams simulated on the fly; goes on from its last checkpoint.
 
     example:  spikecam train --mode best --out runs/best
+    on a GPU: spikecam train --mode best --device cuda --batch 64 --workers 12 --refresh-every 4000 --out runs/best
     """
 
     out: Path
@@ -29,7 +30,15 @@ class Train:
     seed: int = 0
     """Seed of network, scenes, cameras and noise."""
     threads: int = 2
-    """Threads of the network; the simulation has a process of its own."""
+    """Threads of the network, on a processor."""
+    device: str = "cpu"
+    """Where the network learns: cpu, cuda, cuda:1."""
+    workers: int = 1
+    """Processes that simulate beside it; a GPU needs a dozen to be kept busy."""
+    steps_per_clip: int = 8
+    """Steps between new clips."""
+    refresh_every: int = 1000
+    """Steps between validations, and between new networks for the gain."""
     resume: bool = True
     """Go on from the folder's checkpoint where there is one."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from denoiser.pairs import WINDOWS_PER_CLIP, SamplePool, draw_clip, draw_model, light_in_frame
+from denoiser.pairs import WINDOWS_PER_CLIP, draw_clip, draw_model, light_in_frame
 from denoiser.recipe import RECIPES
 from spikecam_env.sensor import Keyframes
 
@@ -58,26 +58,6 @@ def test_a_network_gives_the_windows_a_gain():
     assert all(not sample.planes[-1].any() for sample in plain)
     assert any(sample.planes[-1].any() for sample in informed)
     assert all(np.array_equal(a.spikes, b.spikes) for a, b in zip(plain, informed, strict=True))
-
-
-def test_patches_are_cut_turned_and_flipped_alike(recipe, clip):
-    pool = SamplePool(1)
-    pool.add(clip)
-    batch = pool.batch(np.random.default_rng(0), 5, 16)
-    assert batch.spikes.shape == (5, recipe.layout.span, 16, 16)
-    assert batch.target.shape == (5, recipe.layout.planes, 16, 16)
-    whole = {plane.tobytes() for sample in clip for plane in _all_cuts(sample.light[0], 16)}
-    assert all(light[0].tobytes() in whole for light in batch.light)
-
-
-def _all_cuts(plane: np.ndarray, patch: int):
-    for y in range(plane.shape[0] - patch + 1):
-        for x in range(plane.shape[1] - patch + 1):
-            cut = plane[y : y + patch, x : x + patch]
-            for turns in range(4):
-                turned = np.rot90(cut, turns)
-                yield np.ascontiguousarray(turned)
-                yield np.ascontiguousarray(turned[:, ::-1])
 
 
 def test_light_of_a_frame_is_taken_at_its_middle_and_cut():

@@ -19,7 +19,7 @@ from spikecam_env.errors import InputError
 class InlineFeed:
     """ClipFeed without a process of its own, over small clips."""
 
-    def __init__(self, recipe, seed, first=0, weights=None):
+    def __init__(self, recipe, seed, first=0, weights=None, *, workers=1):
         self.recipe, self.seed, self.next, self.weights = recipe, seed, first, weights
 
     def __next__(self):
@@ -78,7 +78,9 @@ def test_the_run_of_another_mode_is_refused(small, tmp_path):
         weights_after(tmp_path, 2, "best")
 
 
-@pytest.mark.parametrize("bad", [{"steps": 0}, {"patch": 97}, {"lr": 0.0}, {"batch": 0}])
+@pytest.mark.parametrize(
+    "bad", [{"steps": 0}, {"patch": 97}, {"lr": 0.0}, {"batch": 0}, {"workers": 0}, {"device": "tpu"}]
+)
 def test_unusable_options_are_named(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
         TrainConfig(**bad)
