@@ -95,7 +95,7 @@ def diagnose(
     with timed("audit"):
         contradictions = upheld(case, assumed, audit(case))
         case = trimmed(case, contradictions)
-        case = replace(case, effort=Effort(effort * len(case.conditions)))
+        case = replace(case, effort=Effort(effort * len(case.conditions), settled=bool(contradictions)))
     names, untestable = testable(names, case.conditions)
     lacking = missing(case, assumed, names)
     start = assumed

@@ -8,26 +8,35 @@ from dataclasses import dataclass, field
 CAMPAIGNS = 60.0
 """Default: so many times the campaign's recordings, with the twins that tell its noise (about 15)."""
 
+NEEDED = 1.5
+"""Times as much may be spent before what a verdict can hardly do without is not begun either."""
+
 
 @dataclass
 class Effort:
     """most: recordings from which nothing more is begun that an answer can do without.
 
     spent: recordings that were simulated, a number a twin.  left_out: what was not begun.
+    settled: whether the verdict is there already, so that an answer can do without all.
     """
 
     most: float = math.inf
     spent: list[int] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    settled: bool = False
 
     @property
     def simulated(self) -> int:
         """Recordings so far."""
         return sum(self.spent)
 
-    def allows(self, what: str, recordings: int = 0) -> bool:
-        """Whether `what`, which takes so many recordings at least, may be begun; noted where it may not."""
-        if self.simulated + recordings < self.most:
+    def allows(self, what: str, recordings: int = 0, *, needed: bool = False) -> bool:
+        """Whether `what`, which takes so many recordings at least, may be begun; noted where it may not.
+
+        needed: a verdict that is not settled can hardly do without it.
+        """
+        most = self.most * (NEEDED if needed and not self.settled else 1.0)
+        if self.simulated + recordings < most:
             return True
         if what not in self.left_out:
             self.left_out.append(what)

@@ -88,14 +88,25 @@ def _refined(
 
 def to_refine(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> list[tuple[str, str]]:
     """Parameters, by effect and name: all that are fitted of those effects that do not wander, since one twin has no
-    direction of these.  Where enough was simulated, of several effects, and of one that leaves something, the strengths
-    alone: derivatives by every shape cost the most, and what effects take from each other is in their strengths."""
+    direction of these.  Where derivatives by every shape would take more than may be simulated, of several effects, and
+    of one that leaves something, the strengths alone: what effects take from each other is in these."""
     free = [(name, key) for name in names if not candidate(name).wanders for key in candidate(name).fitted]
     strengths = [(name, key) for name, key in free if key == candidate(name).fitted[0]]
     last = len(names) == 1 and leaves_nothing(null, measured, found.prediction)
-    if last or len(strengths) == len(free) or case.effort.allows("finer shapes of what was found"):
+    if last or len(strengths) == len(free):
         return free
-    return strengths
+    only, count = simulated_for(case, null, measured, found, names)
+    price = len(only) * count * (1 + len(free))
+    return free if case.effort.allows("finer shapes of what was found", price) else strengths
+
+
+def simulated_for(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> tuple[list[int], int]:
+    """(recordings, by index; twins) that say what the effects of a fit do; none of those that change the pattern alone,
+    for which units are drawn."""
+    if all(is_pattern(name) for name in names):
+        return [], 1
+    only = with_held_out(case, concerned(case, names, null, measured, found.prediction.mean - null.mean))
+    return only, max(twins_of(name) for name in names)
 
 
 def no_surer(known: Mapping[str, float], before: Mapping[str, float]) -> dict[str, float]:
@@ -131,12 +142,11 @@ def agree(before: Fit, after: Fit, errors: Errors) -> bool:
 
 def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[str]) -> Probe:
     """Twins, and drawn units where an effect changes the pattern."""
-    only = with_held_out(case, concerned(case, names, null, measured, found.prediction.mean - null.mean))
-    count = max(twins_of(name) for name in names)
+    only, count = simulated_for(case, null, measured, found, names)
 
     def statistics(model: SensorModel, base: BaseFit) -> Prediction:
         made = null.prediction
-        if not all(is_pattern(name) for name in names):
+        if only:
             made = predict(case, model, within(model, base), null, count, only)
         return with_pattern(case, model, null, made) if any(is_pattern(name) for name in names) else made
 

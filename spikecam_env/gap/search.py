@@ -55,6 +55,9 @@ FEWEST, TRIED = 3, 5
 MOST = 3
 """Effects that one diagnosis names together."""
 
+ANOTHER = {1: "a second effect", 2: "a third effect"}
+"""What is looked for beside so many."""
+
 ALIKE = 0.8
 """Share of what the best removes, that it has to remove with another of its shapes for the other end of a valley."""
 
@@ -124,7 +127,7 @@ def search(
         by_fit = alarmed(null, rho, prediction) if rounds else rings(null, seen)
         if rounds and not (by_fit or alarmed(null, residual(null, values, prediction), prediction)):
             break
-        if len(rounds) > 1 and not case.effort.allows("a third effect"):
+        if rounds and not case.effort.allows(ANOTHER[len(rounds)], needed=len(rounds) == 1):
             break
         if not by_fit:
             case = lent(case)
@@ -247,9 +250,16 @@ def fits_of(
         tries = dict(zip(starts, pool.map(partial(fit_from, case, model, null, seen), starts), strict=True))
         names = dict.fromkeys(s.name for s in starts)
         fits = [min((f for f in tries.values() if f.name == name), key=lambda f: f.misfit) for name in names]
-        worth = worth_shaping(null, before, fits)
+        worth = [f for f in worth_shaping(null, before, fits) if may_be_shaped(case, null, seen, f)]
         better = list(pool.map(partial(shaped, case, model, null, seen), worth))
     return [*better, *(f for f in fits if f not in worth)], tries
+
+
+def may_be_shaped(case: Case, null: Null, seen: Array, found: Fit) -> bool:
+    """Whether there is enough effort left for a fit's other parameters: a twin each, and one to start from."""
+    only = concerned(case, [found.name], null, seen, found.prediction.mean - null.mean)
+    price = len(only) * twins_of(found.name) * (1 + len(candidate(found.name).fitted))
+    return case.effort.allows(f"{found.name} of finer shape", price, needed=True)
 
 
 def fit_from(case: Case, model: SensorModel, null: Null, seen: Array, start: Screened) -> Fit:
@@ -305,6 +315,8 @@ def joined(
     names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
     alone = not before or is_another_bend(last, best)
     if alone and is_little(last, best.misfit, chance, bool(before)) and alarmed(null, best.rho, best.prediction):
+        return [*before, replace(last, fits=(best, *last.fits[1:]))]
+    if not case.effort.allows("finer strengths", needed=True):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
     best = made_sure(case, model, null, seen, values, best)

@@ -36,20 +36,32 @@ def test_what_takes_more_than_is_left_is_not_begun():
     assert effort.left_out == ["photodiode_lag of another shape"]
 
 
+def test_what_a_verdict_can_hardly_do_without_may_take_more():
+    effort = Effort(20, [13])
+    assert effort.allows("a second effect", 16, needed=True) and not effort.allows("a second effect", 17, needed=True)
+
+
+def test_a_verdict_that_is_settled_can_do_without_all():
+    effort = Effort(20, [20], settled=True)
+    assert not effort.allows("a second effect", needed=True) and effort.left_out == ["a second effect"]
+
+
 @pytest.mark.parametrize(
     "most, names, silent, shapes",
     [
-        (1, ["photodiode_lag"], False, True),
+        (16, ["photodiode_lag"], False, True),
         (0, ["photodiode_lag"], True, True),
-        (0, ["photodiode_lag"], False, False),
-        (1, ["photodiode_lag", "crosstalk"], True, True),
-        (0, ["photodiode_lag", "crosstalk"], True, False),
+        (15, ["photodiode_lag"], False, False),
+        (21, ["photodiode_lag", "crosstalk"], True, True),
+        (20, ["photodiode_lag", "crosstalk"], True, False),
     ],
 )
 def test_of_several_effects_strengths_alone_are_refined_when_enough_was_simulated(
     most: int, names: list[str], silent: bool, shapes: bool, monkeypatch
 ):
+    """Five recordings, three of these or four twins: the start and one for each parameter."""
     monkeypatch.setattr(polish, "leaves_nothing", lambda *_: silent)
+    monkeypatch.setattr(polish, "simulated_for", lambda *_: (list(range(5)), 1))
     case, found = SimpleNamespace(effort=Effort(most)), SimpleNamespace(prediction=None)
     free = polish.to_refine(case, None, None, found, names)
     assert (("photodiode_lag", "tau_us") in free) == shapes == (not case.effort.left_out)
