@@ -30,7 +30,7 @@ from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.maps import diagnose_maps
-from spikecam_env.gap.missing import missing
+from spikecam_env.gap.missing import missing, with_all
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.parameters import Off, off_nominal
@@ -98,9 +98,7 @@ def diagnose(
         case = replace(case, effort=Effort(effort * len(case.conditions), settled=bool(contradictions)))
     names, untestable = testable(names, case.conditions)
     lacking = missing(case, assumed, names)
-    start = assumed
-    for m in lacking:
-        start = start.with_effect(m.effect)
+    start = with_all(assumed, lacking)
     off = Off({}, case.base) if lacking else off_nominal(case, assumed, case.base)
     with timed("twins"):
         null = model_null(case, start, twin_count)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.gap.case import Case
-from spikecam_env.gap.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common
+from spikecam_env.gap.case import Case, rests_on, twins
+from spikecam_env.gap.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common, within
 from spikecam_env.gap.units import width
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import Effect, SensorModel
@@ -28,6 +28,10 @@ the dark some have a rate there, and others thirty times the error."""
 
 LEAST_JITTER = 1e-7
 """s^2 that is more than none: a pixel of 10 million electrons."""
+
+QUIET, CLEAR = 4, 5.0
+"""Twins without noise whose refits say what s^2 alike pixels seem to have, which beat with the read-out's clock; and by how
+many of their standard deviations a measured one has to be more."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +69,24 @@ def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missin
         own = float(np.sqrt(max(scatter(dark[known]) ** 2 - (level * width(gain)) ** 2 - error**2, 0.0)))
         if own > error:
             add("dark_current_spread", own * to_pA, own * to_pA / count)
-    if not has & set(NOISE) and white > LEAST_JITTER:
+    if not has & set(NOISE) and white > LEAST_JITTER and is_noise(case, with_all(model, found)):
         add("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
     return found
+
+
+def with_all(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
+    """The model with all that was found."""
+    for m in found:
+        model = model.with_effect(m.effect)
+    return model
+
+
+def is_noise(case: Case, model: SensorModel) -> bool:
+    """Whether the refit's s^2 is more than refits of twins of a model without noise find: of alike pixels 3e-7, at some
+    lights."""
+    made = twins(case, model, within(model, case.base), range(QUIET), sorted(rests_on(case)))
+    shown = np.array([t.base.white for t in made if t.base is not None])
+    return bool(case.base.white > shown.mean() + CLEAR * shown.std(ddof=1))
 
 
 def fires_in_the_dark(case: Case, level: float) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small import SHAPE, effect, recorded
 
+from spikecam_env.gap.case import Twin
 from spikecam_env.gap.missing import missing
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
@@ -111,3 +112,13 @@ def test_what_one_voltage_cannot_tell_apart_is_said():
     found = lacking(SensorModel.preset("scsim"))
     assert set(found["conversion_gain_spread"].also) == {"bias_voltage_spread", "capacitor_spread"}
     assert "reset_noise" in found["shot_noise"].also
+
+
+@pytest.mark.parametrize("white, there", [(2.8e-7, False), (3.9e-7, True)])
+def test_noise_that_twins_without_it_seem_to_have_is_not_missing(white, there, monkeypatch):
+    """Alike pixels that beat with the read-out's clock."""
+    case = recorded(model=IDEAL)
+    quiet = [Twin({}, replace(case.base, white=w)) for w in (2.81e-7, 2.82e-7, 2.75e-7, 2.66e-7)]
+    monkeypatch.setattr("spikecam_env.gap.missing.twins", lambda *_: quiet)
+    found = [m.effect.name for m in missing(replace(case, base=replace(case.base, white=white)), IDEAL, NAMES)]
+    assert found == (["shot_noise"] if there else [])
