@@ -30,8 +30,8 @@ LEAST_JITTER = 1e-7
 """s^2 that is more than none: a pixel of 10 million electrons."""
 
 QUIET, CLEAR = 4, 5.0
-"""Twins without noise whose refits say what s^2 alike pixels seem to have, which beat with the read-out's clock; and by how
-many of their standard deviations a measured one has to be more."""
+"""Twins without noise, whose refits say what s^2 alike pixels seem to have that beat with the read-out's clock; and by
+how many of their standard deviations a measured one has to be more."""
 
 
 @dataclass(frozen=True)
