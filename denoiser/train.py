@@ -38,6 +38,7 @@ from denoiser.recipe import Recipe, recipe_of
 from denoiser.weights import read_plain, save_weights, write_whole
 from denoiser.window import Window
 from spikecam_env.errors import InputError
+from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.whole import whole_file, write_text_whole
 
 POOL_CLIPS = 160
@@ -81,10 +82,7 @@ class TrainConfig:
                 f"{self.steps_per_clip}, refresh_every {self.refresh_every}, workers {self.workers}; all must be "
                 "positive and the patch 4 to 96 pixels"
             )
-        if self.device.partition(":")[0] not in ("cpu", "cuda"):
-            raise InputError(f"device {self.device!r}; give cpu, cuda or cuda:1")
-        if self.device.startswith("cuda") and not torch.cuda.is_available():
-            raise InputError(f"device {self.device!r}, but this torch finds no CUDA device; train on cpu")
+        checked_device(self.device, "train with --device cpu")
 
 
 def train(config: TrainConfig, *, progress: bool = True) -> Path:

@@ -26,7 +26,7 @@ from spikecam_env.gap.candidates import chosen, testable
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, adjusted, values_of
 from spikecam_env.gap.diagnose import in_order, read_case
-from spikecam_env.gap.missing import Missing, missing
+from spikecam_env.gap.missing import Missing, missing, with_all
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import of_fit, search
 from spikecam_env.gap.templates import load
@@ -110,9 +110,7 @@ def ladder(
     case = read_case(measured, seed, jobs)
     names, _ = testable(chosen(first, None, ()), case.conditions)
     lacking = missing(case, first, names)
-    full = first
-    for m in lacking:
-        full = full.with_effect(m.effect)
+    full = with_all(first, lacking)
     null = model_null(case, full, twin_count)
     values = values_of(case.bank, null.keys)
 

@@ -232,7 +232,7 @@ def compared(
     if sure and turn.misfit - sure[0].misfit > turn.least:
         began = min((s for s in tries if s.name == sure[0].name), key=lambda s: tries[s].misfit)
         again = other_shapes(began, shapes, turn.misfit)
-        price = price_of(unit, here, seen, sure[0], again, tries)
+        price = recordings_of(unit, here, seen, sure[0]) * sum(s not in tries for s in again)
         if again and not case.effort.allows(f"{sure[0].name} of another shape", price):
             again = []
         anew = [confirm(f) for f in other_ends(unit, turn.model, here, seen, turn.misfit, sure[0], again, tries)]
@@ -256,9 +256,8 @@ def fits_of(
 
 
 def may_be_shaped(case: Case, null: Null, seen: Array, found: Fit) -> bool:
-    """Whether there is enough effort left for a fit's other parameters: a twin each, and one to start from."""
-    only = concerned(case, [found.name], null, seen, found.prediction.mean - null.mean)
-    price = len(only) * twins_of(found.name) * (1 + len(candidate(found.name).fitted))
+    """Whether there is enough effort left for a fit's other parameters: a derivative each, and a start."""
+    price = recordings_of(case, null, seen, found) * (1 + len(candidate(found.name).fitted))
     return case.effort.allows(f"{found.name} of finer shape", price, needed=True)
 
 
@@ -286,12 +285,10 @@ def other_ends(
     return [shaped(case, model, null, seen, f) for f in sorted(alike, key=lambda f: f.misfit)[:1]]
 
 
-def price_of(
-    case: Case, null: Null, seen: Array, best: Fit, starts: Sequence[Screened], tries: Collection[Screened]
-) -> int:
-    """Recordings that fits from the starts that were not tried yet simulate at least."""
-    only = concerned(case, [best.name], null, seen, best.prediction.mean - null.mean)
-    return len(only) * twins_of(best.name) * sum(s not in tries for s in starts)
+def recordings_of(case: Case, null: Null, seen: Array, found: Fit) -> int:
+    """Recordings that one prediction of a candidate simulates."""
+    only = concerned(case, [found.name], null, seen, found.prediction.mean - null.mean)
+    return len(only) * twins_of(found.name)
 
 
 def is_little(turn: Round, left: float, chance: float, later: bool) -> bool:
@@ -302,8 +299,8 @@ def is_little(turn: Round, left: float, chance: float, later: bool) -> bool:
 def joined(
     case: Case, model: SensorModel, null: Null, seen: Array, values: Array, rounds: Sequence[Round], chance: float
 ) -> list[Round]:
-    """The rounds with the last one's best together with what was found before, and all of it polished, unless it is
-    a stand-in: the first, or one more bend, that has little to say and leaves something."""
+    """The rounds with the last one's best together with what was found before, and all of it polished, unless no effort
+    is left or it is a stand-in: the first, or one more bend, that has little to say and leaves something."""
     *before, last = rounds
     best = last.fits[0]
     if before:
@@ -314,9 +311,9 @@ def joined(
                 best, before[i] = revisited(case, model, null, seen, values, best, turn)
     names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
     alone = not before or is_another_bend(last, best)
-    if alone and is_little(last, best.misfit, chance, bool(before)) and alarmed(null, best.rho, best.prediction):
-        return [*before, replace(last, fits=(best, *last.fits[1:]))]
-    if not case.effort.allows("finer strengths", needed=True):
+    little = alone and is_little(last, best.misfit, chance, bool(before))
+    stands_in = little and alarmed(null, best.rho, best.prediction)
+    if stands_in or not case.effort.allows("finer strengths", needed=True):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
     best = made_sure(case, model, null, seen, values, best)

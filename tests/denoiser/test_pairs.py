@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from denoiser.pairs import WINDOWS_PER_CLIP, draw_clip, draw_model, light_in_frame
+from denoiser.pairs import WINDOWS_PER_CLIP, ClipFeed, draw_clip, draw_model, light_in_frame
 from denoiser.recipe import RECIPES
 from spikecam_env.sensor import Keyframes
 
@@ -58,6 +58,19 @@ def test_a_network_gives_the_windows_a_gain():
     assert all(not sample.planes[-1].any() for sample in plain)
     assert any(sample.planes[-1].any() for sample in informed)
     assert all(np.array_equal(a.spikes, b.spikes) for a, b in zip(plain, informed, strict=True))
+
+
+def test_clips_come_in_order_from_several_workers(monkeypatch):
+    monkeypatch.setattr("denoiser.pairs.CLIPS_AHEAD", 1)
+    recipe = RECIPES["best"]
+    feed = ClipFeed(recipe, 5, first=1, workers=2)
+    try:
+        clips = [next(feed) for _ in range(2)]
+    finally:
+        feed.close()
+    for number, clip in enumerate(clips, start=1):
+        expected = draw_clip(recipe, 5, number)
+        assert all(np.array_equal(a.spikes, b.spikes) for a, b in zip(clip, expected, strict=True))
 
 
 def test_light_of_a_frame_is_taken_at_its_middle_and_cut():

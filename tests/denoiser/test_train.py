@@ -79,8 +79,22 @@ def test_the_run_of_another_mode_is_refused(small, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "bad", [{"steps": 0}, {"patch": 97}, {"lr": 0.0}, {"batch": 0}, {"workers": 0}, {"device": "tpu"}]
+    "bad",
+    [{"steps": 0}, {"patch": 97}, {"lr": 0.0}, {"batch": 0}, {"workers": 0}, {"device": "tpu"}, {"device": "cuda:x"}],
 )
 def test_unusable_options_are_named(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
         TrainConfig(**bad)
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="this machine has a CUDA device")
+def test_a_gpu_that_is_not_there_is_refused():
+    with pytest.raises(InputError, match="sees 0 CUDA devices; train with --device cpu"):
+        TrainConfig(device="cuda")
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device on this machine")
+def test_a_network_learns_on_a_gpu(small, tmp_path):
+    """To weights that load on a processor, past a validation and into clips with a gain."""
+    weights = weights_after(tmp_path, 6, device="cuda")
+    assert all(w.device.type == "cpu" and bool(torch.isfinite(w).all()) for w in weights.values())

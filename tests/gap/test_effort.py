@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import pytest
 
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.gap import polish
+from spikecam_env.gap import search as searching
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
-from spikecam_env.gap.search import revisited
+from spikecam_env.gap.search import joined, may_be_shaped, revisited
 from spikecam_env.gap.words import unfinished
 
 
@@ -85,6 +87,32 @@ def test_runners_up_are_not_tried_anew_when_enough_was_simulated():
     case = SimpleNamespace(effort=Effort(0))
     assert revisited(case, None, None, None, None, best, turn) == (best, turn)
     assert case.effort.left_out == ["others in place of blooming"]
+
+
+def test_a_shape_is_fitted_up_to_half_as_much_again(monkeypatch):
+    """Of two parameters, three predictions of five recordings, of twenty and half as much."""
+    monkeypatch.setattr(searching, "recordings_of", lambda *_: 5)
+    lag = SimpleNamespace(name="photodiode_lag")
+    spent, more = (SimpleNamespace(effort=Effort(20, [n])) for n in (14, 15))
+    assert may_be_shaped(spent, None, None, lag) and not may_be_shaped(more, None, None, lag)
+    assert more.effort.left_out == ["photodiode_lag of finer shape"]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What of a round is asked here."""
+
+    fits: tuple[SimpleNamespace, ...]
+
+
+@pytest.mark.parametrize("spent, settled", [(30, False), (20, True)])
+def test_what_was_found_stays_as_it_was_fitted_when_no_effort_is_left(spent: int, settled: bool, monkeypatch):
+    monkeypatch.setattr(searching, "is_little", lambda *_: False)
+    model = SimpleNamespace(effects=(SimpleNamespace(name="blooming"),))
+    best = SimpleNamespace(name="blooming", model=model, misfit=10.0)
+    case = SimpleNamespace(effort=Effort(20, [spent], settled=settled))
+    assert joined(case, None, None, None, None, [Found((best,))], 0.0) == [Found((best,))]
+    assert case.effort.left_out == ["finer strengths"]
 
 
 def test_the_command_asks_for_what_the_function_does():

@@ -49,8 +49,12 @@ def kernel_on(device: torch.device) -> str:
     return "triton" if device.type == "cuda" and _has_triton() else "torch"
 
 
-def checked_device(device: str | torch.device) -> torch.device:
-    """A device that the engine can run on; raises InputError for CUDA where there is none, and for other kinds."""
+ON_PROCESSOR = "use engine='fast', or SpikeSensorBatch(..., device='cpu') for batches on the processor"
+
+
+def checked_device(device: str | torch.device, instead: str = ON_PROCESSOR) -> torch.device:
+    """A device to run on; raises InputError for CUDA where there is none, and says what to do instead, and for other
+    kinds."""
     try:
         chosen = torch.device(device)
     except (RuntimeError, TypeError):
@@ -60,7 +64,7 @@ def checked_device(device: str | torch.device) -> torch.device:
     if chosen.type == "cuda" and (chosen.index or 0) >= torch.cuda.device_count():
         raise InputError(
             f"device = {str(device)!r}, but torch {torch.__version__} sees {torch.cuda.device_count()} CUDA devices; "
-            "use engine='fast', or SpikeSensorBatch(..., device='cpu') for batches on the processor"
+            f"{instead}"
         )
     return chosen
 
