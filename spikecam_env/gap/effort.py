@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 CAMPAIGNS = 60.0
 """Default: so many times the campaign's recordings, with the twins that tell its noise (about 15)."""
 
-NEEDED = 1.5
+NEEDED = 1.3
 """Times as much may be spent before what a verdict can hardly do without is not begun either."""
 
 

@@ -34,7 +34,7 @@ from spikecam_env.gap.compare import (
 from spikecam_env.gap.confirm import confirmed, made_sure, of_any_dark, rejoined, resettled
 from spikecam_env.gap.fit import Fit, concerned, fit, twins_of
 from spikecam_env.gap.opposed import PAIR, opposed
-from spikecam_env.gap.polish import Errors, no_surer, polished
+from spikecam_env.gap.polish import Errors, no_surer, polished, simulated_for
 from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.screen import Screened, screen
@@ -57,6 +57,10 @@ MOST = 3
 
 ANOTHER = {1: "a second effect", 2: "a third effect"}
 """What is looked for beside so many."""
+
+BESIDE = 16
+"""Times the campaign that another effect takes at least: its fits, twins that confirm it, and its place beside those
+before it."""
 
 ALIKE = 0.8
 """Share of what the best removes, that it has to remove with another of its shapes for the other end of a valley."""
@@ -127,7 +131,8 @@ def search(
         by_fit = alarmed(null, rho, prediction) if rounds else rings(null, seen)
         if rounds and not (by_fit or alarmed(null, residual(null, values, prediction), prediction)):
             break
-        if rounds and not case.effort.allows(ANOTHER[len(rounds)], needed=len(rounds) == 1):
+        price = BESIDE * len(case.conditions)
+        if rounds and not case.effort.allows(ANOTHER[len(rounds)], price, needed=len(rounds) == 1):
             break
         if not by_fit:
             case = lent(case)
@@ -282,7 +287,8 @@ def other_ends(
         new = [s for s in starts if s not in tries]
         fits = {**tries, **dict(zip(new, pool.map(partial(fit_from, case, model, null, seen), new), strict=True))}
     alike = [fits[s] for s in starts if before - fits[s].misfit > ALIKE * (before - best.misfit)]
-    return [shaped(case, model, null, seen, f) for f in sorted(alike, key=lambda f: f.misfit)[:1]]
+    worth = [f for f in sorted(alike, key=lambda f: f.misfit)[:1] if may_be_shaped(case, null, seen, f)]
+    return [shaped(case, model, null, seen, f) for f in worth]
 
 
 def recordings_of(case: Case, null: Null, seen: Array, found: Fit) -> int:
@@ -313,7 +319,9 @@ def joined(
     alone = not before or is_another_bend(last, best)
     little = alone and is_little(last, best.misfit, chance, bool(before))
     stands_in = little and alarmed(null, best.rho, best.prediction)
-    if stands_in or not case.effort.allows("finer strengths", needed=True):
+    only, count = simulated_for(case, null, seen, best, names)
+    price = len(only) * count * (1 + len(names))
+    if stands_in or not case.effort.allows("finer strengths", price, needed=True):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
     best = made_sure(case, model, null, seen, values, best)

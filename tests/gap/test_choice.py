@@ -365,7 +365,7 @@ def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, 
     n, effect, values, _ = campaign()
     found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
     faded = replace(found, prediction=n.prediction, misfit=judged(n, values, n.prediction)[1])
-    case = SimpleNamespace(base=unit(), to_fit=lambda keys: np.ones(len(keys), bool), effort=Effort())
+    case = SimpleNamespace(base=unit(), to_fit=lambda keys: np.ones(len(keys), bool), effort=Effort(), conditions=())
 
     def polished(*given):
         *before, last = given[5]
@@ -376,3 +376,28 @@ def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, 
     monkeypatch.setattr(search, "cancelling", lambda *_: [])
     rounds = search.search(case, MODEL, n, values, [], None)
     assert rounds[-1].model is (found.model if keeps else MODEL)
+
+
+@pytest.mark.parametrize("spent, begun", [(43, True), (44, False)])
+def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int, begun: bool, monkeypatch):
+    """Of sixty recordings, and three tenths more, it takes two campaigns of BESIDE."""
+    n, effect, values, _ = campaign()
+    found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
+    case = SimpleNamespace(
+        base=unit(), to_fit=lambda keys: np.ones(len(keys), bool), effort=Effort(60), conditions=(None, None)
+    )
+    asked = []
+
+    def compared(*given):
+        asked.append(given[-1])
+        case.effort.spent.append(spent)
+        return replace(given[-1], fits=(found,) if len(asked) == 1 else ())
+
+    monkeypatch.setattr(search, "compared", compared)
+    monkeypatch.setattr(search, "joined", lambda *given: given[5])
+    monkeypatch.setattr(search, "cancelling", lambda *_: [])
+    monkeypatch.setattr(search, "alarmed", lambda *_: True)
+    monkeypatch.setattr(search, "is_little", lambda *_: False)
+    monkeypatch.setattr(search, "BESIDE", 17)
+    search.search(case, MODEL, n, values, [], None)
+    assert len(asked) == 1 + begun and case.effort.left_out == ([] if begun else ["a second effect"])

@@ -40,7 +40,7 @@ def test_what_takes_more_than_is_left_is_not_begun():
 
 def test_what_a_verdict_can_hardly_do_without_may_take_more():
     effort = Effort(20, [13])
-    assert effort.allows("a second effect", 16, needed=True) and not effort.allows("a second effect", 17, needed=True)
+    assert effort.allows("a second effect", 12, needed=True) and not effort.allows("a second effect", 13, needed=True)
 
 
 def test_a_verdict_that_is_settled_can_do_without_all():
@@ -89,11 +89,11 @@ def test_runners_up_are_not_tried_anew_when_enough_was_simulated():
     assert case.effort.left_out == ["others in place of blooming"]
 
 
-def test_a_shape_is_fitted_up_to_half_as_much_again(monkeypatch):
-    """Of two parameters, three predictions of five recordings, of twenty and half as much."""
+def test_a_shape_is_fitted_up_to_three_tenths_more(monkeypatch):
+    """Of two parameters, three predictions of five recordings, of twenty and three tenths more."""
     monkeypatch.setattr(searching, "recordings_of", lambda *_: 5)
     lag = SimpleNamespace(name="photodiode_lag")
-    spent, more = (SimpleNamespace(effort=Effort(20, [n])) for n in (14, 15))
+    spent, more = (SimpleNamespace(effort=Effort(20, [n])) for n in (10, 11))
     assert may_be_shaped(spent, None, None, lag) and not may_be_shaped(more, None, None, lag)
     assert more.effort.left_out == ["photodiode_lag of finer shape"]
 
@@ -105,9 +105,11 @@ class Found:
     fits: tuple[SimpleNamespace, ...]
 
 
-@pytest.mark.parametrize("spent, settled", [(30, False), (20, True)])
+@pytest.mark.parametrize("spent, settled", [(16, False), (10, True)])
 def test_what_was_found_stays_as_it_was_fitted_when_no_effort_is_left(spent: int, settled: bool, monkeypatch):
+    """Two predictions of five recordings are the least that it takes."""
     monkeypatch.setattr(searching, "is_little", lambda *_: False)
+    monkeypatch.setattr(searching, "simulated_for", lambda *_: (list(range(5)), 1))
     model = SimpleNamespace(effects=(SimpleNamespace(name="blooming"),))
     best = SimpleNamespace(name="blooming", model=model, misfit=10.0)
     case = SimpleNamespace(effort=Effort(20, [spent], settled=settled))

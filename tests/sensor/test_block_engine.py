@@ -18,7 +18,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, decay
 from spikecam_env.sensor.agreement import compare, observe
 from spikecam_env.sensor.effects.base import Array, Charge, Exposure, Spikes, parameter
-from spikecam_env.sensor.kernels import block, draws, loop
+from spikecam_env.sensor.kernels import block, block_loop, draws, loop
 from spikecam_env.sensor.kernels.field import octave_field, white_field, words
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
@@ -104,6 +104,28 @@ def test_rows_wider_than_a_band_and_bands_of_rows_have_the_bits_of_the_reference
     for threads in (1, 2):
         sensor = SpikeSensor(model, shape, 1, "fast", threads=threads)
         np.testing.assert_array_equal(np.concatenate([sensor.step(light, 37), sensor.step(light, 23)]), expected)
+
+
+@pytest.mark.parametrize("shape", [(2, 2500), (33, 50)])
+@pytest.mark.parametrize("name", ["incomplete_reset", "dead_time", "random_telegraph_noise", "synchronous_reset"])
+@pytest.mark.parametrize("preset", ["ideal", "scsim"])
+def test_from_spike_to_spike_has_the_bits_of_frame_by_frame(preset: str, name: str, shape: tuple[int, int]) -> None:
+    """Under steady light, in most of it few spikes: all frames at once, three at a time, and one by one; then the dark,
+    in which pixels that got several thresholds a frame are to be as far as they were."""
+    model = with_effects(preset, CATALOGUE[name](**MODERATE.get(name, {})))
+    rng = np.random.default_rng(0)
+    light = (0.6 * rng.random(shape) ** 3).astype(np.float32)
+    light.flat[rng.integers(0, light.size, 20)] = [0.0, 3.3] * 10
+    assert light.mean() < block_loop.SPARSE
+    spikes = [
+        np.concatenate([*(sensor.step(light, n) for n in calls), sensor.step(0 * light, 9)])
+        for calls in ([300], [3] * 100, [1] * 300, [250, 50])
+        for sensor in [SpikeSensor(model, shape, 1, "fast", threads=1)]
+    ]
+    for other in spikes[1:]:
+        np.testing.assert_array_equal(other, spikes[0])
+    if preset == "ideal" and name != "random_telegraph_noise":
+        np.testing.assert_array_equal(SpikeSensor(model, shape, 1, "reference").step(light, 300), spikes[0][:300])
 
 
 @dataclass(frozen=True)
@@ -245,8 +267,6 @@ def test_octave_field_keeps_unit_variance_and_its_correlation() -> None:
 
 def test_the_kernel_names_the_decay_that_it_is_compiled_with() -> None:
     now = zlib.crc32(inspect.getsource(decay).encode())
-    from spikecam_env.sensor.kernels import block_loop
-
     assert now == block_loop.DECAY, f"the decay has changed: write DECAY = {now:#x} in {block_loop.__file__}"
 
 
@@ -255,7 +275,7 @@ def test_kernels_name_the_draws_that_they_are_compiled_with() -> None:
     of_draws = (loop.scramble, loop.first_key, loop.second_key, loop.byte_sum, loop.bell, loop.bell_of, draws.standard)
     source = "".join(inspect.getsource(function.py_func) for function in of_draws)
     now = zlib.crc32(source.encode())
-    from spikecam_env.sensor.kernels import block_loop, field
+    from spikecam_env.sensor.kernels import field
 
     for kernel in (block_loop, field):
         assert now == kernel.DRAWS, f"the draws have changed: write DRAWS = {now:#x} in {kernel.__file__}"

@@ -7,6 +7,9 @@
 The same operations in the same order, in float64, so that without noise the bits are the reference's.  With noise the
 electrons still to come are drawn once a spike, as in the jump kernel (`fast`).  No fastmath.
 
+Where nothing moves from frame to frame, or only what single pixels get, a pixel goes from spike to spike instead
+(`jump`).  Charge is held on a grid (`on_grid`) on which sums are exact: so many frames at once are so many one by one.
+
 A line is a row of pixels, or a piece of one that is wider than a band.  Where any of a group of pixels fires, what
 follows a spike is worked out for all of them, and kept for those that did: vector instructions for sixteen cost less
 than to gather, one by one, the few that fired.
@@ -29,6 +32,10 @@ BAND = 1024
 GROUP = 16
 """Pixels that are worked out together where one of them fires (LLVM would make no vector instructions of fewer)."""
 
+WORTH, SPARSE = 4, 0.5
+"""Frames of a block from which on, and spikes a pixel and frame up to which, going from spike to spike is faster than
+going from frame to frame."""
+
 DRAWS, DECAY = 0x3BD9BCE3, 0xFDEE1FA
 """Checksums of the draws and of the decay compiled in: numba's cache sees a change of this file, not of those it
 imports from."""
@@ -40,12 +47,17 @@ _Q = np.uint64
 _G = float(GRAINS)
 
 # Rows of a band's scratch: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
-_HELD, _LIMIT, _PHI, _ARRIVES, _STANDS, _MOVED, _FACTOR, _LOAD, _NOISE, _JITTER, _ELECTRONS, _CROSSED = (
-    row * BAND for row in range(12)
+_HELD, _LIMIT, _PHI, _ARRIVES, _STANDS, _MOVED, _FACTOR, _LOAD, _NOISE, _JITTER, _ELECTRONS, _CROSSED, _AT, _UNTIL = (
+    row * BAND for row in range(14)
 )
-_PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _DUE, _AWAKE = ((24 + row) * BAND for row in range(7))  # of 32 bits
-_HIT = 8 * 16 * BAND  # of 8 bits
-_SCRATCH = 17 * BAND
+_PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _DUE, _AWAKE, _AGAIN, _EXTRA = (
+    (28 + row) * BAND for row in range(9)
+)  # of 32 bits
+_HIT = 8 * 19 * BAND  # of 8 bits
+_SCRATCH = 20 * BAND
+_ROUNDS = 1.5 * 2.0**32  # added to a number below 2^31 and taken off again, it rounds to 2^-20
+_NONE = 0xFFFFFFFF
+_LEAST = 1e-30  # what arrives where nothing does, to divide by
 _INSIDE = BAND - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
 
 
@@ -109,6 +121,8 @@ def advance(  # type: ignore[no-untyped-def]
     light_moves, dark_moves, field_moves = light.shape[0] > 1, dark.shape[0] > 1, field.shape[0] > 1
     moves = light_moves or dark_moves or field_moves or droop != 0.0
     moves = moves or differ(light_factor) or differ(dark_factor) or differ(factor) or differ(common)
+    alone = not moves and kick == 0.0 and frames >= WORTH
+    jumps = False
     pieces = (columns + BAND - 1) // BAND
     pitch = (min(columns, BAND) + 7) // 8 * 8
     lines = BAND // pitch
@@ -183,8 +197,25 @@ def advance(  # type: ignore[no-untyped-def]
                         continue
                     p, r = few[i], few_row[i]
                     at_light, at_dark = lights[p] * light_factor[t, r], (darks[p] + extra[t, i]) * dark_factor[t, r]
-                    x[_ARRIVES + place[i]] = (max(at_light, 0.0) + max(at_dark, 0.0)) * _G
+                    x[_ARRIVES + place[i]] = on_grid((max(at_light, 0.0) + max(at_dark, 0.0)) * _G)
                 used = (end - begin) * pitch
+                jumps = alone and t == 0 and x[_ARRIVES : _ARRIVES + used].sum() < SPARSE * _G * used
+                if jumps:
+                    groups = (used + GROUP - 1) // GROUP
+                    for g in range(groups):
+                        live[g] = g * GROUP
+                    x[_LIMIT + used : _LIMIT + groups * GROUP] = np.inf
+                    for line in range(begin, end):
+                        p0, n, h0 = pixel_of[line], width_of[line], slot_of[line]
+                        x[_LIMIT + h0 + n : _LIMIT + h0 + pitch] = np.inf
+                        spikes[:, p0 : p0 + n] = 0
+                    words[_EXTRA : _EXTRA + BAND] = _NONE
+                    for i in range(few_of[b], few_of[b + 1]):
+                        words[_EXTRA + place[i]] = i
+                    of_few = lights[few], darks[few], light_factor[0, few_row], dark_factor[0, few_row], extra
+                    wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_high)
+                    jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_tau, spikes)
+                    break
                 collect(x[_HELD:], x[_ARRIVES:], x[_LIMIT:], used, hit)
                 groups = find_live(hit.view(np.uint64), (used + GROUP - 1) // GROUP, live)
                 wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_high)
@@ -194,6 +225,8 @@ def advance(  # type: ignore[no-untyped-def]
                 for line in range(begin, end):
                     p0, n, h0 = pixel_of[line], width_of[line], slot_of[line]
                     copy(hit[h0 : h0 + n], bits[p0 : p0 + n])
+            if jumps:
+                break
             if kick != 0.0:
                 for r in range(top, bottom):
                     count_neighbours(bits, r, columns, around)
@@ -216,6 +249,12 @@ def advance(  # type: ignore[no-untyped-def]
             copy(x[_PHI + h0 : _PHI + h0 + n], threshold[p0 : p0 + n])
             copy(x[_CROSSED + h0 : _CROSSED + h0 + n], crossing[p0 : p0 + n])
             copy(words[_FIRED + h0 : _FIRED + h0 + n], fired[p0 : p0 + n])
+
+
+@njit(inline="always")
+def on_grid(charge):  # type: ignore[no-untyped-def]
+    """Charge [grains] to 2^-20 of a grain: below 256 thresholds, sums and multiples of such are exact."""
+    return (charge + _ROUNDS) - _ROUNDS
 
 
 @njit(inline="always")
@@ -242,7 +281,7 @@ def copy(values, out):  # type: ignore[no-untyped-def]
 def arrive(light, dark, light_factor, dark_factor, out):  # type: ignore[no-untyped-def]
     """Charge of a row in one frame [grains]."""
     for j in range(out.size):
-        out[j] = (max(light[j] * light_factor, 0.0) + max(dark[j] * dark_factor, 0.0)) * _G
+        out[j] = on_grid((max(light[j] * light_factor, 0.0) + max(dark[j] * dark_factor, 0.0)) * _G)
 
 
 @njit(inline="always")
@@ -305,7 +344,7 @@ def fire(x, words, hit, live, groups, reset, polynomial):  # type: ignore[no-unt
         for j in range(q, q + GROUP):
             floats[_DRAW + j] = drawn(words[_FIRST + j], words[_SECOND + j], words[_FIRED + j], polynomial)
         for j in range(q, q + GROUP):
-            over, electrons = x[_HELD + j] - x[_LIMIT + j], x[_STANDS + j] * (1.0 / _G)
+            over, electrons = on_grid(x[_HELD + j] - x[_LIMIT + j]), x[_STANDS + j] * (1.0 / _G)
             if not whole:
                 over, electrons = after_reset(over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept)
             phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
@@ -341,7 +380,7 @@ def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-un
             words[_FIRED + j] = _U(words[_FIRED + j] + words[_DUE + j])
         again = 0
         for j in range(q, q + GROUP):
-            over, electrons = x[_HELD + j] - x[_LIMIT + j], x[_STANDS + j] * (1.0 / _G)
+            over, electrons = on_grid(x[_HELD + j] - x[_LIMIT + j]), x[_STANDS + j] * (1.0 / _G)
             if not whole:
                 over, electrons = after_reset(over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept)
             phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
@@ -371,9 +410,111 @@ def stay(x, hit, live, groups, end, left, left_tau):  # type: ignore[no-untyped-
             limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
             fires = hit[j] != 0
             x[_CROSSED + j] = crossed if fires else x[_CROSSED + j]
-            x[_HELD + j] = (held - stays) * _G if fires else x[_HELD + j]
+            x[_HELD + j] = on_grid((held - stays) * _G) if fires else x[_HELD + j]
             x[_PHI + j] = phi if fires else x[_PHI + j]
             x[_LIMIT + j] = limit if fires else x[_LIMIT + j]
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_tau, spikes):  # type: ignore[no-untyped-def]
+    """All frames of a band in which every pixel goes its own way: from what happens to it to what happens next, that it
+    fires or gets something else.  spikes: (F, P), set where a pixel fires.
+
+    of_few: light, dark, their factors (n,) and what comes besides (F, n) of the pixels whose number is in row EXTRA.
+    The law is that of `fire` and `stay`, written out as in `fire_again`.
+    """
+    per_root_rate, per_rate, kept = reset
+    whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
+    floats = words.view(np.float32)
+    frames = spikes.shape[0]
+    for j in range(groups * GROUP):
+        x[_AT + j], x[_UNTIL + j], words[_AGAIN + j] = 0.0, frames, 0
+    for j in range(groups * GROUP):
+        if words[_EXTRA + j] != _NONE:
+            x[_UNTIL + j] = stays_until(of_few[4], words[_EXTRA + j], 0)
+    while groups:
+        for g in range(groups):
+            q = live[g] & _INSIDE
+            for j in range(q, q + GROUP):
+                held, gets, limit = x[_HELD + j], x[_ARRIVES + j], x[_LIMIT + j]
+                n = np.floor(max(min((limit - held) / max(gets, _LEAST), frames + 1.0), 0.0))
+                n = n + 1.0 if held + n * gets < limit else n
+                n = 0.0 if words[_AGAIN + j] != 0 else max(n, 1.0)
+                rest = x[_UNTIL + j] - x[_AT + j]
+                words[_DUE + j] = n <= rest
+                n = min(n, rest)
+                x[_AT + j] += n
+                x[_HELD + j] = held + n * gets
+        groups = note(x, words, live, groups, of_few, spikes)
+        for g in range(groups):
+            q = live[g] & _INSIDE
+            for j in range(q, q + GROUP):
+                floats[_DRAW + j] = drawn(words[_FIRST + j], words[_SECOND + j], words[_FIRED + j], polynomial)
+                words[_FIRED + j] = _U(words[_FIRED + j] + words[_DUE + j])
+        for g in range(groups):
+            q = live[g] & _INSIDE
+            for j in range(q, q + GROUP):
+                over, electrons = on_grid(x[_HELD + j] - x[_LIMIT + j]), x[_STANDS + j] * (1.0 / _G)
+                if not whole:
+                    over, electrons = after_reset(
+                        over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept
+                    )
+                phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
+                limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+                due = words[_DUE + j] != 0
+                x[_ELECTRONS + j] = electrons
+                x[_HELD + j] = over if due else x[_HELD + j]
+                x[_PHI + j] = phi if due else x[_PHI + j]
+                x[_LIMIT + j] = limit if due else x[_LIMIT + j]
+                words[_AGAIN + j] = due & (over >= limit)
+        if left != 0.0:
+            for g in range(groups):
+                q = live[g] & _INSIDE
+                for j in range(q, q + GROUP):
+                    held, rate = x[_HELD + j] / _G, x[_ARRIVES + j] / _G
+                    crossed = number + x[_AT + j] - min(max(held / max(rate, 1e-12), 0.0), 1.0)
+                    stays = left * (decay(min((crossed - x[_CROSSED + j]) / left_tau, LONG)) - 1.0)
+                    phi = needed(x[_ELECTRONS + j] + stays, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
+                    limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+                    due = words[_DUE + j] > words[_AGAIN + j]
+                    x[_CROSSED + j] = crossed if due else x[_CROSSED + j]
+                    x[_HELD + j] = on_grid((held - stays) * _G) if due else x[_HELD + j]
+                    x[_PHI + j] = phi if due else x[_PHI + j]
+                    x[_LIMIT + j] = limit if due else x[_LIMIT + j]
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def note(x, words, live, groups, of_few, spikes):  # type: ignore[no-untyped-def]
+    """What happened to the pixels of live groups: a spike where they are due, else another charge from here on.  Lists
+    the groups in which something may happen yet, and returns their number."""
+    light, dark, light_factor, dark_factor, extra = of_few
+    still = 0
+    for g in range(groups):
+        q = live[g] & _INSIDE
+        goes_on = False
+        for j in range(q, q + GROUP):
+            at = np.int64(x[_AT + j])
+            if words[_DUE + j] != 0:
+                spikes[at - 1, words[_PIXEL + j]] = 1
+                goes_on = True
+            elif at < spikes.shape[0]:
+                i = words[_EXTRA + j]
+                at_light, at_dark = light[i] * light_factor[i], (dark[i] + extra[at, i]) * dark_factor[i]
+                x[_ARRIVES + j] = on_grid((max(at_light, 0.0) + max(at_dark, 0.0)) * _G)
+                x[_UNTIL + j] = stays_until(extra, i, at)
+                goes_on = True
+        live[still] = q
+        still += goes_on
+    return still
+
+
+@njit(inline="always")
+def stays_until(extra, i, at):  # type: ignore[no-untyped-def]
+    """The frame in which what comes besides (F, n) to one of few is no longer what it is in frame `at`; F if none."""
+    until = at + 1
+    while until < extra.shape[0] and extra[until, i] == extra[at, i]:
+        until += 1
+    return until
 
 
 @njit(inline="always")
@@ -391,7 +532,7 @@ def after_reset(over, rate, limit, per_root_rate, per_rate, kept):  # type: igno
     root, over = math.sqrt(rate), over / _G
     left = ((over - root * per_root_rate) - rate * per_rate) * kept
     lost = kept * (root * per_root_rate + rate * per_rate)
-    return left * _G, limit * (1.0 / _G) + lost - kept * (1.0 - kept) * over
+    return on_grid(left * _G), limit * (1.0 / _G) + lost - kept * (1.0 - kept) * over
 
 
 @njit(inline="always")
