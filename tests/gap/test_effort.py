@@ -105,14 +105,14 @@ class Found:
     fits: tuple[SimpleNamespace, ...]
 
 
-@pytest.mark.parametrize("spent, settled", [(16, False), (10, True)])
+@pytest.mark.parametrize("spent, settled", [(48, False), (30, True)])
 def test_what_was_found_stays_as_it_was_fitted_when_no_effort_is_left(spent: int, settled: bool, monkeypatch):
-    """Two predictions of five recordings are the least that it takes."""
+    """Two predictions of five recordings and four twins more are the least that it takes."""
     monkeypatch.setattr(searching, "is_little", lambda *_: False)
     monkeypatch.setattr(searching, "simulated_for", lambda *_: (list(range(5)), 1))
     model = SimpleNamespace(effects=(SimpleNamespace(name="blooming"),))
     best = SimpleNamespace(name="blooming", model=model, misfit=10.0)
-    case = SimpleNamespace(effort=Effort(20, [spent], settled=settled))
+    case = SimpleNamespace(effort=Effort(60, [spent], settled=settled))
     assert joined(case, None, None, None, None, [Found((best,))], 0.0) == [Found((best,))]
     assert case.effort.left_out == ["finer strengths"]
 
