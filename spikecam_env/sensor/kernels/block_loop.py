@@ -197,7 +197,7 @@ def advance(  # type: ignore[no-untyped-def]
                         continue
                     p, r = few[i], few_row[i]
                     at_light, at_dark = lights[p] * light_factor[t, r], (darks[p] + extra[t, i]) * dark_factor[t, r]
-                    x[_ARRIVES + place[i]] = on_grid((max(at_light, 0.0) + max(at_dark, 0.0)) * _G)
+                    x[_ARRIVES + place[i]] = gets(at_light, at_dark)
                 used = (end - begin) * pitch
                 jumps = alone and t == 0 and x[_ARRIVES : _ARRIVES + used].sum() < SPARSE * _G * used
                 if jumps:
@@ -258,6 +258,12 @@ def on_grid(charge):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
+def gets(light, dark):  # type: ignore[no-untyped-def]
+    """Charge [grains] of a pixel in one frame, of light and dark [thresholds], neither of which takes any away."""
+    return on_grid((max(light, 0.0) + max(dark, 0.0)) * _G)
+
+
+@njit(inline="always")
 def differ(values):  # type: ignore[no-untyped-def]
     """Whether any frame's differ from the first's."""
     return bool((values != values[0]).any())
@@ -281,7 +287,7 @@ def copy(values, out):  # type: ignore[no-untyped-def]
 def arrive(light, dark, light_factor, dark_factor, out):  # type: ignore[no-untyped-def]
     """Charge of a row in one frame [grains]."""
     for j in range(out.size):
-        out[j] = on_grid((max(light[j] * light_factor, 0.0) + max(dark[j] * dark_factor, 0.0)) * _G)
+        out[j] = gets(light[j] * light_factor, dark[j] * dark_factor)
 
 
 @njit(inline="always")
@@ -436,15 +442,15 @@ def jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_t
         for g in range(groups):
             q = live[g] & _INSIDE
             for j in range(q, q + GROUP):
-                held, gets, limit = x[_HELD + j], x[_ARRIVES + j], x[_LIMIT + j]
-                n = np.floor(max(min((limit - held) / max(gets, _LEAST), frames + 1.0), 0.0))
-                n = n + 1.0 if held + n * gets < limit else n
+                held, more, limit = x[_HELD + j], x[_ARRIVES + j], x[_LIMIT + j]
+                n = np.floor(max(min((limit - held) / max(more, _LEAST), frames + 1.0), 0.0))
+                n = n + 1.0 if held + n * more < limit else n
                 n = 0.0 if words[_AGAIN + j] != 0 else max(n, 1.0)
                 rest = x[_UNTIL + j] - x[_AT + j]
                 words[_DUE + j] = n <= rest
                 n = min(n, rest)
                 x[_AT + j] += n
-                x[_HELD + j] = held + n * gets
+                x[_HELD + j] = held + n * more
         groups = note(x, words, live, groups, of_few, spikes)
         for g in range(groups):
             q = live[g] & _INSIDE
@@ -500,7 +506,7 @@ def note(x, words, live, groups, of_few, spikes):  # type: ignore[no-untyped-def
             elif at < spikes.shape[0]:
                 i = words[_EXTRA + j]
                 at_light, at_dark = light[i] * light_factor[i], (dark[i] + extra[at, i]) * dark_factor[i]
-                x[_ARRIVES + j] = on_grid((max(at_light, 0.0) + max(at_dark, 0.0)) * _G)
+                x[_ARRIVES + j] = gets(at_light, at_dark)
                 x[_UNTIL + j] = stays_until(extra, i, at)
                 goes_on = True
         live[still] = q
