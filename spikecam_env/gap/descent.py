@@ -44,6 +44,9 @@ LONGEST = 0.7
 WORSE = 3.0
 """Misfit by which a step may seem worse, by chance of the draws."""
 
+PROBED = 2
+"""Times that a model is probed: under the unit there was, and under the one that it then shows."""
+
 WHITE = ("the unit", "white")
 """The unit's own s^2, among parameters by effect and name, where an effect hides it."""
 

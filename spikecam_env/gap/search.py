@@ -32,6 +32,7 @@ from spikecam_env.gap.compare import (
     residual,
 )
 from spikecam_env.gap.confirm import FINAL, confirmed, made_sure, of_any_dark, rejoined, resettled
+from spikecam_env.gap.descent import PROBED
 from spikecam_env.gap.fit import Fit, concerned, fit, twins_of
 from spikecam_env.gap.opposed import PAIR, opposed
 from spikecam_env.gap.polish import Errors, no_surer, polished, simulated_for
@@ -320,7 +321,7 @@ def joined(
     little = alone and is_little(last, best.misfit, chance, bool(before))
     stands_in = little and alarmed(null, best.rho, best.prediction)
     only, count = simulated_for(case, null, seen, best, names)
-    price = len(only) * (count * (1 + len(names)) + FINAL)
+    price = len(only) * (PROBED * count * (1 + len(names)) + FINAL)
     if stands_in or not case.effort.allows("finer strengths", price, needed=True):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     best, errors, lent = polished(case, model, null, seen, values, best, names)
