@@ -31,7 +31,7 @@ from spikecam_env.gap.compare import (
     own_variance,
     residual,
 )
-from spikecam_env.gap.confirm import FINAL, confirmed, made_sure, of_any_dark, rejoined, resettled
+from spikecam_env.gap.confirm import AGAIN, FINAL, confirmed, made_sure, of_any_dark, rejoined, resettled
 from spikecam_env.gap.descent import PROBED
 from spikecam_env.gap.fit import Fit, concerned, fit, twins_of
 from spikecam_env.gap.opposed import PAIR, opposed
@@ -196,6 +196,8 @@ def cancelling(
         return []
     if not alarmed(null, residual(null, values, last.prediction), last.prediction):
         return []
+    if not case.effort.allows("two bends that cancel", needed=True):
+        return []
     found = opposed(case, model, null, seen, names)
     if found is None or found.misfit > last.misfit:
         return []
@@ -306,11 +308,11 @@ def is_little(turn: Round, left: float, chance: float, later: bool) -> bool:
 def joined(
     case: Case, model: SensorModel, null: Null, seen: Array, values: Array, rounds: Sequence[Round], chance: float
 ) -> list[Round]:
-    """The rounds with the last one's best together with what was found before, and all of it polished, unless no effort
-    is left or it is a stand-in: the first, or one more bend, that has little to say and leaves something."""
+    """The rounds with the last one's best together with what was found before, and all of it polished, while effort is
+    left, unless it is a stand-in: the first, or one more bend, that has little to say and leaves something."""
     *before, last = rounds
     best = last.fits[0]
-    if before:
+    if before and may_be_rejoined(case, len(rounds)):
         earlier = {r.fits[0].name: r.fits[0].prediction.mean - r.prediction.mean for r in before}
         best = rejoined(case, model, null, seen, best, earlier)
         for i, turn in enumerate(before):
@@ -334,6 +336,12 @@ def joined(
                 rest = [f for f in last.fits if f.name != other.name]
                 last, errors = replace(last, fits=(tried, *rest), rivals=(), lent=all_told), known
     return [with_errors(r, errors) for r in (*before, last)]
+
+
+def may_be_rejoined(case: Case, count: int) -> bool:
+    """Whether effort is left for so many effects to be simulated together, and without each that came before."""
+    price = count * AGAIN * len(case.conditions)
+    return case.effort.allows("whether all that was found is needed", price, needed=True)
 
 
 def instead_of(turn: Round, names: Sequence[str]) -> list[Fit]:

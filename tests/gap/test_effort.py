@@ -12,7 +12,7 @@ from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.gap import polish
 from spikecam_env.gap import search as searching
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
-from spikecam_env.gap.search import joined, may_be_shaped, revisited
+from spikecam_env.gap.search import cancelling, joined, may_be_rejoined, may_be_shaped, revisited
 from spikecam_env.gap.words import unfinished
 
 
@@ -96,6 +96,27 @@ def test_a_shape_is_fitted_up_to_three_tenths_more(monkeypatch):
     spent, more = (SimpleNamespace(effort=Effort(20, [n])) for n in (10, 11))
     assert may_be_shaped(spent, None, None, lag) and not may_be_shaped(more, None, None, lag)
     assert more.effort.left_out == ["photodiode_lag of finer shape"]
+
+
+def test_two_effects_are_simulated_together_and_alone_while_effort_is_left():
+    """Two by two twins of five recordings, of forty and three tenths more."""
+    left, spent = (SimpleNamespace(effort=Effort(40, [n]), conditions=range(5)) for n in (31, 32))
+    assert may_be_rejoined(left, 2) and left.effort.left_out == []
+    assert not may_be_rejoined(spent, 2)
+    assert spent.effort.left_out == ["whether all that was found is needed"]
+
+
+@pytest.mark.parametrize("spent", [51, 52])
+def test_bends_that_cancel_are_looked_for_while_effort_is_left(spent: int, monkeypatch):
+    """Of forty recordings and three tenths more."""
+    asked = []
+    monkeypatch.setattr(searching, "alarmed", lambda *_: True)
+    monkeypatch.setattr(searching, "residual", lambda *_: None)
+    monkeypatch.setattr(searching, "opposed", lambda *_: asked.append("twins"))
+    case = SimpleNamespace(effort=Effort(40, [spent]))
+    turn = SimpleNamespace(fits=(SimpleNamespace(name="dead_time"),), prediction=None)
+    assert cancelling(case, None, None, None, None, (), [turn]) == []
+    assert (asked == ["twins"]) == (spent < 52) == (case.effort.left_out == [])
 
 
 @dataclass(frozen=True)
