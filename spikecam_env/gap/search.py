@@ -31,7 +31,7 @@ from spikecam_env.gap.compare import (
     own_variance,
     residual,
 )
-from spikecam_env.gap.confirm import AGAIN, FINAL, confirmed, made_sure, of_any_dark, rejoined, resettled
+from spikecam_env.gap.confirm import AGAIN, FINAL, confirmed, made_sure, of_any_dark, rejoined, rejudged, resettled
 from spikecam_env.gap.descent import PROBED
 from spikecam_env.gap.fit import Fit, concerned, fit, twins_of
 from spikecam_env.gap.opposed import PAIR, opposed
@@ -309,7 +309,10 @@ def joined(
     case: Case, model: SensorModel, null: Null, seen: Array, values: Array, rounds: Sequence[Round], chance: float
 ) -> list[Round]:
     """The rounds with the last one's best together with what was found before, and all of it polished, while effort is
-    left, unless it is a stand-in: the first, or one more bend, that has little to say and leaves something."""
+    left, unless it is a stand-in: the first, or one more bend, that has little to say and leaves something.
+
+    The last one's best was judged by the model that it was added to; all together are by the one given (null).
+    """
     *before, last = rounds
     best = last.fits[0]
     if before and may_be_rejoined(case, len(rounds)):
@@ -318,6 +321,8 @@ def joined(
         for i, turn in enumerate(before):
             if turn.fits[0].name in {e.name for e in best.model.effects}:
                 best, before[i] = revisited(case, model, null, seen, values, best, turn)
+    elif before:
+        best = rejudged(null, seen, best, best.prediction)
     names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
     alone = not before or is_another_bend(last, best)
     little = alone and is_little(last, best.misfit, chance, bool(before))

@@ -6,13 +6,17 @@ import math
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.gap import polish
 from spikecam_env.gap import search as searching
+from spikecam_env.gap.compare import Null, Prediction, judged
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
-from spikecam_env.gap.search import cancelling, joined, may_be_rejoined, may_be_shaped, revisited
+from spikecam_env.gap.fit import Fit
+from spikecam_env.gap.search import Round, cancelling, joined, may_be_rejoined, may_be_shaped, revisited
+from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.words import unfinished
 
 
@@ -136,6 +140,24 @@ def test_what_was_found_stays_as_it_was_fitted_when_no_effort_is_left(spent: int
     case = SimpleNamespace(effort=Effort(60, [spent], settled=settled))
     assert joined(case, None, None, None, None, [Found((best,))], 0.0) == [Found((best,))]
     assert case.effort.left_out == ["finer strengths"]
+
+
+def test_what_is_not_simulated_together_is_judged_by_the_model_given(monkeypatch):
+    """And not by the one with the first effect, whose noise is no price to the second."""
+    monkeypatch.setattr(searching, "simulated_for", lambda *_: ([0], 1))
+    keys = tuple(Key("g", "r", str(i)) for i in range(3))
+    null = Null(keys, np.zeros(3), np.ones(3), np.full(3, 0.1), 12, 11.0)
+    both = Prediction(np.ones(3), np.full(3, 0.3), np.full(3, 2.0), ())
+    model = SimpleNamespace(effects=(SimpleNamespace(name="lamp_drift"), SimpleNamespace(name="blooming")))
+    last = Fit("blooming", {}, {}, both, None, np.zeros(3), -10.0, model)
+    turn = Round(SimpleNamespace(effects=model.effects[:1]), None, null.prediction, np.zeros(3), 50.0, (last,))
+    first = Found((SimpleNamespace(name="lamp_drift"),))
+    seen = np.array([0.5, 1.0, 2.0])
+    case = SimpleNamespace(effort=Effort(0), conditions=range(5))
+    _, joint = joined(case, None, null, seen, seen, [first, turn], 0.0)
+    rho, misfit = judged(null, seen, both)
+    assert joint.fits[0].misfit == misfit > 0 and np.array_equal(joint.fits[0].rho, rho)
+    assert case.effort.left_out == ["whether all that was found is needed", "finer strengths"]
 
 
 def test_the_command_asks_for_what_the_function_does():
