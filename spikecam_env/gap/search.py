@@ -60,8 +60,8 @@ ANOTHER = {1: "a second effect", 2: "a third effect"}
 """What is looked for beside so many."""
 
 BESIDE = 16
-"""Times the campaign that another effect takes at least: its fits, twins that confirm it, and its place beside those
-before it."""
+"""Times the campaign that another effect takes, by and large: its fits, twins that confirm it, and its place beside
+those before it."""
 
 ALIKE = 0.8
 """Share of what the best removes, that it has to remove with another of its shapes for the other end of a valley."""
