@@ -1,0 +1,210 @@
+"""Files from outside, read in one place: JSON, TOML and arrays, checked against a declaration before anyone uses them.
+
+A format declares its entries once, as a `Declared` class with types and ranges; `declared` checks data against it.
+Whatever is wrong is an InputError that names the file, the entry, its value and what is allowed.
+
+    class Camera(Declared):
+        height: Count
+        frame_rate_hz: Positive
+
+    camera = declared(Camera, read_json(path)["camera"], f"{path}: camera")
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from spikecam_env.errors import InputError, unknown_name
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+MOST_TEXT_BYTES = 64 << 20
+"""Largest JSON or TOML file that is read; the largest this package writes take a few MB."""
+LARGEST_COUNT = 2**53
+"""Whole numbers beyond are not exact as float64, in which JSON tools hold them."""
+
+Count = Annotated[int, Field(ge=1, le=LARGEST_COUNT)]
+"""A whole number, 1 or more."""
+Whole = Annotated[int, Field(ge=0, le=LARGEST_COUNT)]
+"""A whole number, 0 or more."""
+Positive = Annotated[float, Field(gt=0)]
+"""A finite number above 0."""
+Name = Annotated[str, Field(min_length=1, max_length=255)]
+"""Text that is not empty."""
+
+
+class Declared(BaseModel):
+    """Entries of a file: no others are allowed, types are taken as they are, numbers are finite."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+D = TypeVar("D", bound=BaseModel)
+
+
+def declared(kind: type[D], data: Any, where: str) -> D:
+    """Data as an instance of a `Declared` class.
+
+    where: begins the error's text, e.g. a file's path.
+    Raises InputError that names the first entry that is missing, unknown, of another type or out of range.
+    """
+    try:
+        return kind.model_validate(data)
+    except ValidationError as error:
+        raise _as_input_error(error, kind, where) from error
+    except RecursionError as error:
+        raise InputError(f"{where}: nested too deeply") from error
+
+
+def read_json(path: str | Path) -> Any:
+    """The value in a JSON file.
+
+    Raises InputError where it is missing, too large, not UTF-8, not JSON, nested too deeply or has NaN or Infinity.
+    """
+    text = read_text(path)
+    try:
+        return json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is not JSON: {_short(error)}") from error
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """The table in a TOML file; raises InputError as `read_json` does."""
+    return parse_toml(read_text(path), str(path))
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """The table in a TOML text; raises InputError where it is not one."""
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{where} is not TOML: {_short(error)}") from error
+
+
+def read_text(path: str | Path) -> str:
+    """UTF-8 text; raises InputError where the file cannot be read, is larger than MOST_TEXT_BYTES or is not UTF-8."""
+    source = existing_file(path)
+    try:
+        size = source.stat().st_size
+        if size > MOST_TEXT_BYTES:
+            raise InputError(f"{source} has {size} bytes; text of at most {MOST_TEXT_BYTES} is read")
+        return source.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"cannot read {source}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{source} is not UTF-8 text: {_short(error)}") from error
+
+
+def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[str, NDArray[Any]]:
+    """Arrays of an `.npz` by name, all of them or those of `names`; Python objects are never unpickled.
+
+    Raises InputError where the file is missing, no `.npz`, damaged, lacks a name, holds Python objects, or declares
+    more data than it has.
+    """
+    source = existing_file(path)
+    try:
+        with zipfile.ZipFile(source) as archive:
+            held = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+            wanted = list(held) if names is None else list(names)
+            missing = [name for name in wanted if name not in held]
+            if missing:
+                raise InputError(f"{source} lacks {', '.join(missing)}; it holds {', '.join(held) or 'nothing'}")
+            return {name: _array(archive, held[name], source) for name in wanted}
+    except InputError:
+        raise
+    except MemoryError as error:
+        raise InputError(f"{source} does not fit in memory; read a part of it or give a smaller one") from error
+    except Exception as error:  # zlib, struct, tokenize, ...: the many ways in which a damaged archive fails
+        raise InputError(f"{source} is not a readable .npz of plain arrays ({_short(error)})") from error
+
+
+def number(arrays: Mapping[str, NDArray[Any]], name: str, where: str) -> float:
+    """A single finite number out of an array of any shape; raises InputError where it is none."""
+    value = arrays[name]
+    if value.size != 1 or value.dtype.kind not in "iuf" or not math.isfinite(value.item()):
+        raise InputError(f"{where}: {name} is {value.dtype} of shape {value.shape}; it must be one finite number")
+    return float(value.item())
+
+
+def numbers(array: NDArray[Any], name: str, where: str) -> NDArray[Any]:
+    """An array of real numbers as it is; raises InputError for text, dates, complex numbers or records."""
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"{where}: {name} is {array.dtype}; it must be real numbers")
+    return array
+
+
+def existing_file(path: str | Path) -> Path:
+    """The path; raises InputError where it is no file."""
+    source = Path(path)
+    try:
+        if source.is_file():
+            return source
+        found = "a folder" if source.is_dir() else ""
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot read {str(source)[:200]!r}: {_short(error)}") from error
+    raise InputError(f"{source} is {found}, not a file" if found else f"there is no file {source}")
+
+
+def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, source: Path) -> NDArray[Any]:
+    with archive.open(info) as member:
+        version = np.lib.format.read_magic(member)
+        read_header = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }.get(version)
+        if read_header is None:
+            raise InputError(f"{source}: {info.filename} is an .npy of version {version}; save it again")
+        shape, _, dtype = read_header(member)
+        if dtype.hasobject:
+            raise InputError(f"{source}: {info.filename} holds Python objects; save plain arrays")
+        declared_bytes = math.prod(shape) * dtype.itemsize
+        if min(shape, default=0) < 0 or declared_bytes > info.file_size:
+            raise InputError(
+                f"{source}: {info.filename} declares {dtype} of shape {shape}; it has {info.file_size} bytes"
+            )
+    with archive.open(info) as member:
+        return np.lib.format.read_array(member, allow_pickle=False)  # type: ignore[no-any-return]
+
+
+def _no_constant(name: str) -> Any:
+    raise ValueError(f"{name} is no JSON number")
+
+
+def _as_input_error(error: ValidationError, kind: type[BaseModel], where: str) -> InputError:
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"])
+    value = _shown(first["input"])
+    if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
+        return unknown_name(f"entry of {where}", first["loc"][0], kind.model_fields)
+    if first["type"] == "missing":
+        return InputError(f"{where}: {place} is missing")
+    if first["type"] == "value_error":
+        return InputError(f"{where}: {place or 'it'} = {value}: {first['ctx']['error']}")
+    message = first["msg"].removeprefix("Input should ")
+    return InputError(f"{where}: {place or 'it'} = {value}; it should {message}")
+
+
+def _shown(value: Any) -> str:
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
+        return f"a {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _short(error: BaseException) -> str:
+    text = (str(error).splitlines() or [""])[0] or type(error).__name__
+    return text if len(text) <= 160 else f"{text[:157]}..."
