@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: install install-dev demo test lint clean
+.PHONY: install install-dev demo test test-oldest lint clean
 
 install: $(VENV)/.installed
 install-dev: $(VENV)/.installed-dev
@@ -24,6 +24,19 @@ demo: install
 test: install-dev
 	$(BIN)/python -m pytest
 
+# The oldest releases that pyproject.toml allows (constraints-oldest.txt), in an environment of their own; numba's
+# compiled code of one release is no use to another, so it goes to a folder of its own too.
+OLDEST := $(VENV)-oldest
+OLDEST_TESTS := tests/test_requirements.py tests/test_untrusted.py tests/streams tests/scenes tests/cli tests/envs
+
+$(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
+	$(PYTHON) -m venv $(OLDEST)
+	$(OLDEST)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --editable . pytest hypothesis
+	touch $@
+
+test-oldest: $(OLDEST)/.installed
+	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning $(OLDEST_TESTS)
+
 lint: install-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -31,4 +44,4 @@ lint: install-dev
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf $(VENV) build *.egg-info
+	rm -rf $(VENV) $(VENV)-oldest build *.egg-info
