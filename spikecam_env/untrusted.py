@@ -1,4 +1,4 @@
-"""Files from outside, read in one place: JSON, TOML and arrays, checked against a declaration before anyone uses them.
+"""Files from outside, read in one place: JSON, TOML, arrays and HDF5, checked before anyone uses them.
 
 A format declares its entries once, as a `Declared` class with types and ranges; `declared` checks data against it.
 Whatever is wrong is an InputError that names the file, the entry, its value and what is allowed.
@@ -20,10 +20,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory
 from spikecam_env.errors import InputError, unknown_name
 
 if sys.version_info >= (3, 11):
@@ -33,13 +35,15 @@ else:
 
 MOST_TEXT_BYTES = 64 << 20
 """Largest JSON or TOML file that is read; the largest this package writes take a few MB."""
-LARGEST_COUNT = 2**53
-"""Whole numbers beyond are not exact as float64, in which JSON tools hold them."""
 
 Count = Annotated[int, Field(ge=1, le=LARGEST_COUNT)]
 """A whole number, 1 or more."""
 Whole = Annotated[int, Field(ge=0, le=LARGEST_COUNT)]
 """A whole number, 0 or more."""
+Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+"""A seed of random numbers."""
+Side = Annotated[int, Field(ge=1, le=MOST_PIXELS)]
+"""Rows or columns of a picture."""
 Positive = Annotated[float, Field(gt=0)]
 """A finite number above 0."""
 Name = Annotated[str, Field(min_length=1, max_length=255)]
@@ -131,6 +135,67 @@ def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[st
         raise InputError(f"{source} is not a readable .npz of plain arrays ({_short(error)})") from error
 
 
+def open_hdf5(path: str | Path) -> h5py.File:
+    """An HDF5 file, open for reading; raises InputError where it is missing, truncated or none."""
+    source = existing_file(path)
+    try:
+        return h5py.File(source, "r")
+    except (OSError, RuntimeError, ValueError) as error:
+        raise InputError(f"{source} is truncated or not an HDF5 file ({_short(error)})") from error
+
+
+def hdf5_attributes(item: h5py.HLObject, where: str) -> dict[str, Any]:
+    """Attributes by name: scalars as Python's own, text as str, anything else as h5py has it, for `declared` to refuse.
+
+    Raises InputError for an attribute that cannot be read.
+    """
+    try:
+        return {str(name): _plain(item.attrs[name]) for name in item.attrs}
+    except Exception as error:  # h5py has no words for many types
+        raise InputError(f"{where}: its attributes cannot be read ({_short(error)})") from error
+
+
+def hdf5_item(group: h5py.Group, path: str, where: str, *, outside: bool = False) -> h5py.Group | h5py.Dataset:
+    """What is at a path in a file, e.g. "truth/frame".
+
+    outside: follow links, external storage and virtual data, which may lie in other files.
+    Raises InputError where there is nothing, or it is a link or its values are in another file, unless `outside`.
+    """
+    found: Any = group
+    for part in filter(None, path.split("/")):
+        if not isinstance(found, h5py.Group) or part not in found.keys():  # noqa: SIM118 - `in` follows links
+            held = ", ".join(found.keys()) if isinstance(found, h5py.Group) else "values"
+            raise InputError(f"{where} has no {path!r}; it holds {_cut(held) or 'nothing'}")
+        try:
+            if not outside and found.id.links.get_info(part.encode()).type != h5py.h5l.TYPE_HARD:
+                raise InputError(f"{where}: {path} is a link; copy the data into the file, or allow it (outside=True)")
+            found = found[part]
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"{where}: {path} cannot be read ({_short(error)})") from error
+    if not outside and isinstance(found, h5py.Dataset) and (found.external or found.is_virtual):
+        raise InputError(f"{where}: {path} is stored in other files; copy it into one, or allow it (outside=True)")
+    return found
+
+
+def hdf5_values(group: h5py.Group, path: str, where: str, part: Any = (), *, outside: bool = False) -> NDArray[Any]:
+    """An array, or its part, e.g. `slice(0, 100)`; raises InputError as `hdf5_item`, and where it cannot be read."""
+    found = hdf5_item(group, path, where, outside=outside)
+    if not isinstance(found, h5py.Dataset) or found.shape is None:
+        raise InputError(f"{where}: {path} is no array")
+    try:
+        asked = math.prod(_selected(found.shape, part))
+        checked_memory(asked * found.dtype.itemsize, f"{where}: {path}, {found.dtype} of shape {found.shape},")
+        return np.asarray(found[part])
+    except InputError:
+        raise
+    except MemoryError as error:
+        raise InputError(f"{where}: {path} of shape {found.shape} does not fit in memory; read a part") from error
+    except Exception as error:  # filters, checksums, types without a numpy counterpart
+        raise InputError(f"{where}: {path} cannot be read ({_short(error)})") from error
+
+
 def number(arrays: Mapping[str, NDArray[Any]], name: str, where: str) -> float:
     """A single finite number out of an array of any shape; raises InputError where it is none."""
     value = arrays[name]
@@ -173,10 +238,24 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, source: Path) -> NDA
         declared_bytes = math.prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or declared_bytes > info.file_size:
             raise InputError(
-                f"{source}: {info.filename} declares {dtype} of shape {shape}; it has {info.file_size} bytes"
+                f"{source}: {info.filename} declares {dtype} of shape {_cut(str(shape))}; it has {info.file_size} bytes"
             )
+        checked_memory(declared_bytes, f"{source}: {info.filename}, {dtype} of shape {shape},")
     with archive.open(info) as member:
         return np.lib.format.read_array(member, allow_pickle=False)  # type: ignore[no-any-return]
+
+
+def _selected(shape: tuple[int, ...], part: Any) -> list[int]:
+    """Lengths of the axes that a selection of slices leaves, at most."""
+    parts = part if isinstance(part, tuple) else (part,)
+    cut = [len(range(*p.indices(n))) if isinstance(p, slice) else n for p, n in zip(parts, shape, strict=False)]
+    return [*cut, *shape[len(cut) :]]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode("utf-8")
+    return value.item() if isinstance(value, np.generic) and value.dtype.kind in "biufSU" else value
 
 
 def _no_constant(name: str) -> Any:
@@ -206,5 +285,8 @@ def _shown(value: Any) -> str:
 
 
 def _short(error: BaseException) -> str:
-    text = (str(error).splitlines() or [""])[0] or type(error).__name__
+    return _cut((str(error).splitlines() or [""])[0] or type(error).__name__)
+
+
+def _cut(text: str) -> str:
     return text if len(text) <= 160 else f"{text[:157]}..."

@@ -21,9 +21,9 @@ from tqdm import tqdm
 
 from spikecam_env.calibration.campaign import USES, Campaign, read_campaign
 from spikecam_env.calibration.campaign_files import campaign_folder, finish_campaign, save_light, save_spikes
+from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
-from spikecam_env.sensor.sensor import checked_count, checked_seed, checked_shape
 from spikecam_env.streams.packing import packed_bytes
 from spikecam_env.version import __version__
 from spikecam_env.whole import write_text_whole

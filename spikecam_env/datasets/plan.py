@@ -14,10 +14,10 @@ import numpy as np
 from scenes.catalogue import SCENES, make_scene
 from scenes.protocol import Scene
 from scenes.renderers.choose import BACKENDS
+from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.datasets.renderer import AUTO, renderer_of_process
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.sensor import checked_count, checked_seed, checked_shape
 
 RANDOM = "random"
 """The scene of the catalogue that its seed draws."""

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from spikecam_env.calibration import Campaign, Take, record_takes
+from spikecam_env.checked import checked_count, checked_shape
 from spikecam_env.gap.recordings import Bars, Dark, Disk, Flat, Planned, Step
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.sensor import checked_count, checked_shape
 
 FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
 HOLDOUT_LEVELS = (0.05, 0.15, 0.5)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Effect, Exposure
@@ -216,36 +216,6 @@ def _recycled(out: NDArray[np.uint8] | None, shape: tuple[int, int, int]) -> NDA
     if out.shape != shape or out.dtype != np.uint8 or not (out.flags.c_contiguous and out.flags.writeable):
         raise InputError(f"out is {out.dtype} {out.shape}; it must be uint8 {shape}, C-contiguous and writeable")
     return out
-
-
-def checked_shape(shape: Any) -> tuple[int, int]:
-    try:
-        rows, columns = (operator.index(n) for n in shape)
-    except (TypeError, ValueError):
-        rows = columns = 0
-    if rows < 1 or columns < 1:
-        raise InputError(f"shape = {shape!r}; it must be two positive whole numbers, (rows, columns)")
-    return rows, columns
-
-
-def checked_count(count: Any, name: str = "frames") -> int:
-    try:
-        number = operator.index(count)
-    except TypeError:
-        number = 0
-    if number < 1:
-        raise InputError(f"{name} = {count!r}; it must be a whole number, 1 or more")
-    return number
-
-
-def checked_seed(seed: Any, name: str = "seed") -> int:
-    try:
-        number = operator.index(seed)
-    except TypeError:
-        number = -1
-    if number < 0:
-        raise InputError(f"{name} = {seed!r}; it must be a whole number, 0 or more")
-    return number
 
 
 def checked_unit(unit: Any, shape: tuple[int, int]) -> Unit:

@@ -1,0 +1,113 @@
+"""Values of a user that many functions take: sizes, counts, seeds, numbers; each is checked by one function.
+
+Whatever is refused is an InputError that says the value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import os
+from pathlib import Path
+from typing import Any
+
+from spikecam_env.errors import InputError
+
+MOST_PIXELS = 1 << 26
+"""Largest picture [pixels], 8192 x 8192: 64 times that of the largest spike camera."""
+LARGEST_SEED = 2**63 - 1
+"""Seeds are held as signed 64-bit numbers, in files and in compiled code."""
+LARGEST_COUNT = 2**53
+"""Whole numbers beyond are not exact as float64, in which JSON tools hold them."""
+
+
+def checked_shape(shape: Any, name: str = "shape") -> tuple[int, int]:
+    """(rows, columns), both 1 or more, at most MOST_PIXELS together."""
+    try:
+        rows, columns = (_whole(n) for n in shape)
+    except (TypeError, ValueError):
+        rows = columns = 0
+    if rows < 1 or columns < 1:
+        raise InputError(f"{name} = {_shown(shape)}; it must be two positive whole numbers, (rows, columns)")
+    if rows * columns > MOST_PIXELS:
+        raise InputError(f"{name} = {_shown(shape)}; it must be at most {MOST_PIXELS} pixels (8192 x 8192)")
+    return rows, columns
+
+
+def checked_count(count: Any, name: str = "frames") -> int:
+    """A whole number, 1 or more."""
+    return _checked_whole(count, name, 1, LARGEST_COUNT)
+
+
+def checked_seed(seed: Any, name: str = "seed") -> int:
+    """A whole number, 0 to LARGEST_SEED."""
+    return _checked_whole(seed, name, 0, LARGEST_SEED)
+
+
+def checked_number(
+    value: Any, name: str, least: float = -math.inf, most: float = math.inf, *, unit: str = "", above: bool = False
+) -> float:
+    """A finite number from `least` to `most`; `above`: not `least` itself."""
+    try:
+        number = math.nan if isinstance(value, (bool, str, bytes)) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not (math.isfinite(number) and least <= number <= most) or (above and number == least):
+        raise InputError(f"{name} = {_shown(value)}; it must be {_range(least, most, above)}{unit and f' {unit}'}")
+    return number
+
+
+def checked_memory(size: int, what: str) -> None:
+    """Raises InputError where so many bytes are more than the memory of this machine or container."""
+    most = memory_bytes()
+    if size > most:
+        raise InputError(
+            f"{what} would take {size / 1e9:.3g} GB of memory, this machine has {most / 1e9:.3g}; ask less"
+        )
+
+
+def memory_bytes() -> int:
+    """Memory of this machine, or what its container may use of it."""
+    try:
+        most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # no POSIX system: no limit is known
+        most = 1 << 62
+    for limit in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
+        try:
+            most = min(most, int(Path(limit).read_text()))
+        except (OSError, ValueError):  # none, or "max"
+            continue
+    return most
+
+
+def _checked_whole(value: Any, name: str, least: int, most: int) -> int:
+    try:
+        number = _whole(value)
+    except TypeError:
+        number = least - 1
+    if not least <= number <= most:
+        rule = f"{least} or more" if number < least else f"{least} to {most}"
+        raise InputError(f"{name} = {_shown(value)}; it must be a whole number, {rule}")
+    return number
+
+
+def _whole(value: Any) -> int:
+    if isinstance(value, bool):
+        raise TypeError
+    return operator.index(value)
+
+
+def _range(least: float, most: float, above: bool) -> str:
+    if least == -math.inf and most == math.inf:
+        return "a finite number"
+    if most == math.inf:
+        return f"a finite number {'above' if above else 'of at least'} {least:g}"
+    return f"a number {'above' if above else 'from'} {least:g} {'and up to' if above else 'to'} {most:g}"
+
+
+def _shown(value: Any) -> str:
+    try:
+        text = repr(value)
+    except ValueError:  # whole numbers of more than 4300 digits have no text
+        return f"a {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
