@@ -11,6 +11,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from spikecam_env.errors import InputError
 
 MOST_PIXELS = 1 << 26
@@ -28,9 +30,9 @@ def checked_shape(shape: Any, name: str = "shape") -> tuple[int, int]:
     except (TypeError, ValueError):
         rows = columns = 0
     if rows < 1 or columns < 1:
-        raise InputError(f"{name} = {_shown(shape)}; it must be two positive whole numbers, (rows, columns)")
+        raise InputError(f"{name} = {shown(shape)}; it must be two positive whole numbers, (rows, columns)")
     if rows * columns > MOST_PIXELS:
-        raise InputError(f"{name} = {_shown(shape)}; it must be at most {MOST_PIXELS} pixels (8192 x 8192)")
+        raise InputError(f"{name} = {shown(shape)}; it must be at most {MOST_PIXELS} pixels (8192 x 8192)")
     return rows, columns
 
 
@@ -48,13 +50,27 @@ def checked_number(
     value: Any, name: str, least: float = -math.inf, most: float = math.inf, *, unit: str = "", above: bool = False
 ) -> float:
     """A finite number from `least` to `most`; `above`: not `least` itself."""
-    try:
-        number = math.nan if isinstance(value, (bool, str, bytes)) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = as_number(value)
     if not (math.isfinite(number) and least <= number <= most) or (above and number == least):
-        raise InputError(f"{name} = {_shown(value)}; it must be {_range(least, most, above)}{unit and f' {unit}'}")
+        raise InputError(f"{name} = {shown(value)}; it must be {_range(least, most, above)}{unit and f' {unit}'}")
     return number
+
+
+def as_number(value: Any) -> float:
+    """A number as a float; NaN for text, true and false, and whatever else is no number or too large for a float."""
+    try:
+        return math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def shown(value: Any) -> str:
+    """A value in an error's text: at most 60 characters."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
+        return f"a {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def checked_memory(size: int, what: str) -> None:
@@ -87,7 +103,7 @@ def _checked_whole(value: Any, name: str, least: int, most: int) -> int:
         number = least - 1
     if not least <= number <= most:
         rule = f"{least} or more" if number < least else f"{least} to {most}"
-        raise InputError(f"{name} = {_shown(value)}; it must be a whole number, {rule}")
+        raise InputError(f"{name} = {shown(value)}; it must be a whole number, {rule}")
     return number
 
 
@@ -103,11 +119,3 @@ def _range(least: float, most: float, above: bool) -> str:
     if most == math.inf:
         return f"a finite number {'above' if above else 'of at least'} {least:g}"
     return f"a number {'above' if above else 'from'} {least:g} {'and up to' if above else 'to'} {most:g}"
-
-
-def _shown(value: Any) -> str:
-    try:
-        text = repr(value)
-    except ValueError:  # whole numbers of more than 4300 digits have no text
-        return f"a {type(value).__name__}"
-    return text if len(text) <= 60 else f"{text[:57]}..."
