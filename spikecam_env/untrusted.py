@@ -18,7 +18,7 @@ import json
 import math
 import sys
 import zipfile
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -127,7 +127,7 @@ def read_text(path: str | Path) -> str:
 
 
 def read_table(
-    path: str | Path, columns: Collection[str], needed: Iterable[str] = ()
+    path: str | Path, columns: Collection[str], needed: Sequence[str] = ()
 ) -> list[tuple[int, dict[str, str]]]:
     """Rows of a CSV table whose first line names its columns: (line, cell by column), text without spaces about it.
 

@@ -93,8 +93,11 @@ class Manifest:
         path = folder / NAME
         if not path.is_file():
             raise InputError(f"{folder} is no dataset: there is no {NAME} in it")
-        data = checked_format(read_json(path), FORMAT, str(path))
-        file = declared(_DatasetFile, data, str(path))
+        try:
+            data = checked_format(read_json(path), FORMAT, NAME)
+            file = declared(_DatasetFile, data, NAME)
+        except InputError as error:
+            raise InputError(f"{path} is damaged ({error}); make the dataset again in an empty folder") from error
         for entry in file.files:
             inside(folder, entry.path, f"{path}: file", outside=outside)
         distinct((entry.path for entry in file.files), "file")

@@ -36,6 +36,7 @@ rest from `feedback`; an effect that reacts to spikes and does not declare it, i
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Sequence
 from enum import IntEnum
@@ -44,7 +45,6 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.checked import as_number, shown
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.unit import PixelArray, Unit
 
@@ -202,18 +202,19 @@ class Effect:
 
     def __post_init__(self) -> None:
         for f in dataclasses.fields(self):
-            value, bounds, name = getattr(self, f.name), f.metadata["bounds"], f"{self.name}.{f.name}"
+            value, bounds = getattr(self, f.name), f.metadata["bounds"]
             if bounds is None:
-                if not isinstance(value, bool | np.bool_):
-                    raise InputError(f"{name} = {shown(value)}; it must be true or false")
                 continue
-            number = as_number(value)
+            try:
+                number = float(value)
+            except (TypeError, ValueError):
+                number = math.nan
             if not bounds[0] <= number <= bounds[1]:
                 raise InputError(
-                    f"{name} = {shown(value)} is outside {bounds[0]:g} .. {bounds[1]:g} {f.metadata['unit']}"
+                    f"{self.name}.{f.name} = {value!r} is outside {bounds[0]:g} .. {bounds[1]:g} {f.metadata['unit']}"
                 )
             if isinstance(f.default, int) and not number.is_integer():
-                raise InputError(f"{name} = {shown(value)} must be a whole number")
+                raise InputError(f"{self.name}.{f.name} = {value!r} must be a whole number")
 
     @classmethod
     def neutralised(cls) -> Effect:
