@@ -1,4 +1,4 @@
-"""Files from outside, read in one place: JSON, TOML and arrays, checked against a declaration before anyone uses them.
+"""Files from outside, read in one place: JSON, TOML, arrays and HDF5, checked before anyone uses them.
 
 A format declares its entries once, as a `Declared` class with types and ranges; `declared` checks data against it.
 Whatever is wrong is an InputError that names the file, the entry, its value and what is allowed.
@@ -12,18 +12,22 @@ Whatever is wrong is an InputError that names the file, the entry, its value and
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import sys
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory, shown
 from spikecam_env.errors import InputError, unknown_name
 
 if sys.version_info >= (3, 11):
@@ -33,13 +37,15 @@ else:
 
 MOST_TEXT_BYTES = 64 << 20
 """Largest JSON or TOML file that is read; the largest this package writes take a few MB."""
-LARGEST_COUNT = 2**53
-"""Whole numbers beyond are not exact as float64, in which JSON tools hold them."""
 
 Count = Annotated[int, Field(ge=1, le=LARGEST_COUNT)]
 """A whole number, 1 or more."""
 Whole = Annotated[int, Field(ge=0, le=LARGEST_COUNT)]
 """A whole number, 0 or more."""
+Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+"""A seed of random numbers."""
+Side = Annotated[int, Field(ge=1, le=MOST_PIXELS)]
+"""Rows or columns of a picture."""
 Positive = Annotated[float, Field(gt=0)]
 """A finite number above 0."""
 Name = Annotated[str, Field(min_length=1, max_length=255)]
@@ -69,16 +75,28 @@ def declared(kind: type[D], data: Any, where: str) -> D:
         raise InputError(f"{where}: nested too deeply") from error
 
 
+def checked_format(data: Any, expected: str, where: str) -> dict[str, Any]:
+    """The data; raises InputError unless it is a table whose entry `format` is the one expected."""
+    found = data.get("format") if isinstance(data, dict) else type(data).__name__
+    if found != expected:
+        raise InputError(f"{where}: format is {shown(found)}, expected {expected!r}")
+    return data  # type: ignore[no-any-return]
+
+
 def read_json(path: str | Path) -> Any:
     """The value in a JSON file.
 
     Raises InputError where it is missing, too large, not UTF-8, not JSON, nested too deeply or has NaN or Infinity.
     """
-    text = read_text(path)
+    return parse_json(read_text(path), str(path))
+
+
+def parse_json(text: str, where: str) -> Any:
+    """The value in a JSON text; raises InputError where it is not one."""
     try:
         return json.loads(text, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not JSON: {_short(error)}") from error
+        raise InputError(f"{where} is not a JSON file: {_short(error)}") from error
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -91,7 +109,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where} is not TOML: {_short(error)}") from error
+        raise InputError(f"{where} is not a TOML file: {_short(error)}") from error
 
 
 def read_text(path: str | Path) -> str:
@@ -106,6 +124,48 @@ def read_text(path: str | Path) -> str:
         raise InputError(f"cannot read {source}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{source} is not UTF-8 text: {_short(error)}") from error
+
+
+def read_table(
+    path: str | Path, columns: Collection[str], needed: Sequence[str] = ()
+) -> list[tuple[int, dict[str, str]]]:
+    """Rows of a CSV table whose first line names its columns: (line, cell by column), text without spaces about it.
+
+    columns: those allowed.  needed: those that must be there.  A row may be shorter than the columns, not longer.
+    Raises InputError, with the line, for unknown, repeated and missing columns, rows that are too long, and no table.
+    """
+    lines = csv.reader(io.StringIO(read_text(path), newline=""), skipinitialspace=True)
+    rows: list[tuple[int, dict[str, str]]] = []
+    try:
+        names = [name.strip() for name in next(lines, [])]
+        for name in names:
+            if name not in columns:
+                raise unknown_name(f"column of {path}", name, columns)
+            if names.count(name) > 1:
+                raise InputError(f"{path} has {names.count(name)} columns {name!r}; leave one")
+        for name in needed:
+            if name not in names:
+                raise InputError(
+                    f"{path} has no column {name!r}; its first line must name the columns: {','.join(needed)}"
+                )
+        for cells in lines:
+            if len(cells) > len(names):
+                raise InputError(f"{path}, line {lines.line_num} has more cells than there are columns")
+            if cells:
+                rows.append((lines.line_num, dict(zip(names, (cell.strip() for cell in cells), strict=False))))
+    except csv.Error as error:
+        raise InputError(f"{path}, line {lines.line_num} is no line of a table: {_short(error)}") from error
+    return rows
+
+
+def array_names(path: str | Path) -> set[str]:
+    """Names of the arrays of an `.npz`; raises InputError where it is missing or none."""
+    source = existing_file(path)
+    try:
+        with zipfile.ZipFile(source) as archive:
+            return {name.removesuffix(".npy") for name in archive.namelist()}
+    except Exception as error:
+        raise InputError(f"{source} is not a readable .npz of plain arrays ({_short(error)})") from error
 
 
 def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[str, NDArray[Any]]:
@@ -129,6 +189,67 @@ def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[st
         raise InputError(f"{source} does not fit in memory; read a part of it or give a smaller one") from error
     except Exception as error:  # zlib, struct, tokenize, ...: the many ways in which a damaged archive fails
         raise InputError(f"{source} is not a readable .npz of plain arrays ({_short(error)})") from error
+
+
+def open_hdf5(path: str | Path) -> h5py.File:
+    """An HDF5 file, open for reading; raises InputError where it is missing, truncated or none."""
+    source = existing_file(path)
+    try:
+        return h5py.File(source, "r")
+    except (OSError, RuntimeError, ValueError) as error:
+        raise InputError(f"{source} is truncated or not an HDF5 file ({_short(error)})") from error
+
+
+def hdf5_attributes(item: h5py.HLObject, where: str) -> dict[str, Any]:
+    """Attributes by name: scalars as Python's own, text as str, anything else as h5py has it, for `declared` to refuse.
+
+    Raises InputError for an attribute that cannot be read.
+    """
+    try:
+        return {str(name): _plain(item.attrs[name]) for name in item.attrs}
+    except Exception as error:  # h5py has no words for many types
+        raise InputError(f"{where}: its attributes cannot be read ({_short(error)})") from error
+
+
+def hdf5_item(group: h5py.Group, path: str, where: str, *, outside: bool = False) -> h5py.Group | h5py.Dataset:
+    """What is at a path in a file, e.g. "truth/frame".
+
+    outside: follow links, external storage and virtual data, which may lie in other files.
+    Raises InputError where there is nothing, or it is a link or its values are in another file, unless `outside`.
+    """
+    found: Any = group
+    for part in filter(None, path.split("/")):
+        if not isinstance(found, h5py.Group) or part not in found.keys():  # noqa: SIM118 - `in` follows links
+            held = ", ".join(found.keys()) if isinstance(found, h5py.Group) else "values"
+            raise InputError(f"{where} has no {path!r}; it holds {_cut(held) or 'nothing'}")
+        try:
+            if not outside and found.id.links.get_info(part.encode()).type != h5py.h5l.TYPE_HARD:
+                raise InputError(f"{where}: {path} is a link; copy the data into the file, or allow it (outside=True)")
+            found = found[part]
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"{where}: {path} cannot be read ({_short(error)})") from error
+    if not outside and isinstance(found, h5py.Dataset) and (found.external or found.is_virtual):
+        raise InputError(f"{where}: {path} is stored in other files; copy it into one, or allow it (outside=True)")
+    return found
+
+
+def hdf5_values(group: h5py.Group, path: str, where: str, part: Any = (), *, outside: bool = False) -> NDArray[Any]:
+    """An array, or its part, e.g. `slice(0, 100)`; raises InputError as `hdf5_item`, and where it cannot be read."""
+    found = hdf5_item(group, path, where, outside=outside)
+    if not isinstance(found, h5py.Dataset) or found.shape is None:
+        raise InputError(f"{where}: {path} is no array")
+    try:
+        asked = math.prod(_selected(found.shape, part))
+        checked_memory(asked * found.dtype.itemsize, f"{where}: {path}, {found.dtype} of shape {found.shape},")
+        return np.asarray(found[part])
+    except InputError:
+        raise
+    except MemoryError as error:
+        raise InputError(f"{where}: {path} of shape {found.shape} does not fit in memory; read a part") from error
+    except Exception as error:  # filters, checksums, types without a numpy counterpart
+        raise InputError(f"{where}: {path} cannot be read ({_short(error)})") from error
 
 
 def number(arrays: Mapping[str, NDArray[Any]], name: str, where: str) -> float:
@@ -173,10 +294,24 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, source: Path) -> NDA
         declared_bytes = math.prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or declared_bytes > info.file_size:
             raise InputError(
-                f"{source}: {info.filename} declares {dtype} of shape {shape}; it has {info.file_size} bytes"
+                f"{source}: {info.filename} declares {dtype} of shape {_cut(str(shape))}; it has {info.file_size} bytes"
             )
+        checked_memory(declared_bytes, f"{source}: {info.filename}, {dtype} of shape {shape},")
     with archive.open(info) as member:
         return np.lib.format.read_array(member, allow_pickle=False)  # type: ignore[no-any-return]
+
+
+def _selected(shape: tuple[int, ...], part: Any) -> list[int]:
+    """Lengths of the axes that a selection of slices leaves, at most."""
+    parts = part if isinstance(part, tuple) else (part,)
+    cut = [len(range(*p.indices(n))) if isinstance(p, slice) else n for p, n in zip(parts, shape, strict=False)]
+    return [*cut, *shape[len(cut) :]]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode("utf-8")
+    return value.item() if isinstance(value, np.generic) and value.dtype.kind in "biufSU" else value
 
 
 def _no_constant(name: str) -> Any:
@@ -186,25 +321,23 @@ def _no_constant(name: str) -> Any:
 def _as_input_error(error: ValidationError, kind: type[BaseModel], where: str) -> InputError:
     first = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in first["loc"])
-    value = _shown(first["input"])
+    value = shown(first["input"])
     if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
         return unknown_name(f"entry of {where}", first["loc"][0], kind.model_fields)
     if first["type"] == "missing":
         return InputError(f"{where}: {place} is missing")
     if first["type"] == "value_error":
         return InputError(f"{where}: {place or 'it'} = {value}: {first['ctx']['error']}")
+    if first["type"] == "literal_error":
+        allowed = first["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
+        return InputError(f"{where}: {place} = {value}; choose one of {allowed}")
     message = first["msg"].removeprefix("Input should ")
     return InputError(f"{where}: {place or 'it'} = {value}; it should {message}")
 
 
-def _shown(value: Any) -> str:
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
-        return f"a {type(value).__name__}"
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
 def _short(error: BaseException) -> str:
-    text = (str(error).splitlines() or [""])[0] or type(error).__name__
+    return _cut((str(error).splitlines() or [""])[0] or type(error).__name__)
+
+
+def _cut(text: str) -> str:
     return text if len(text) <= 160 else f"{text[:157]}..."

@@ -11,11 +11,12 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels import cuda
 from spikecam_env.sensor.light import MAX_SEGMENT, Keyframes, Segment, as_light, check_radiance, segments
 from spikecam_env.sensor.model import SensorModel, generator
-from spikecam_env.sensor.sensor import checked_count, checked_seed, checked_shape, imaged
+from spikecam_env.sensor.sensor import imaged
 
 
 @dataclass(frozen=True)

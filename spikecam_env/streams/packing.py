@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.checked import checked_shape as check_shape
 from spikecam_env.errors import InputError, unknown_name
 
 BitOrder = Literal["little", "big"]
@@ -59,13 +60,6 @@ def as_spikes(spikes: ArrayLike) -> NDArray[np.uint8]:
             "of shape (frames, rows, columns)"
         )
     return array.view(np.uint8)
-
-
-def check_shape(shape: tuple[int, int]) -> tuple[int, int]:
-    """(rows, columns), both at least 1, or InputError."""
-    if len(shape) != 2 or min(shape) < 1:
-        raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
-    return int(shape[0]), int(shape[1])
 
 
 def check_bit_order(bit_order: str) -> BitOrder:

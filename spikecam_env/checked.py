@@ -1,0 +1,150 @@
+"""Values of a user that many functions take: sizes, counts, seeds, numbers; each is checked by one function.
+
+Whatever is refused is an InputError that says the value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spikecam_env.errors import InputError
+
+MOST_PIXELS = 1 << 26
+"""Largest picture [pixels], 8192 x 8192: 64 times that of the largest spike camera."""
+LARGEST_SEED = 2**63 - 1
+"""Largest seed of a user: files hold signed 64-bit numbers."""
+LARGEST_DERIVED_SEED = 2**128 - 1
+"""Largest seed of a sensor, which may be made from a user's by arithmetic."""
+LARGEST_COUNT = 2**53
+"""Whole numbers beyond are not exact as float64, in which JSON tools hold them."""
+
+
+def checked_shape(shape: Any, name: str = "shape") -> tuple[int, int]:
+    """(rows, columns), both 1 or more, at most MOST_PIXELS together."""
+    try:
+        rows, columns = (_whole(n) for n in shape)
+    except (TypeError, ValueError):
+        rows = columns = 0
+    if rows < 1 or columns < 1:
+        raise InputError(f"{_said(name, shape)}; it must be two positive whole numbers, (rows, columns)")
+    if rows * columns > MOST_PIXELS:
+        raise InputError(f"{_said(name, shape)}; it must be at most {MOST_PIXELS} pixels (8192 x 8192)")
+    return rows, columns
+
+
+def checked_count(count: Any, name: str = "frames", most: int = LARGEST_COUNT) -> int:
+    """A whole number, 1 to `most`."""
+    return checked_whole(count, name, 1, most)
+
+
+def checked_seed(seed: Any, name: str = "seed", most: int = LARGEST_SEED) -> int:
+    """A whole number, 0 to `most`."""
+    return checked_whole(seed, name, 0, most)
+
+
+def checked_whole(value: Any, name: str, least: int = -LARGEST_COUNT, most: int = LARGEST_COUNT) -> int:
+    """A whole number from `least` to `most`; true and false are none."""
+    try:
+        number = _whole(value)
+    except TypeError:
+        number = least - 1
+    if not least <= number <= most:
+        rule = f"{least} or more" if number < least else f"{least} to {most}"
+        raise InputError(f"{_said(name, value)}; it must be a whole number, {rule}")
+    return number
+
+
+def checked_number(
+    value: Any, name: str, least: float = -math.inf, most: float = math.inf, *, unit: str = "", above: bool = False
+) -> float:
+    """A finite number from `least` to `most`; `above`: not `least` itself."""
+    number = as_number(value)
+    if not (math.isfinite(number) and least <= number <= most) or (above and number == least):
+        raise InputError(f"{_said(name, value)}; it must be {_range(least, most, above)}{unit and f' {unit}'}")
+    return number
+
+
+def checked_above_zero(value: Any, name: str) -> float:
+    """A number above 0, which may be infinite."""
+    number = as_number(value)
+    if not number > 0:
+        raise InputError(f"{_said(name, value)}; it must be a number above 0, or inf")
+    return number
+
+
+def as_number(value: Any) -> float:
+    """A number as a float; NaN for text, true and false, and whatever else is no number or too large for a float."""
+    try:
+        return math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def shown(value: Any) -> str:
+    """A value in an error's text: at most 60 characters."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
+        return f"a {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def checked_memory(size: int, what: str) -> None:
+    """Raises InputError where so many bytes are more than the memory of this machine or container."""
+    most = memory_bytes()
+    if size > most:
+        raise InputError(
+            f"{what} would take {size / 1e9:.3g} GB of memory, this machine has {most / 1e9:.3g}; ask less"
+        )
+
+
+def checked_disk(size: int, path: str | Path, what: str) -> None:
+    """Raises InputError where so many bytes are more than is free where `path` is or will be."""
+    place = Path(path).absolute()
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    free = shutil.disk_usage(place).free
+    if size > free:
+        raise InputError(f"{what} would take {size / 1e9:.3g} GB on disk; {place} has {free / 1e9:.3g} GB free")
+
+
+def memory_bytes() -> int:
+    """Memory of this machine, or what its container may use of it."""
+    try:
+        most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # no POSIX system: no limit is known
+        most = 1 << 62
+    for limit in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
+        try:
+            most = min(most, int(Path(limit).read_text()))
+        except (OSError, ValueError):  # none, or "max"
+            continue
+    return most
+
+
+def _said(name: str, value: Any) -> str:
+    """A name and its value; options of a command as they are typed."""
+    if not name.startswith("--"):
+        return f"{name} = {shown(value)}"
+    return f"{name} {' '.join(shown(item) for item in value) if isinstance(value, tuple) else shown(value)}"
+
+
+def _whole(value: Any) -> int:
+    if isinstance(value, bool):
+        raise TypeError
+    return operator.index(value)
+
+
+def _range(least: float, most: float, above: bool) -> str:
+    if least == -math.inf and most == math.inf:
+        return "a finite number"
+    if most == math.inf:
+        return f"a finite number {'above' if above else 'of at least'} {least:g}"
+    return f"a number {'above' if above else 'from'} {least:g} {'and up to' if above else 'to'} {most:g}"

@@ -1,0 +1,94 @@
+"""Names that are names, and paths that stay inside their folder: all text from files that becomes a path goes through.
+
+file_name("flat-120", "recording name")                  "flat-120"
+inside(folder, "flats/120.dat", "spikes")                 folder / "flats/120.dat"
+file_name("../x", ...), inside(folder, "../x", ...)       InputError
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable
+from pathlib import Path, PureWindowsPath
+
+from spikecam_env.checked import shown
+from spikecam_env.errors import InputError
+
+MOST_BYTES = 180
+"""Longest name [bytes of UTF-8]: file systems take 255, and endings such as `-holdout-rates.npz` are added to it."""
+
+_NOT_IN_NAMES = frozenset('/\\:*?"<>|')
+"""Characters that one file system or another takes for something else."""
+_DEVICES = frozenset({"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))})
+"""Names that Windows keeps for devices, with any ending."""
+
+
+def file_name(text: str, what: str) -> str:
+    """The text; raises InputError unless it is a plain file name on every system.
+
+    what: begins the error's text, e.g. "recording name".
+    """
+    rule = _broken_rule(text)
+    if rule:
+        raise InputError(f"{what} {shown(text)} {rule}; give a plain file name: letters, digits, dots, dashes")
+    return text
+
+
+def distinct(names: Iterable[str], what: str) -> None:
+    """Raises InputError where two names are one file: the same text, or the same but for upper and lower case."""
+    seen: dict[str, list[str]] = {}
+    for name in names:
+        seen.setdefault(unicodedata.normalize("NFC", name).casefold(), []).append(name)
+    for same in seen.values():
+        if len(same) > 1 and len(set(same)) == 1:
+            raise InputError(f"{len(same)} {what}s are named {same[0]!r}; give them names of their own")
+        if len(same) > 1:
+            raise InputError(f"{what}s {same[0]!r} and {same[1]!r} are one file where case does not count; rename one")
+
+
+def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -> Path:
+    """The path that a text in a file means, relative to its folder.
+
+    outside: take paths that leave the folder too, by `..`, from the root, or over a symbolic link.
+    Raises InputError for text that is no path, and for one that leaves the folder unless `outside`.
+    """
+    root = Path(folder)
+    if not text or not text.isprintable() or not _encodes(text):
+        raise InputError(f"{what} {shown(text)} is no path of a file")
+    path = root / text
+    if outside:
+        return path
+    absolute = (path.is_absolute() and Path(text).is_absolute()) or bool(PureWindowsPath(text).anchor)
+    try:
+        leaves = absolute or ".." in PureWindowsPath(text).parts or not path.resolve().is_relative_to(root.resolve())
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, names too long
+        raise InputError(f"{what} {shown(text)} cannot be read: {error}") from error
+    if leaves:
+        raise InputError(
+            f"{what} {shown(text)} is outside of {root}; copy the file there, or allow it (--outside, outside=True)"
+        )
+    return path
+
+
+def _broken_rule(text: str) -> str:
+    if not text.strip():
+        return "is empty"
+    if not text.isprintable() or not _encodes(text):
+        return "has characters that do not print"
+    if _NOT_IN_NAMES.intersection(text):
+        return f"has {', '.join(sorted(_NOT_IN_NAMES.intersection(text)))}"
+    if text != text.strip() or text.startswith(".") or text.endswith("."):
+        return "begins or ends with a dot or a space"
+    if text.split(".")[0].strip().lower() in _DEVICES:
+        return "is a device on Windows"
+    if len(text.encode()) > MOST_BYTES:
+        return f"has {len(text.encode())} bytes, more than {MOST_BYTES}"
+    return ""
+
+
+def _encodes(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
