@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.streams.files import check_range, existing_file
-from spikecam_env.streams.packing import as_spikes, check_shape, pack_frames, packed_bytes, unpack_frames
+from spikecam_env.streams.packing import as_spikes, check_shape, pack_checked, packed_bytes, unpack_frames
 from spikecam_env.version import __version__
 from spikecam_env.whole import beside_path
 
@@ -90,7 +90,7 @@ class SpikeWriter:
         if set(streams) != {"spikes", "clean"} & set(file) or len({len(frames) for frames in streams.values()}) > 1:
             raise InputError("spikes and clean must come together, as many frames of each, in every call or in none")
         for name, frames in streams.items():
-            _grow(file[name], pack_frames(frames))
+            _grow(file[name], pack_checked(frames))
 
     def append_truth(self, frame: float, **arrays: ArrayLike) -> None:
         """Add ground truth at a frame, e.g. radiance, flow: the same names, shapes and dtypes at each call."""
