@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.keys import side_by_side
-from scenes.protocol import Gaze, Truth
+from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import random_texture
+from spikecam_env.checked import checked_number, checked_shape
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -53,14 +54,11 @@ class Collage:
         textures: Sequence[NDArray[np.float32]] | None = None,
         frame_rate_hz: float = 40_000.0,
     ) -> None:
-        if min(shape) < 1 or speed < 0 or light <= 0 or contrast < 1:
-            raise InputError(
-                f"Collage got shape {shape}, speed {speed}, light {light}, contrast {contrast}; "
-                "need a shape of at least 1 x 1, speed >= 0, light > 0, contrast >= 1"
-            )
-        self.shape = (int(shape[0]), int(shape[1]))
-        self.frame_rate_hz = float(frame_rate_hz)
-        self.light = float(light)
+        self.shape = checked_shape(shape)
+        self.frame_rate_hz = checked_number(frame_rate_hz, "frame_rate_hz", *FRAME_RATES_HZ)
+        self.light = checked_number(light, "light", 0.0, MOST_LIGHT, above=True)
+        checked_number(speed, "speed", 0.0, MOST_PLACE)
+        checked_number(contrast, "contrast", 1.0)
         rng = np.random.default_rng(seed)
         count = int(rng.integers(3, 7)) if layers is None else layers
         drawn = [_draw_layer(rng, self, speed, contrast, kinds, textures, i == 0) for i in range(count + 1)]

@@ -25,14 +25,20 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
 
 from scenes.keys import interval_for, painted
-from scenes.protocol import Gaze, Truth
+from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
+from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_memory, checked_number, checked_seed, checked_shape
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
 TEXELS_PER_PIXEL = 5
 """Of the prefiltered texture.  At a key the default disk is 0.75 % rms of full scale off 16 x 16 supersampling at 5,
 0.86 % at 3, 0.72 % at 8; the rest is the pixel's square, which turns over the texture and is taken as round."""
+
+MOST_RPM = 1e9
+"""Turns a minute: 1000 times the fastest motors."""
+MOST_RADIUS = 6000.0
+"""[pixels] Texels are counted in 32 bits, TEXELS_PER_PIXEL^2 of them to a pixel of the disk's square."""
 
 
 class RotatingDisk:
@@ -72,7 +78,7 @@ class RotatingDisk:
         angle: float = 0.0,
         motion_per_key: float = 0.6,
     ) -> None:
-        self.shape = _checked_shape(shape)
+        self.shape, seed = checked_shape(shape), checked_seed(seed, most=LARGEST_DERIVED_SEED)
         self.radius = 0.44 * min(self.shape) if radius is None else float(radius)
         self.rpm, self.frame_rate_hz, self.light = float(rpm), float(frame_rate_hz), light
         self.centre = ((self.shape[1] - 1) / 2, (self.shape[0] - 1) / 2) if centre is None else centre
@@ -177,7 +183,7 @@ class RotatingDisk:
         else:
             behind = np.empty_like(picture)
             _paint_tile(self._tile, pan, tilt, behind)
-        x, y = self.centre_at(frame, gaze)
+        x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
         angle, texels = self.angle_at(frame), self._disk
         scale = (texels.side - 2 * _MARGIN) / (2 * self.radius)
         cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
@@ -200,20 +206,21 @@ class RotatingDisk:
         )
 
     def _check_numbers(self) -> None:
-        ranges: dict[str, tuple[float, bool, str]] = {
-            "rpm": (self.rpm, True, "finite"),
-            "radius": (self.radius, self.radius >= 1, "at least 1 pixel"),
-            "frame_rate_hz": (self.frame_rate_hz, self.frame_rate_hz > 0, "positive"),
-            "light[0]": (self.light[0], self.light[0] >= 0, "0 or more"),
-            "light[1]": (self.light[1], self.light[1] > self.light[0], "above light[0]"),
-            "centre": (sum(self.centre), True, "finite"),
-            "drift_px_s": (sum(self.drift_px_s), True, "finite"),
-            "angle": (self.angle, True, "finite"),
-            "motion_per_key": (self.motion_per_key, self.motion_per_key > 0, "positive"),
+        dark, bright = self.light
+        ranges: dict[str, tuple[float, float, float]] = {
+            "rpm": (self.rpm, -MOST_RPM, MOST_RPM),
+            "radius": (self.radius, 1.0, MOST_RADIUS),
+            "frame_rate_hz": (self.frame_rate_hz, *FRAME_RATES_HZ),
+            "light[0]": (dark, 0.0, MOST_LIGHT),
+            "light[1]": (bright, dark, MOST_LIGHT),
+            "angle": (self.angle, -MOST_PLACE, MOST_PLACE),
+            "motion_per_key": (self.motion_per_key, 1e-9, MOST_PLACE),
         }
-        for name, (value, allowed, rule) in ranges.items():
-            if not (np.isfinite(value) and allowed):
-                raise InputError(f"{name} is {value}; it must be {rule}")
+        for axis in (0, 1):
+            ranges[f"centre[{axis}]"] = (self.centre[axis], -MOST_PLACE, MOST_PLACE)
+            ranges[f"drift_px_s[{axis}]"] = (self.drift_px_s[axis], -MOST_PLACE, MOST_PLACE)
+        for name, (value, least, most) in ranges.items():
+            checked_number(value, name, least, most, above=name == "light[1]")
 
 
 def disk_texture(rng: np.random.Generator, size: int = 1024) -> Texture:
@@ -267,6 +274,7 @@ def _prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.flo
     pixels^2; a box of side sqrt(1 - 3 / m^2) makes up the pixel's 1 / 12.  The border is repeated outward.
     """
     texels = max(2, round(2 * radius * TEXELS_PER_PIXEL))
+    checked_memory(20 * texels**2, f"a disk of radius {radius:g} pixels")
     way = cv2.INTER_AREA if texels < len(texture) else cv2.INTER_LINEAR
     resampled = cv2.resize(texture.astype(np.float32), (texels, texels), interpolation=way)
     wide = np.pad(resampled, _MARGIN, mode="edge")
@@ -398,12 +406,6 @@ def _blend_rim(behind, start, stop, x, dy, reach, row):  # pragma: no cover - co
         dx = np.float32(c - x)
         cover = min(max(reach - np.sqrt(dx * dx + dy * dy), np.float32(0.0)), np.float32(1.0))
         row[c] = behind[c] + cover * (row[c] - behind[c])
-
-
-def _checked_shape(shape: tuple[int, int]) -> tuple[int, int]:
-    if len(shape) != 2 or min(shape) < 1:
-        raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
-    return int(shape[0]), int(shape[1])
 
 
 def _checked_texture(texture: ArrayLike) -> NDArray[np.float32]:

@@ -13,11 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes.protocol import Dimmable, Gaze, Placed, Scene, Truth
+from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
 METERED_FRAMES = (0.5, 333.5, 666.5, 999.5)
 """Where the light is measured: over the first thousand frames, a common length of a clip."""
+
+MOST_INTERVAL = 1e6
+"""Longest mean interval of an exposure [frames]: a spike in 25 s at 40 kHz."""
 
 
 def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = None) -> Scene:
@@ -26,8 +30,7 @@ def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = No
     metered   measure this one instead, e.g. the same scene at a smaller shape
     Errors: InputError for an interval below 1 (a pixel fires at most once a frame) or a scene without light.
     """
-    if not (np.isfinite(mean_interval) and mean_interval >= 1):
-        raise InputError(f"mean_interval is {mean_interval}; it must be 1 frame or more, e.g. 10")
+    checked_number(mean_interval, "mean_interval", 1.0, MOST_INTERVAL, unit="frames, e.g. 10")
     mean = float(np.mean([(metered or scene).truth(frame).radiance.mean() for frame in METERED_FRAMES]))
     if not mean > 0:
         raise InputError("the scene has no light to expose; give it a lamp, an emission or a background")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.protocol import Gaze
+from spikecam_env.checked import checked_memory, checked_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.kernels.threads import as_many, together
@@ -41,8 +42,12 @@ def painted(
     Without gaze they are multiples of the interval; with gaze there are keys at `start` and `stop` too, where the
     camera's path may bend.  Errors: InputError unless start < stop.
     """
+    checked_whole(start, "start")
+    checked_whole(stop, "stop")
     if not start < stop:
         raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+    keys = (stop - start) // interval + 2
+    checked_memory(4 * keys * shape[0] * shape[1], f"light of frames {start} to {stop}, {keys} keys,")
     if gaze is None:
         frame = np.arange(start // interval, -(-stop // interval) + 1) * interval
     else:

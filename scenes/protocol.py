@@ -13,10 +13,19 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 
 if TYPE_CHECKING:
     from spikecam_env.sensor import Keyframes
+
+
+MOST_PLACE = 1e9
+"""Farthest that anything is from the picture [pixels], or moves in a second; compiled code counts pixels in 64 bits."""
+MOST_LIGHT = 1e6
+"""Brightest light of a scene; 1.0 makes the nominal pixel fire once a frame."""
+FRAME_RATES_HZ = (1e-3, 1e9)
+"""Slowest and fastest camera of a scene."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,10 @@ class Gaze:
     frames: tuple[float, float]
 
     def __post_init__(self) -> None:
+        for value in (*self.start, *self.stop):
+            checked_number(value, "gaze offset", -MOST_PLACE, MOST_PLACE)
+        for frame in self.frames:
+            checked_number(frame, "gaze frame")
         if not self.frames[0] < self.frames[1]:
             raise InputError(f"gaze frames are {self.frames}; the first must be before the second")
 

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.keys import interval_for, painted
-from scenes.protocol import Gaze, Truth
+from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import dead_leaves
+from spikecam_env.checked import checked_memory, checked_number, checked_shape
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -165,15 +166,15 @@ def _check(
     frame_rate_hz: float,
     motion_per_key: float,
 ) -> None:
-    if len(shape) != 2 or min(shape) < 1:
-        raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
+    checked_shape(shape)
     if texture.ndim != 2 or not texture.size or not (texture.min() >= 0 and texture.max() <= 1):
         raise InputError(f"texture has shape {texture.shape}; it must be (n, m) with values in [0, 1]")
-    if not np.isfinite(velocity_px_s).all():
-        raise InputError(f"velocity_px_s is {velocity_px_s}; it must be finite")
-    if not 0 <= light[0] < light[1] < np.inf:
-        raise InputError(f"light is {light}; it must be (dark, bright) with 0 <= dark < bright")
-    positive = {"texel_px": texel_px, "frame_rate_hz": frame_rate_hz, "motion_per_key": motion_per_key}
-    for name, value in positive.items():
-        if not 0 < value < np.inf:
-            raise InputError(f"{name} is {value}; it must be positive and finite")
+    for axis in (0, 1):
+        checked_number(velocity_px_s[axis], f"velocity_px_s[{axis}]", -MOST_PLACE, MOST_PLACE)
+    if not 0 <= light[0] < light[1] <= MOST_LIGHT:
+        raise InputError(f"light is {light}; it must be (dark, bright) with 0 <= dark < bright <= {MOST_LIGHT:g}")
+    checked_number(frame_rate_hz, "frame_rate_hz", *FRAME_RATES_HZ)
+    checked_number(motion_per_key, "motion_per_key", 1e-9, MOST_PLACE)
+    checked_number(texel_px, "texel_px", 1e-3, 1e3)
+    samples = texture.size * (texel_px * SAMPLES_PER_PIXEL) ** 2
+    checked_memory(int(32 * max(samples, texture.size)), f"a texture of {texture.shape} texels of {texel_px:g} pixels")

@@ -8,15 +8,20 @@ from __future__ import annotations
 import math
 import operator
 import os
+import shutil
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from spikecam_env.errors import InputError
 
 MOST_PIXELS = 1 << 26
 """Largest picture [pixels], 8192 x 8192: 64 times that of the largest spike camera."""
 LARGEST_SEED = 2**63 - 1
-"""Seeds are held as signed 64-bit numbers, in files and in compiled code."""
+"""Largest seed of a user: files hold signed 64-bit numbers."""
+LARGEST_DERIVED_SEED = 2**128 - 1
+"""Largest seed of a sensor, which may be made from a user's by arithmetic."""
 LARGEST_COUNT = 2**53
 """Whole numbers beyond are not exact as float64, in which JSON tools hold them."""
 
@@ -28,33 +33,67 @@ def checked_shape(shape: Any, name: str = "shape") -> tuple[int, int]:
     except (TypeError, ValueError):
         rows = columns = 0
     if rows < 1 or columns < 1:
-        raise InputError(f"{name} = {_shown(shape)}; it must be two positive whole numbers, (rows, columns)")
+        raise InputError(f"{_said(name, shape)}; it must be two positive whole numbers, (rows, columns)")
     if rows * columns > MOST_PIXELS:
-        raise InputError(f"{name} = {_shown(shape)}; it must be at most {MOST_PIXELS} pixels (8192 x 8192)")
+        raise InputError(f"{_said(name, shape)}; it must be at most {MOST_PIXELS} pixels (8192 x 8192)")
     return rows, columns
 
 
-def checked_count(count: Any, name: str = "frames") -> int:
-    """A whole number, 1 or more."""
-    return _checked_whole(count, name, 1, LARGEST_COUNT)
+def checked_count(count: Any, name: str = "frames", most: int = LARGEST_COUNT) -> int:
+    """A whole number, 1 to `most`."""
+    return checked_whole(count, name, 1, most)
 
 
-def checked_seed(seed: Any, name: str = "seed") -> int:
-    """A whole number, 0 to LARGEST_SEED."""
-    return _checked_whole(seed, name, 0, LARGEST_SEED)
+def checked_seed(seed: Any, name: str = "seed", most: int = LARGEST_SEED) -> int:
+    """A whole number, 0 to `most`."""
+    return checked_whole(seed, name, 0, most)
+
+
+def checked_whole(value: Any, name: str, least: int = -LARGEST_COUNT, most: int = LARGEST_COUNT) -> int:
+    """A whole number from `least` to `most`; true and false are none."""
+    try:
+        number = _whole(value)
+    except TypeError:
+        number = least - 1
+    if not least <= number <= most:
+        rule = f"{least} or more" if number < least else f"{least} to {most}"
+        raise InputError(f"{_said(name, value)}; it must be a whole number, {rule}")
+    return number
 
 
 def checked_number(
     value: Any, name: str, least: float = -math.inf, most: float = math.inf, *, unit: str = "", above: bool = False
 ) -> float:
     """A finite number from `least` to `most`; `above`: not `least` itself."""
-    try:
-        number = math.nan if isinstance(value, (bool, str, bytes)) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = as_number(value)
     if not (math.isfinite(number) and least <= number <= most) or (above and number == least):
-        raise InputError(f"{name} = {_shown(value)}; it must be {_range(least, most, above)}{unit and f' {unit}'}")
+        raise InputError(f"{_said(name, value)}; it must be {_range(least, most, above)}{unit and f' {unit}'}")
     return number
+
+
+def checked_above_zero(value: Any, name: str) -> float:
+    """A number above 0, which may be infinite."""
+    number = as_number(value)
+    if not number > 0:
+        raise InputError(f"{_said(name, value)}; it must be a number above 0, or inf")
+    return number
+
+
+def as_number(value: Any) -> float:
+    """A number as a float; NaN for text, true and false, and whatever else is no number or too large for a float."""
+    try:
+        return math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def shown(value: Any) -> str:
+    """A value in an error's text: at most 60 characters."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
+        return f"a {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def checked_memory(size: int, what: str) -> None:
@@ -64,6 +103,16 @@ def checked_memory(size: int, what: str) -> None:
         raise InputError(
             f"{what} would take {size / 1e9:.3g} GB of memory, this machine has {most / 1e9:.3g}; ask less"
         )
+
+
+def checked_disk(size: int, path: str | Path, what: str) -> None:
+    """Raises InputError where so many bytes are more than is free where `path` is or will be."""
+    place = Path(path).absolute()
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    free = shutil.disk_usage(place).free
+    if size > free:
+        raise InputError(f"{what} would take {size / 1e9:.3g} GB on disk; {place} has {free / 1e9:.3g} GB free")
 
 
 def memory_bytes() -> int:
@@ -80,15 +129,11 @@ def memory_bytes() -> int:
     return most
 
 
-def _checked_whole(value: Any, name: str, least: int, most: int) -> int:
-    try:
-        number = _whole(value)
-    except TypeError:
-        number = least - 1
-    if not least <= number <= most:
-        rule = f"{least} or more" if number < least else f"{least} to {most}"
-        raise InputError(f"{name} = {_shown(value)}; it must be a whole number, {rule}")
-    return number
+def _said(name: str, value: Any) -> str:
+    """A name and its value; options of a command as they are typed."""
+    if not name.startswith("--"):
+        return f"{name} = {shown(value)}"
+    return f"{name} {' '.join(shown(item) for item in value) if isinstance(value, tuple) else shown(value)}"
 
 
 def _whole(value: Any) -> int:
@@ -103,11 +148,3 @@ def _range(least: float, most: float, above: bool) -> str:
     if most == math.inf:
         return f"a finite number {'above' if above else 'of at least'} {least:g}"
     return f"a number {'above' if above else 'from'} {least:g} {'and up to' if above else 'to'} {most:g}"
-
-
-def _shown(value: Any) -> str:
-    try:
-        text = repr(value)
-    except ValueError:  # whole numbers of more than 4300 digits have no text
-        return f"a {type(value).__name__}"
-    return text if len(text) <= 60 else f"{text[:57]}..."

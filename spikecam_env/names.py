@@ -11,6 +11,7 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import Path, PureWindowsPath
 
+from spikecam_env.checked import shown
 from spikecam_env.errors import InputError
 
 MOST_BYTES = 180
@@ -29,19 +30,20 @@ def file_name(text: str, what: str) -> str:
     """
     rule = _broken_rule(text)
     if rule:
-        raise InputError(f"{what} {_shown(text)} {rule}; give a plain file name: letters, digits, dots, dashes")
+        raise InputError(f"{what} {shown(text)} {rule}; give a plain file name: letters, digits, dots, dashes")
     return text
 
 
 def distinct(names: Iterable[str], what: str) -> None:
     """Raises InputError where two names are one file: the same text, or the same but for upper and lower case."""
-    seen: dict[str, str] = {}
+    seen: dict[str, list[str]] = {}
     for name in names:
-        key = unicodedata.normalize("NFC", name).casefold()
-        if key in seen:
-            same = "" if seen[key] == name else f" and {seen[key]!r}, one file where case does not count"
-            raise InputError(f"two {what}s are named {name!r}{same}; give each a name of its own")
-        seen[key] = name
+        seen.setdefault(unicodedata.normalize("NFC", name).casefold(), []).append(name)
+    for same in seen.values():
+        if len(same) > 1 and len(set(same)) == 1:
+            raise InputError(f"{len(same)} {what}s are named {same[0]!r}; give them names of their own")
+        if len(same) > 1:
+            raise InputError(f"{what}s {same[0]!r} and {same[1]!r} are one file where case does not count; rename one")
 
 
 def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -> Path:
@@ -52,7 +54,7 @@ def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -
     """
     root = Path(folder)
     if not text or not text.isprintable() or not _encodes(text):
-        raise InputError(f"{what} {_shown(text)} is no path of a file")
+        raise InputError(f"{what} {shown(text)} is no path of a file")
     path = root / text
     if outside:
         return path
@@ -60,10 +62,10 @@ def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -
     try:
         leaves = absolute or ".." in PureWindowsPath(text).parts or not path.resolve().is_relative_to(root.resolve())
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, names too long
-        raise InputError(f"{what} {_shown(text)} cannot be read: {error}") from error
+        raise InputError(f"{what} {shown(text)} cannot be read: {error}") from error
     if leaves:
         raise InputError(
-            f"{what} {_shown(text)} is outside of {root}; copy the file there, or allow it (--outside, outside=True)"
+            f"{what} {shown(text)} is outside of {root}; copy the file there, or allow it (--outside, outside=True)"
         )
     return path
 
@@ -90,7 +92,3 @@ def _encodes(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
-
-
-def _shown(text: str) -> str:
-    return repr(text) if len(text) <= 60 else f"{text[:57]!r}..."

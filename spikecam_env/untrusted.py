@@ -12,11 +12,13 @@ Whatever is wrong is an InputError that names the file, the entry, its value and
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import sys
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -25,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory
+from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory, shown
 from spikecam_env.errors import InputError, unknown_name
 
 if sys.version_info >= (3, 11):
@@ -73,16 +75,28 @@ def declared(kind: type[D], data: Any, where: str) -> D:
         raise InputError(f"{where}: nested too deeply") from error
 
 
+def checked_format(data: Any, expected: str, where: str) -> dict[str, Any]:
+    """The data; raises InputError unless it is a table whose entry `format` is the one expected."""
+    found = data.get("format") if isinstance(data, dict) else type(data).__name__
+    if found != expected:
+        raise InputError(f"{where}: format is {shown(found)}, expected {expected!r}")
+    return data  # type: ignore[no-any-return]
+
+
 def read_json(path: str | Path) -> Any:
     """The value in a JSON file.
 
     Raises InputError where it is missing, too large, not UTF-8, not JSON, nested too deeply or has NaN or Infinity.
     """
-    text = read_text(path)
+    return parse_json(read_text(path), str(path))
+
+
+def parse_json(text: str, where: str) -> Any:
+    """The value in a JSON text; raises InputError where it is not one."""
     try:
         return json.loads(text, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not JSON: {_short(error)}") from error
+        raise InputError(f"{where} is not a JSON file: {_short(error)}") from error
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -95,7 +109,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where} is not TOML: {_short(error)}") from error
+        raise InputError(f"{where} is not a TOML file: {_short(error)}") from error
 
 
 def read_text(path: str | Path) -> str:
@@ -110,6 +124,48 @@ def read_text(path: str | Path) -> str:
         raise InputError(f"cannot read {source}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{source} is not UTF-8 text: {_short(error)}") from error
+
+
+def read_table(
+    path: str | Path, columns: Collection[str], needed: Sequence[str] = ()
+) -> list[tuple[int, dict[str, str]]]:
+    """Rows of a CSV table whose first line names its columns: (line, cell by column), text without spaces about it.
+
+    columns: those allowed.  needed: those that must be there.  A row may be shorter than the columns, not longer.
+    Raises InputError, with the line, for unknown, repeated and missing columns, rows that are too long, and no table.
+    """
+    lines = csv.reader(io.StringIO(read_text(path), newline=""), skipinitialspace=True)
+    rows: list[tuple[int, dict[str, str]]] = []
+    try:
+        names = [name.strip() for name in next(lines, [])]
+        for name in names:
+            if name not in columns:
+                raise unknown_name(f"column of {path}", name, columns)
+            if names.count(name) > 1:
+                raise InputError(f"{path} has {names.count(name)} columns {name!r}; leave one")
+        for name in needed:
+            if name not in names:
+                raise InputError(
+                    f"{path} has no column {name!r}; its first line must name the columns: {','.join(needed)}"
+                )
+        for cells in lines:
+            if len(cells) > len(names):
+                raise InputError(f"{path}, line {lines.line_num} has more cells than there are columns")
+            if cells:
+                rows.append((lines.line_num, dict(zip(names, (cell.strip() for cell in cells), strict=False))))
+    except csv.Error as error:
+        raise InputError(f"{path}, line {lines.line_num} is no line of a table: {_short(error)}") from error
+    return rows
+
+
+def array_names(path: str | Path) -> set[str]:
+    """Names of the arrays of an `.npz`; raises InputError where it is missing or none."""
+    source = existing_file(path)
+    try:
+        with zipfile.ZipFile(source) as archive:
+            return {name.removesuffix(".npy") for name in archive.namelist()}
+    except Exception as error:
+        raise InputError(f"{source} is not a readable .npz of plain arrays ({_short(error)})") from error
 
 
 def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[str, NDArray[Any]]:
@@ -265,23 +321,18 @@ def _no_constant(name: str) -> Any:
 def _as_input_error(error: ValidationError, kind: type[BaseModel], where: str) -> InputError:
     first = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in first["loc"])
-    value = _shown(first["input"])
+    value = shown(first["input"])
     if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
         return unknown_name(f"entry of {where}", first["loc"][0], kind.model_fields)
     if first["type"] == "missing":
         return InputError(f"{where}: {place} is missing")
     if first["type"] == "value_error":
         return InputError(f"{where}: {place or 'it'} = {value}: {first['ctx']['error']}")
+    if first["type"] == "literal_error":
+        allowed = first["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
+        return InputError(f"{where}: {place} = {value}; choose one of {allowed}")
     message = first["msg"].removeprefix("Input should ")
     return InputError(f"{where}: {place or 'it'} = {value}; it should {message}")
-
-
-def _shown(value: Any) -> str:
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
-        return f"a {type(value).__name__}"
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _short(error: BaseException) -> str:

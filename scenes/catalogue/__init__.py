@@ -33,9 +33,10 @@ from scenes.catalogue import (
     tumble,
 )
 from scenes.exposure import expose
-from scenes.protocol import Scene
+from scenes.protocol import FRAME_RATES_HZ, Scene
 from scenes.renderers.protocol import Renderer
 from scenes.world import World
+from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_number, checked_seed, checked_shape
 from spikecam_env.errors import unknown_name
 
 SCENES: dict[str, Callable[..., Scene]] = {
@@ -78,6 +79,8 @@ def make_scene(
     """
     if name not in SCENES:
         raise unknown_name("scene", name, SCENES)
+    shape, seed = checked_shape(shape), checked_seed(seed, most=LARGEST_DERIVED_SEED)
+    checked_number(frame_rate_hz, "frame_rate_hz", *FRAME_RATES_HZ)
     scene, metered = SCENES[name](shape, seed, frame_rate_hz, renderer), None
     if isinstance(scene, World) and shape[0] > METERED_ROWS:
         metered = replace(scene, shape=(METERED_ROWS, max(1, round(METERED_ROWS * shape[1] / shape[0]))))

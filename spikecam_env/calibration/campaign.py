@@ -9,28 +9,41 @@ campaign.json, format `spikecam-campaign/1` (docs/calibration.md):
 
 spikes: `.dat`, unflipped.  radiance: npz with `frame` (K,) and `radiance` (K, H, W) or broadcastable, linear between
 keys; null = an unknown static scene.  Instead of spikes, rates: npz with `rate` (H, W) [spikes/frame] and `frames`.
+Names are plain file names, and files lie in the folder.
 """
 
 from __future__ import annotations
 
-import json
-import zipfile
-from collections.abc import Mapping
+import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.checked import checked_count, checked_memory, checked_shape
+from spikecam_env.errors import InputError
+from spikecam_env.names import distinct, file_name, inside
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import load_vidar_dat
 from spikecam_env.streams.packing import packed_bytes
+from spikecam_env.untrusted import (
+    Count,
+    Declared,
+    Name,
+    Positive,
+    Side,
+    checked_format,
+    declared,
+    number,
+    numbers,
+    read_arrays,
+    read_json,
+)
 
 FORMAT = "spikecam-campaign/1"
 USES = ("fit", "holdout")
-_ENTRIES = ("name", "spikes", "rates", "frames", "radiance", "use", "v_d", "temperature_k", "note")
 
 
 @dataclass(frozen=True)
@@ -56,14 +69,14 @@ class CampaignRecording:
         """What the camera was shown; None where that is unknown."""
         if self.radiance is None:
             return None
-        arrays = _read_npz(self.radiance, ("frame", "radiance"), self.name)
-        frame, radiance = np.atleast_1d(arrays["frame"]), arrays["radiance"]
+        where = f"recording {self.name!r}"
+        frame, radiance = read_light(self.radiance, where)
+        checked_memory(4 * frame.size * math.prod(self.shape), f"{where}: light at {frame.size} keys")
         try:
-            shown = np.broadcast_to(radiance.astype(np.float32), (frame.size, *self.shape))
-            return Keyframes(frame.astype(np.float64), shown)
+            return Keyframes(frame, np.broadcast_to(radiance.astype(np.float32), (frame.size, *self.shape)))
         except ValueError as error:
             raise InputError(
-                f"recording {self.name!r}: {self.radiance.name} holds frame {frame.shape}, radiance {radiance.shape}, "
+                f"{where}: {self.radiance.name} holds frame {frame.shape}, radiance {radiance.shape}, "
                 f"unusable for {self.shape} pixels: {error}"
             ) from error
 
@@ -86,7 +99,7 @@ class CampaignRecording:
         """(H, W) measured rates of a recording that is rates only [spikes/frame]."""
         if self.rates is None:
             raise InputError(f"recording {self.name!r} is a stream of spikes; read it with load() or packed()")
-        return _read_rates(self.rates, self.name, self.shape)[0]
+        return _rates(self.rates, self.name, self.shape)[0]
 
     def _stream(self) -> Path:
         if self.spikes is None:
@@ -104,65 +117,107 @@ class Campaign:
     recordings: tuple[CampaignRecording, ...]
 
 
-def read_campaign(folder: str | Path) -> Campaign:
-    """Read and check a campaign; raises InputError that names the recording for anything missing or contradictory."""
+class _Camera(Declared):
+    height: Side
+    width: Side
+    frame_rate_hz: Positive
+
+
+class _Entry(Declared):
+    """A recording in campaign.json."""
+
+    name: Name
+    spikes: Name | None = None
+    rates: Name | None = None
+    frames: Count | None = None
+    radiance: Name | None = None
+    use: Literal["fit", "holdout"] = "fit"
+    v_d: Positive | None = None
+    temperature_k: Positive | None = None
+    note: str = ""
+
+
+class _CampaignFile(Declared):
+    format: str
+    camera: _Camera
+    recordings: list[_Entry]
+
+
+def read_campaign(folder: str | Path, *, outside: bool = False) -> Campaign:
+    """Read and check a campaign.
+
+    outside: read files that lie outside of the folder too, by `..`, from the root, or over symbolic links.
+    Raises InputError that names the recording for anything missing or contradictory.
+    """
     root = Path(folder)
-    try:
-        data = json.loads((root / "campaign.json").read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{root} is no campaign: cannot read its campaign.json ({error.strerror})") from error
-    except ValueError as error:
-        raise InputError(f"{root / 'campaign.json'} is not JSON: {error}") from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        found = data.get("format") if isinstance(data, dict) else type(data).__name__
-        raise InputError(f"{root / 'campaign.json'}: format is {found!r}, expected {FORMAT!r}")
-    shape, frame_rate_hz = _camera(data.get("camera"))
-    entries = data.get("recordings")
-    if not isinstance(entries, list) or not entries:
-        raise InputError(f"{root / 'campaign.json'} lists no recordings")
-    recordings = tuple(_recording(root, shape, entry) for entry in entries)
-    names = [r.name for r in recordings]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"recording {name!r} is listed {names.count(name)} times; names must differ")
-    return Campaign(root, shape, frame_rate_hz, recordings)
+    path = root / "campaign.json"
+    if not path.is_file():
+        raise InputError(f"{root} is no campaign: there is no campaign.json in it")
+    file = declared(_CampaignFile, checked_format(read_json(path), FORMAT, str(path)), str(path))
+    shape = checked_shape((file.camera.height, file.camera.width), f"{path}: camera")
+    if not file.recordings:
+        raise InputError(f"{path} lists no recordings")
+    recordings = tuple(_recording(root, shape, entry, outside) for entry in file.recordings)
+    distinct((r.name for r in recordings), "recording")
+    return Campaign(root, shape, file.camera.frame_rate_hz, recordings)
 
 
-def _camera(camera: Any) -> tuple[tuple[int, int], float]:
-    if not isinstance(camera, Mapping):
-        raise InputError("campaign.json needs a camera: height, width and frame_rate_hz")
-    height, width = (_positive(camera.get(key), f"camera.{key}", whole=True) for key in ("height", "width"))
-    return (int(height), int(width)), _positive(camera.get("frame_rate_hz"), "camera.frame_rate_hz")
+def read_light(path: Path, where: str) -> tuple[NDArray[np.float64], NDArray[Any]]:
+    """Light over time, frame (K,) and radiance as they are stored in an npz of these names.
+
+    Raises InputError for other arrays, and radiance that is no number, negative or larger than float32 holds.
+    """
+    where = f"{where}: {path.name}"
+    arrays = read_arrays(path, ("frame", "radiance"))
+    frame = np.atleast_1d(numbers(arrays["frame"], "frame", where)).astype(np.float64)
+    radiance = numbers(arrays["radiance"], "radiance", where)
+    if not (radiance.size and np.all((radiance >= 0) & (radiance <= np.finfo(np.float32).max))):
+        raise InputError(
+            f"{where}: radiance of shape {radiance.shape} must be finite and >= 0 (1.0 = one spike a frame)"
+        )
+    return frame, radiance
 
 
-def _recording(root: Path, shape: tuple[int, int], entry: Any) -> CampaignRecording:
-    if not isinstance(entry, Mapping) or not isinstance(entry.get("name"), str):
-        raise InputError(f"campaign.json: recording {entry!r} has no name")
-    name = entry["name"]
-    for key in entry:
-        if key not in _ENTRIES:
-            raise unknown_name(f"entry of recording {name!r}", key, _ENTRIES)
-    use = entry.get("use", "fit")
-    if use not in USES:
-        raise unknown_name(f"use of recording {name!r}", use, USES)
-    spikes, rates, radiance = (_file(root, name, key, entry.get(key)) for key in ("spikes", "rates", "radiance"))
+def read_rates(path: Path, where: str) -> tuple[NDArray[np.float64], int]:
+    """Rates (H, W) [spikes/frame] and the frames they were counted over, from an npz of `rate` and `frames`.
+
+    Raises InputError for other arrays, and for rates that are not 0 to 1.
+    """
+    where = f"{where}: {path.name}"
+    arrays = read_arrays(path, ("rate", "frames"))
+    rate = numbers(arrays["rate"], "rate", where).astype(np.float64)
+    if rate.ndim != 2 or not rate.size:
+        raise InputError(f"{where}: rate is {rate.shape}; it must be (rows, columns)")
+    if not np.all((rate >= 0) & (rate <= 1)):
+        raise InputError(f"{where}: rate runs from {rate.min():g} to {rate.max():g}; a pixel has 0 to 1 spikes a frame")
+    frames = number(arrays, "frames", where)
+    if not frames.is_integer():
+        raise InputError(f"{where}: frames = {frames:g}; it must be a whole number, 1 or more")
+    return rate, checked_count(int(frames), f"{where}: frames")
+
+
+def _recording(root: Path, shape: tuple[int, int], entry: _Entry, outside: bool) -> CampaignRecording:
+    name = file_name(entry.name, "recording name")
+    spikes, rates, radiance = (
+        _file(root, name, key, getattr(entry, key), outside) for key in ("spikes", "rates", "radiance")
+    )
     if (spikes is None) == (rates is None):
         raise InputError(f"recording {name!r} needs either spikes (a .dat) or rates (an .npz)")
+    frames = entry.frames
     if rates is not None:
-        frames = _read_rates(rates, name, shape)[1]
-    else:
-        frames = int(_positive(entry.get("frames"), f"recording {name!r}: frames", whole=True))
-        _check_length(spikes, name, frames, shape)
-    optional = {
-        key: None if entry.get(key) is None else _positive(entry[key], f"recording {name!r}: {key}")
-        for key in ("v_d", "temperature_k")
-    }
-    note = str(entry.get("note", ""))
-    return CampaignRecording(name, shape, frames, spikes, rates, radiance, use, **optional, note=note)
+        frames = _rates(rates, name, shape)[1]
+    if frames is None:
+        raise InputError(f"recording {name!r}: frames is missing; say how many the spikes have")
+    _check_length(spikes, name, frames, shape)
+    return CampaignRecording(
+        name, shape, frames, spikes, rates, radiance, entry.use, entry.v_d, entry.temperature_k, entry.note
+    )
 
 
 def _check_length(spikes: Path | None, name: str, frames: int, shape: tuple[int, int]) -> None:
-    size, frame = spikes.stat().st_size if spikes else 0, packed_bytes(shape)
+    if spikes is None:
+        return
+    size, frame = spikes.stat().st_size, packed_bytes(shape)
     if size != frames * frame:
         raise InputError(
             f"recording {name!r}: {spikes} has {size} bytes, {frames} frames of {shape[0]} x {shape[1]} pixels take "
@@ -170,41 +225,17 @@ def _check_length(spikes: Path | None, name: str, frames: int, shape: tuple[int,
         )
 
 
-def _file(root: Path, name: str, key: str, value: Any) -> Path | None:
-    if value is None:
+def _file(root: Path, name: str, key: str, text: str | None, outside: bool) -> Path | None:
+    if text is None:
         return None
-    path = root / str(value)
+    path = inside(root, text, f"recording {name!r}: {key}", outside=outside)
     if not path.is_file():
         raise InputError(f"recording {name!r}: its {key} file {path} is missing; add it or drop the recording")
     return path
 
 
-def _read_rates(path: Path, name: str, shape: tuple[int, int]) -> tuple[NDArray[np.float64], int]:
-    arrays = _read_npz(path, ("rate", "frames"), name)
-    rate = arrays["rate"].astype(np.float64)
+def _rates(path: Path, name: str, shape: tuple[int, int]) -> tuple[NDArray[np.float64], int]:
+    rate, frames = read_rates(path, f"recording {name!r}")
     if rate.shape != shape:
         raise InputError(f"recording {name!r}: rate in {path.name} is {rate.shape}, the camera {shape}")
-    if not np.all((rate >= 0) & (rate <= 1)):
-        raise InputError(
-            f"recording {name!r}: rate in {path.name} runs from {rate.min():g} to {rate.max():g}; a pixel has 0 to 1 "
-            "spikes a frame"
-        )
-    return rate, int(_positive(arrays["frames"].item(), f"recording {name!r}: frames", whole=True))
-
-
-def _read_npz(path: Path, keys: tuple[str, ...], name: str) -> dict[str, NDArray[Any]]:
-    try:
-        with np.load(path) as arrays:
-            missing = [key for key in keys if key not in arrays]
-            if missing:
-                raise InputError(f"recording {name!r}: {path.name} lacks {', '.join(missing)}; it has {arrays.files}")
-            return {key: arrays[key] for key in keys}
-    except (OSError, zipfile.BadZipFile, AttributeError) as error:
-        raise InputError(f"recording {name!r}: {path} is not a readable npz: {error}") from error
-
-
-def _positive(value: Any, what: str, *, whole: bool = False) -> float:
-    ok = isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value < np.inf
-    if not ok or (whole and value != int(value)):
-        raise InputError(f"{what} = {value!r}; it must be a positive {'whole ' if whole else ''}number")
-    return value
+    return rate, frames

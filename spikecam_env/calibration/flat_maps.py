@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
+from spikecam_env.untrusted import numbers, read_arrays
 
 Array = NDArray[np.float64]
 
@@ -38,6 +39,9 @@ _SEARCH = 0.25
 """How far a dark count may be from that of the maps' correction, relative; two counts more for the darkest."""
 
 _WHOLE = 1e-3
+
+_MOST = 1e9
+"""Of D_light and Nd, and of 1 / Nd [lux]: far beyond any map, far from where numbers overflow."""
 
 
 @dataclass(frozen=True)
@@ -58,15 +62,12 @@ def read_flat_maps(path: Path) -> FlatMaps:
 
     Errors: InputError for a file that cannot be read, maps that differ in shape, values that no camera can have.
     """
-    try:
-        with np.load(path) as arrays:
-            between, dark_lux = (np.asarray(arrays[name], np.float64) for name in ("D_light", "Nd"))
-    except (OSError, KeyError) as error:
-        raise InputError(f"cannot read flat maps from {path}: {error}; give an npz with D_light and Nd") from error
-    if between.ndim != 2 or between.shape != dark_lux.shape:
+    arrays = read_arrays(path, ("D_light", "Nd"))
+    between, dark_lux = (numbers(array, name, str(path)).astype(np.float64) for name, array in arrays.items())
+    if between.ndim != 2 or not between.size or between.shape != dark_lux.shape:
         raise InputError(f"{path}: D_light is {between.shape}, Nd {dark_lux.shape}; both must be (rows, columns)")
-    if not (between.min() >= 0 and dark_lux.min() > 0 and np.isfinite(between + dark_lux).all()):
-        raise InputError(f"{path}: D_light must be 0 or more and Nd above 0, all finite; these are no flat maps")
+    if not (np.all((between >= 0) & (between <= _MOST)) and np.all((dark_lux >= 1 / _MOST) & (dark_lux <= _MOST))):
+        raise InputError(f"{path}: D_light must be 0 or more and Nd above 0, at most {_MOST:g}; these are no flat maps")
     corrected = 1.0 / (between * (LUX + dark_lux) / dark_lux + 1.0)
     dark, dim, off = _whole_counts(dark_lux.ravel(), FRAMES * corrected.ravel())
     counted = (off < _WHOLE).reshape(between.shape)

@@ -20,6 +20,7 @@ from spikecam_env.calibration.response import rates_from_times
 from spikecam_env.calibration.spike_times import SpikeTimes, spike_times
 from spikecam_env.errors import InputError
 from spikecam_env.streams import pack_frames
+from spikecam_env.untrusted import read_arrays
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,10 @@ QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99)
 
 def read_wall(folder: str | Path) -> NDArray[np.uint8]:
     """(T, rows, columns) uint8 spikes of the bare wall."""
-    spikes = _array(Path(folder) / "wall.npz", "arr_0")
+    path = Path(folder) / "wall.npz"
+    spikes = read_arrays(path, ("arr_0",))["arr_0"]
+    if spikes.ndim != 3 or spikes.dtype not in (np.uint8, np.int8, np.bool_):
+        raise InputError(f"{path}: arr_0 is {spikes.dtype} of shape {spikes.shape}; it must be spikes, time last")
     return np.ascontiguousarray(np.moveaxis(spikes, 2, 0)[:, WALL[0], WALL[1]])
 
 
@@ -45,14 +49,6 @@ def read_response_and_dark(folder: str | Path) -> tuple[Array, Array]:
     """(H, W) rates at 335 lux less the dark's, and in the dark [spikes/frame], of the flat maps."""
     maps = read_flat_maps(Path(folder) / MAPS)
     return maps.lit - maps.dark, maps.dark
-
-
-def _array(path: Path, name: str) -> NDArray[np.generic]:
-    try:
-        with np.load(path) as arrays:
-            return arrays[name]
-    except (OSError, KeyError) as error:
-        raise InputError(f"cannot read {name} from {path}: {error}; give the folder of the real recordings") from error
 
 
 @dataclass(frozen=True)

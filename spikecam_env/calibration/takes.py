@@ -23,8 +23,10 @@ from spikecam_env.calibration.campaign import USES, Campaign, read_campaign
 from spikecam_env.calibration.campaign_files import campaign_folder, finish_campaign, save_light, save_spikes
 from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.names import distinct, file_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams.packing import packed_bytes
+from spikecam_env.untrusted import read_json
 from spikecam_env.version import __version__
 from spikecam_env.whole import write_text_whole
 
@@ -150,14 +152,8 @@ def _entry(take: Take, model: SensorModel) -> dict[str, Any]:
 def _check(takes: Sequence[Take], shape: tuple[int, int]) -> None:
     if not takes:
         raise InputError("a campaign needs at least one recording; give some")
-    names = [take.name for take in takes]
+    distinct((file_name(take.name, "recording name") for take in takes), "recording")
     for take in takes:
-        if not take.name or take.name != Path(take.name).name or take.name.startswith("."):
-            raise InputError(f"recording name {take.name!r} must be a plain file name: letters, digits, dots, dashes")
-        if names.count(take.name) > 1:
-            raise InputError(
-                f"{names.count(take.name)} recordings are named {take.name!r}; give them names of their own"
-            )
         if take.use not in USES:
             raise unknown_name(f"use of recording {take.name!r}", take.use, USES)
         checked_count(take.frames)
@@ -206,7 +202,7 @@ def _claim(target: Path, model: SensorModel, plan: dict[str, Any]) -> None:
 
 def _same_simulation(target: Path, model: SensorModel, plan: dict[str, Any]) -> bool:
     try:
-        found = json.loads((target / "simulation.json").read_text(encoding="utf-8"))
+        found = read_json(target / "simulation.json")
         return bool(found == plan and SensorModel.from_toml(target / "model.toml") == model)
-    except (OSError, ValueError):
+    except InputError:
         return False

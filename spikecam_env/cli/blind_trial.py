@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import spikecam_env
+from spikecam_env.cli.options import Count, Workers
 from spikecam_env.errors import InputError
 
 WORLD = Path(spikecam_env.__file__).resolve().parents[1] / "tests" / "hidden_world"
@@ -32,13 +33,13 @@ class BlindTrial:
     """Which set of cases."""
     part: Literal["tune", "report", "verify"] = "tune"
     """Disjoint seeds: one to work on, two to judge by, of other outside mechanisms; `verify` was looked at last."""
-    jobs: int = 1
+    jobs: Workers = 1
     """Cases at once, each in a process of its own."""
-    threads: int = 1
+    threads: Workers = 1
     """Threads of each diagnosis."""
     only: list[str] = field(default_factory=list)
     """Groups: none, strong, weak, base, outside, left_out, pair, tricky, severe; default all."""
-    limit: int | None = None
+    limit: Count | None = None
     """At most so many cases of each group."""
     record: Path | None = None
     """File that holds all results, a line each: what it has is not done again, and what is done is written to it."""
@@ -52,9 +53,6 @@ class BlindTrial:
     def run(self) -> None:
         from tqdm import tqdm
 
-        for name in ("jobs", "threads", "limit"):
-            if getattr(self, name) is not None and getattr(self, name) < 1:
-                raise InputError(f"{name} = {getattr(self, name)}; it must be at least 1")
         trial = hidden_world(self.world)
         record = importlib.import_module("tests.hidden_world.record")
         try:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import tyro
 
+from spikecam_env.cli.options import Positive
+
 
 @dataclass
 class Calibrate:
@@ -19,14 +21,17 @@ class Calibrate:
     """Folder with a campaign.json (format spikecam-campaign/1)."""
     out: Path
     """Folder for the results."""
-    reset_noise_mv: float | None = None
+    reset_noise_mv: Positive | None = None
     """Reset noise taken as known where there is one V_d; default sqrt(kT/C)."""
+    outside: bool = False
+    """Read files of the campaign that lie outside of its folder too."""
 
     def run(self) -> None:
-        from spikecam_env.calibration import calibrate, findings, save_calibration
+        from spikecam_env.calibration import calibrate, findings, read_campaign, save_calibration
         from spikecam_env.cli.table import table
 
-        calibration = calibrate(self.campaign, reset_noise_mV=self.reset_noise_mv, progress=True)
+        campaign = read_campaign(self.campaign, outside=self.outside)
+        calibration = calibrate(campaign, reset_noise_mV=self.reset_noise_mv, progress=True)
         rows = [
             {"quantity": f.quantity, "value (90 %)": f.text, "unit": f.unit or "-", "status": f.status, "from": f.basis}
             for f in findings(calibration)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
 
 if TYPE_CHECKING:
     from spikecam_env.calibration import Campaign as Folder
@@ -26,11 +27,11 @@ class Simulate:
     out: tyro.conf.Positional[Path]
     """Folder for the campaign."""
     camera: Camera = field(default_factory=Camera)
-    shape: tuple[int, int] = (64, 64)
+    shape: Size = (64, 64)
     """Rows and columns."""
-    frames: int = 8000
+    frames: Count = 8000
     """Length of each recording; 40 000 are a second."""
-    seed: int = 0
+    seed: Seed = 0
     """Which unit of the model: its fixed pattern, and the noise of all recordings."""
     recording: Annotated[Repeated, tyro.conf.arg(metavar="KIND[:PARAM=VALUE,...]")] = ()
     """What to record instead of the standard design (dark, nine flats, step, bars, disk), which `standard` stands for;
@@ -79,21 +80,21 @@ class Import:
     label: Annotated[Repeated, tyro.conf.arg(metavar="FILE=RADIANCE")] = ()
     """What a recording was shown: a radiance (0 is dark), an .npz of light over time, `unknown` for a static scene, or
     `relative` for flat maps; may be repeated."""
-    frame_rate_hz: float | None = None
+    frame_rate_hz: Positive | None = None
     """Frames a second; needed where the files do not say."""
-    rows: tuple[int, int] | None = None
+    rows: tuple[Whole, Whole] | None = None
     """First and stop of the rows to keep."""
-    columns: tuple[int, int] | None = None
+    columns: tuple[Whole, Whole] | None = None
     """First and stop of the columns to keep."""
     holdout_share: float = 0.0
     """Share of every recording, its end, to hold out for judging."""
-    radiance_per_unit: float = 1.0
+    radiance_per_unit: Positive = 1.0
     """Radiance that 1 in the labels is, if they are in lux or another unit."""
-    height: int | None = None
+    height: Count | None = None
     """Rows in .dat files; default 250."""
-    width: int | None = None
+    width: Count | None = None
     """Columns in .dat files; default 400."""
-    crop_width: int | None = None
+    crop_width: Count | None = None
     """Columns of .dat files that are pixels, from the left."""
     flip: bool = False
     """Files store the bottom row first, as public Vidar .dat do."""
@@ -103,6 +104,8 @@ class Import:
     """Axis of time in .npz files: 0 or 2; default told from the spikes."""
     key: str | None = None
     """Name of the array in .npz files."""
+    outside: bool = False
+    """Read files that labels name outside of the folder too."""
 
     def run(self) -> None:
         from spikecam_env.gap import import_campaign, label_from_text, labels_from_table
@@ -123,6 +126,7 @@ class Import:
                 columns=self.columns,
                 holdout_share=self.holdout_share,
                 radiance_per_unit=self.radiance_per_unit,
+                outside=self.outside,
                 progress=True,
                 **reading,
                 **({"flip": True} if self.flip else {}),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.options import Count, Seed, Size, Whole, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.datasets import Plan
@@ -20,20 +21,20 @@ class Making:
 
     out: Path
     """Folder for the dataset; a run that was stopped goes on in it."""
-    frames: int = 1000
+    frames: Count = 1000
     """Spike frames of each scene; 40 000 are a second."""
-    size: tuple[int, int] = (250, 400)
+    size: Size = (250, 400)
     """Rows and columns; 500 800 is the other size in use."""
-    seed: int = 0
+    seed: Seed = 0
     """Of the scenes and the cameras; the same seed gives the same bytes."""
-    truth_every: int = 100
+    truth_every: Whole = 100
     """Frames between ground truths (radiance, flow, object number, depth, poses); 0: none."""
     mean_interval: float = 10.0
     """Exposure: frames between spikes, on average over the picture."""
     renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
     """Back-end that draws; auto: the best there is, and the same again when a run goes on."""
     camera: Camera = field(default_factory=Camera)
-    jobs: int = 1
+    jobs: Workers = 1
     """Worker processes on this machine, or workers of a local Ray cluster."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Work on a Ray cluster: its address, e.g. auto or ray-head:6379; `local` starts one of --jobs workers here."""
@@ -69,9 +70,9 @@ class SpiftN(Making):
     example:  spikecam dataset spift-n --out spift --jobs 2
     """
 
-    train: int = 100
+    train: Whole = 100
     """Scenes to train on."""
-    test: int = 10
+    test: Whole = 10
     """Scenes to test."""
 
     def run(self) -> None:
@@ -105,13 +106,15 @@ class Verify:
 
     folder: tyro.conf.Positional[Path]
     """Folder of the dataset."""
-    jobs: int = 1
+    jobs: Workers = 1
     """Files read at a time."""
+    outside: bool = False
+    """Read files that the dataset keeps outside of its folder too."""
 
     def run(self) -> None:
         from spikecam_env.datasets import verify
 
-        faults = verify(self.folder, jobs=self.jobs, progress=True)
+        faults = verify(self.folder, jobs=self.jobs, outside=self.outside, progress=True)
         print("\n".join(faults) if faults else f"{self.folder}: every file is there and as it was written")
         if faults:
             raise SystemExit(1)

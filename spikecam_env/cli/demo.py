@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.options import Count, Rpm, Seed, Size
 
 
 @dataclass
@@ -20,16 +21,16 @@ class Demo:
     """Folder for demo.mp4, demo.png and demo.json."""
     scene: str = "disk"
     """The rotating disk or another scene of `spikecam scenes`."""
-    rpm: float | None = None
+    rpm: Rpm | None = None
     """Speed of the disk; default 2000."""
-    frames: int = 1200
+    frames: Count = 1200
     """Spike frames to stream; 1200 are one turn at 2000 rpm."""
     mode: Literal["best", "paper"] = "best"
     """Which DnSS denoises the film."""
     camera: Camera = field(default_factory=Camera)
-    size: tuple[int, int] = (250, 400)
+    size: Size = (250, 400)
     """Rows and columns."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of the camera unit, its noise, and the scene."""
 
     def run(self) -> None:

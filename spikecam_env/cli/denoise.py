@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 import tyro
 
+from spikecam_env.cli.options import Count
+
 
 @dataclass
 class Denoise:
@@ -22,15 +24,15 @@ class Denoise:
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Literal["best", "paper"] = "best"
     """Which DnSS: `best`, or `paper` (the paper's network and decoder; slower)."""
-    window: int = 41
+    window: Count = 41
     """Frames averaged in the pictures (TFP window); odd."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised."""
-    height: int | None = None
+    height: Count | None = None
     """Rows of a .dat file (250 if not given)."""
-    width: int | None = None
+    width: Count | None = None
     """Columns of a .dat file (400 if not given)."""
-    crop_width: int | None = None
+    crop_width: Count | None = None
     """Columns of a .dat file to keep, where it holds wider rows (416 for 400)."""
     flip: bool = False
     """The file is stored bottom row first (public Vidar files are)."""
@@ -53,7 +55,7 @@ class Denoise:
         from spikecam_env.errors import InputError
         from spikecam_env.streams import SpikeWriter, middleTFP, read_recording
 
-        if self.window < 1 or self.window % 2 == 0:
+        if self.window % 2 == 0:
             raise InputError(f"--window {self.window}; it must be odd and at least 1 (41 is usual)")
         names = ("height", "width", "crop_width", "bit_order", "key", "time_axis")
         options = {name: getattr(self, name) for name in names if getattr(self, name) is not None}

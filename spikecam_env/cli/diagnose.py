@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
+from spikecam_env.cli.options import Effort, Seed, Workers
+
 if TYPE_CHECKING:
     from spikecam_env.gap.result import Diagnosis
 
@@ -29,32 +31,29 @@ class Diagnose:
     """Effects to try; default: all of the catalogue."""
     exclude: tuple[str, ...] = ()
     """Effects not to try."""
-    seed: int = 0
+    seed: Seed = 0
     """Of every simulation; the same seed gives the same result."""
-    jobs: int = 1
+    jobs: Workers = 1
     """Simulations at a time."""
-    effort: float = 60.0
+    effort: Effort = 60.0
     """Times the campaign may be simulated before nothing more is begun that an answer can do without; inf: no end."""
+    outside: bool = False
+    """Read files of the campaign that lie outside of its folder too."""
 
     def run(self) -> None:
+        from spikecam_env.calibration import read_campaign
         from spikecam_env.cli.files import out_folder
-        from spikecam_env.errors import InputError
         from spikecam_env.sensor import SensorModel
 
-        if self.jobs < 1:
-            raise InputError(f"--jobs {self.jobs}: it must be 1 or more")
-        if not (self.campaign / "campaign.json").is_file():
-            raise InputError(f"{self.campaign} is no campaign: there is no campaign.json in it")
-        if not self.effort > 0:
-            raise InputError(f"--effort {self.effort:g}: it must be above 0")
         SensorModel.load(self.model)
         self._known_effects()
+        campaign = read_campaign(self.campaign, outside=self.outside)
         from spikecam_env.gap.diagnose import diagnose
         from spikecam_env.gap.report import write_report
 
         with out_folder(self.out) as folder:
             diagnosis = diagnose(
-                self.campaign,
+                campaign,
                 self.model,
                 candidates=self.candidates,
                 exclude=self.exclude,

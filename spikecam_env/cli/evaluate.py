@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
+
+from spikecam_env.checked import checked_count
+from spikecam_env.cli.options import Checked, Seed
 
 
 @dataclass
@@ -24,9 +27,9 @@ class Evaluate:
     """Weights of the `paper` mode to evaluate instead of the shipped ones."""
     best: Path | None = None
     """Weights of the `best` mode to evaluate instead of the shipped ones."""
-    scenes: int = 2
+    scenes: Annotated[int, Checked(checked_count, most=1000)] = 2
     """Scenes in each class of speed and light; the same count again gives a finer mean."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of the held-out scenes, cameras and noise."""
 
     def run(self) -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import tyro
 
+from spikecam_env.cli.options import Seed, Workers
+
 
 @dataclass
 class Ladder:
@@ -21,24 +23,25 @@ class Ladder:
     """Folder for the results."""
     model: str = "ideal"
     """The first rung: a preset's name, or a model file (.toml)."""
-    seed: int = 0
+    seed: Seed = 0
     """Of every simulation; the same seed gives the same result."""
-    jobs: int = 1
+    jobs: Workers = 1
     """Simulations at a time."""
+    outside: bool = False
+    """Read files of the campaign that lie outside of its folder too."""
 
     def run(self) -> None:
+        from spikecam_env.calibration import read_campaign
         from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.table import table
-        from spikecam_env.errors import InputError
         from spikecam_env.sensor import SensorModel
 
-        if self.jobs < 1:
-            raise InputError(f"--jobs {self.jobs}: it must be 1 or more")
         SensorModel.load(self.model)
+        campaign = read_campaign(self.campaign, outside=self.outside)
         from spikecam_env.gap import ladder
 
         with out_folder(self.out) as folder:
-            made = ladder.ladder(self.campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
+            made = ladder.ladder(campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
             made.write(folder)
             print(table(ladder.table(made)))
             print(f"\ngap: mean square of {made.statistics} statistics' held-out part, in noise; 1 is chance")

@@ -20,6 +20,7 @@ from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.ladder import Ladder
+from spikecam_env.cli.options import check_options
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
@@ -69,6 +70,7 @@ def run(args: list[str] | None = None) -> int:
         union = command_type if union is None else Union[union, command_type]  # noqa: UP007
     command = tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=args, config=(tyro.conf.OmitArgPrefixes,))
     try:
+        check_options(command)
         command.run()
     except InputError as error:
         print(f"spikecam: {error}", file=sys.stderr)

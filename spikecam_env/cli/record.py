@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from spikecam_env.checked import checked_disk, checked_memory
 from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.options import Count, Rpm, Seed, Size
 from spikecam_env.errors import InputError
 
 
@@ -21,14 +23,14 @@ class Record:
     """Where to; .h5 (bit-packed with attributes), .dat (raw Vidar bits) or .npz (key `spikes`)."""
     scene: str = "disk"
     """What the camera looks at: the rotating disk, or another scene of `spikecam scenes`."""
-    frames: int = 4000
+    frames: Count = 4000
     """Spike frames to record; 40 000 are a second."""
     camera: Camera = field(default_factory=Camera)
-    rpm: float | None = None
+    rpm: Rpm | None = None
     """Speed of the disk; default 2000."""
-    size: tuple[int, int] = (250, 400)
+    size: Size = (250, 400)
     """Rows and columns."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of the camera unit, its noise and the scene."""
 
     def run(self) -> None:
@@ -39,14 +41,17 @@ class Record:
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
         from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
+        from spikecam_env.streams.packing import packed_bytes
 
         suffix = self.out.suffix.lower()
         if suffix not in (".h5", ".hdf5", ".dat", ".npz"):
             raise InputError(f"--out {self.out}: unknown file type {suffix!r}; use .h5, .dat or .npz")
         if not self.out.parent.is_dir():
             raise InputError(f"--out {self.out}: there is no folder {self.out.parent}; make it first")
-        if self.frames < 1:
-            raise InputError(f"--frames {self.frames}; record at least 1")
+        if suffix in (".h5", ".hdf5"):
+            checked_disk(self.frames * packed_bytes(self.size), self.out, f"--frames {self.frames}")
+        else:
+            checked_memory(3 * self.frames * math.prod(self.size), f"--frames {self.frames} in {suffix}")
         model = self.camera.load()
         sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
         scene = scene_named(self.scene, self.size, self.seed, model.frame_rate_hz, self.rpm)

@@ -9,12 +9,15 @@ from typing import Any
 
 import tyro
 
+from spikecam_env.cli.options import Count, Seed, Size
 from spikecam_env.errors import InputError, unknown_name
 
 SHOWN_AT = 500
 """Frame of which the sheet has pictures."""
 COLUMNS = 4
 FILM_FPS = 25
+MOST_PICTURES = 90_000
+"""Of a film: an hour."""
 
 
 @dataclass
@@ -31,13 +34,13 @@ class Scenes:
     """Write a picture (PNG) of the scene, or of all on one sheet."""
     film: Path | None = None
     """Write a film (.mp4 or .gif) of the scene's light."""
-    size: tuple[int, int] = (250, 400)
+    size: Size = (250, 400)
     """Rows and columns."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of what the scene leaves to chance; the scene `random` is another world with each."""
-    frames: int = 4000
+    frames: Count = 4000
     """Length of the film in frames of the camera; 40 000 are a second."""
-    every: int = 32
+    every: Count = 32
     """Camera frames from picture to picture: 32 is 50 times slower than life at 25 pictures a second."""
 
     def run(self) -> None:
@@ -62,9 +65,11 @@ class Scenes:
             raise InputError(f"--film {path}: unknown file type {path.suffix!r}; use .mp4 or .gif")
         if self.name is None:
             raise InputError(f"which scene? spikecam scenes NAME --film {path}; `spikecam scenes` lists the names")
-        if self.frames < 1 or self.every < 1:
-            raise InputError(f"--frames {self.frames} --every {self.every}; both must be 1 or more")
         at = range(0, self.frames, self.every)
+        if len(at) > MOST_PICTURES:
+            raise InputError(
+                f"{len(at)} pictures (--frames {self.frames}, --every {self.every}); at most {MOST_PICTURES}"
+            )
         write = write_gif if path.suffix.lower() == ".gif" else write_film
         write(path, self._pictures(at), FILM_FPS, len(at))
         slower = 40_000 / (FILM_FPS * self.every)

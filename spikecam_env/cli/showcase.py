@@ -14,6 +14,7 @@ from tqdm import tqdm
 from denoiser import OnlineDnSS
 from denoiser.metrics import psnr_db
 from scenes.protocol import Gaze
+from spikecam_env.checked import checked_memory
 from spikecam_env.cli.film import Panel, compose
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
@@ -76,6 +77,7 @@ def stream(
     """
     if frames < 500:
         raise InputError(f"{frames} frames are too few to show; ask for 500 or more (1200 are a turn at 2000 rpm)")
+    checked_memory(4 * frames * shape[0] * shape[1], f"a film of {frames} frames of {shape[0]} x {shape[1]} pixels")
     env, start = _camera(scene, rpm, shape, seed, model=model, frames_per_step=BLOCK, max_episode_steps=frames)
     camera: Any = env.unwrapped
     online = OnlineDnSS.pretrained(mode, output="both")

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from spikecam_env.checked import checked_count, checked_disk
 from spikecam_env.datasets.manifest import NAME, Manifest
 from spikecam_env.datasets.plan import Entry, Plan
 from spikecam_env.datasets.processes import on_processes
@@ -24,6 +25,7 @@ from spikecam_env.datasets.ray_cluster import on_ray
 from spikecam_env.datasets.renderer import AUTO, first_that_works
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
+from spikecam_env.streams.packing import packed_bytes
 
 UNFINISHED = ".*.partial.*"
 """Files that a killed run leaves behind (`spikecam_env.whole`)."""
@@ -49,8 +51,9 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     address of a running one, whose machines share `folder`.  progress: a bar over frames.
     Errors: InputError if the folder holds anything else, or another run is at work in it.
     """
-    if jobs < 1:
-        raise InputError(f"jobs is {jobs}; it must be 1 or more")
+    checked_count(jobs, "jobs")
+    frames = plan.frames * len(plan.entries)
+    checked_disk(frames * packed_bytes(plan.shape), folder, f"a dataset of {frames} frames")
     target = Path(folder).resolve()
     try:
         target.mkdir(parents=True, exist_ok=True)

@@ -7,20 +7,71 @@ says when, where or by how many processes the dataset was made.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from spikecam_env.datasets.plan import Entry, Plan
+from pydantic import Field, model_validator
+
+from spikecam_env.datasets.plan import Plan
 from spikecam_env.datasets.write import Written
 from spikecam_env.errors import InputError
+from spikecam_env.names import distinct, inside
+from spikecam_env.untrusted import (
+    Count,
+    Declared,
+    Name,
+    Positive,
+    Seed,
+    Side,
+    Whole,
+    checked_format,
+    declared,
+    read_json,
+)
 from spikecam_env.version import __version__
 from spikecam_env.whole import write_text_whole
 
 NAME = "dataset.json"
 FORMAT = "spikecam-dataset/1"
 _STATE = {"bytes", "sha256"}
-_FILE_KEYS = {field.name for field in fields(Entry)} | _STATE
+
+
+class _Settings(Declared):
+    """What the scenes of a dataset share, see `Plan`."""
+
+    package_version: str
+    kind: str
+    shape: list[Side] = Field(min_length=2, max_length=2)
+    frames: Count
+    seed: Seed
+    truth_every: Whole
+    mean_interval: Positive
+    model: str
+    renderer: str
+
+
+class _File(Declared):
+    """An entry of a dataset, see `Entry`; bytes and sha256 are null until its file is done."""
+
+    path: Name
+    scene: Name
+    scene_seed: Whole
+    unit_seed: Whole
+    bytes: Whole | None
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")] | None
+
+    @model_validator(mode="after")
+    def _is_done_or_not(self) -> _File:
+        if (self.bytes is None) != (self.sha256 is None):
+            raise ValueError("bytes and sha256 come together, or neither")
+        return self
+
+
+class _DatasetFile(Declared):
+    format: str
+    settings: _Settings
+    files: list[_File]
 
 
 @dataclass(frozen=True)
@@ -37,20 +88,20 @@ class Manifest:
         return cls(settings, tuple({**asdict(entry), "bytes": None, "sha256": None} for entry in plan.entries))
 
     @classmethod
-    def read(cls, folder: Path) -> Manifest:
-        """Raises InputError where there is none, or it is none."""
+    def read(cls, folder: Path, *, outside: bool = False) -> Manifest:
+        """Raises InputError where there is none, or it is none, or files lie outside of the folder unless `outside`."""
         path = folder / NAME
         if not path.is_file():
             raise InputError(f"{folder} is no dataset: there is no {NAME} in it")
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            found, manifest = data["format"], cls(data["settings"], tuple(data["files"]))
-            whole = all(set(file) == _FILE_KEYS for file in manifest.files)
-        except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{path} is damaged ({error!r}); make the dataset again in an empty folder") from error
-        if found != FORMAT or not whole:
-            raise InputError(f"{path} is no manifest of a dataset: format {found!r}, need {FORMAT!r}")
-        return manifest
+            data = checked_format(read_json(path), FORMAT, NAME)
+            file = declared(_DatasetFile, data, NAME)
+        except InputError as error:
+            raise InputError(f"{path} is damaged ({error}); make the dataset again in an empty folder") from error
+        for entry in file.files:
+            inside(folder, entry.path, f"{path}: file", outside=outside)
+        distinct((entry.path for entry in file.files), "file")
+        return cls(data["settings"], tuple(data["files"]))
 
     def write(self, folder: Path) -> None:
         """The file appears whole."""

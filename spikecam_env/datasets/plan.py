@@ -12,15 +12,19 @@ from typing import Any
 import numpy as np
 
 from scenes.catalogue import SCENES, make_scene
+from scenes.exposure import MOST_INTERVAL
 from scenes.protocol import Scene
 from scenes.renderers.choose import BACKENDS
-from spikecam_env.checked import checked_count, checked_seed, checked_shape
+from spikecam_env.checked import checked_count, checked_number, checked_seed, checked_shape
 from spikecam_env.datasets.renderer import AUTO, renderer_of_process
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import SensorModel
 
 RANDOM = "random"
 """The scene of the catalogue that its seed draws."""
+
+MOST_SCENES = 100_000
+"""Of a split; the paper has 100."""
 
 PHM = ("ball", "cook", "dice", "doll", "fan", "fly", "hand", "jump", "poker", "top")
 
@@ -69,8 +73,7 @@ class Plan:
         for entry in self.entries:
             if entry.scene not in SCENES:
                 raise unknown_name("scene", entry.scene, SCENES)
-        if not (np.isfinite(self.mean_interval) and self.mean_interval >= 1):
-            raise InputError(f"mean_interval is {self.mean_interval}; it must be 1 frame or more, e.g. 10")
+        checked_number(self.mean_interval, "mean_interval", 1.0, MOST_INTERVAL, unit="frames, e.g. 10")
         if self.renderer not in (AUTO, *BACKENDS):
             raise unknown_name("renderer", self.renderer, (AUTO, *BACKENDS))
         checked_seed(self.truth_every, "truth_every")
@@ -108,7 +111,7 @@ def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any)
 
     A scene depends on the seed, its split and its number, not on how many there are.
     """
-    counts = {"train": checked_seed(train, "train"), "test": checked_seed(test, "test")}
+    counts = {"train": checked_seed(train, "train", MOST_SCENES), "test": checked_seed(test, "test", MOST_SCENES)}
     checked_seed(seed)
     entries = tuple(
         Entry(f"{split}/{number:03}.h5", RANDOM, *_seeds(seed, split, number))

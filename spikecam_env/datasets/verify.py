@@ -9,21 +9,21 @@ from typing import Any
 
 from tqdm import tqdm
 
+from spikecam_env.checked import checked_count
 from spikecam_env.datasets.build import UNFINISHED
 from spikecam_env.datasets.manifest import NAME, Manifest
 from spikecam_env.datasets.write import sha256_of
-from spikecam_env.errors import InputError
 
 
-def verify(folder: str | Path, *, jobs: int = 1, progress: bool = False) -> list[str]:
-    """What is wrong with a dataset, a line each; empty where nothing is.  jobs: files read at a time.
+def verify(folder: str | Path, *, jobs: int = 1, outside: bool = False, progress: bool = False) -> list[str]:
+    """What is wrong with a dataset, a line each; empty where nothing is.
 
-    Errors: InputError if the folder holds no dataset.
+    jobs: files read at a time.  outside: read files that the dataset keeps outside of its folder too.
+    Errors: InputError if the folder holds no dataset, or files outside of it unless `outside`.
     """
-    if jobs < 1:
-        raise InputError(f"jobs is {jobs}; it must be 1 or more")
+    checked_count(jobs, "jobs")
     target = Path(folder)
-    manifest = Manifest.read(target)
+    manifest = Manifest.read(target, outside=outside)
     total = sum(file["bytes"] or 0 for file in manifest.files)
     bar = tqdm(total=total, desc="verify", unit="B", unit_scale=True, leave=False, disable=not progress)
     with bar, ThreadPoolExecutor(jobs) as readers:

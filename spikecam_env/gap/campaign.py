@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from spikecam_env.calibration import Campaign, Take, record_takes
-from spikecam_env.checked import checked_count, checked_shape
+from spikecam_env.checked import checked_count, checked_disk, checked_shape
 from spikecam_env.gap.recordings import Bars, Dark, Disk, Flat, Planned, Step
 from spikecam_env.sensor import SensorModel
+from spikecam_env.streams.packing import packed_bytes
 
 FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
 HOLDOUT_LEVELS = (0.05, 0.15, 0.5)
@@ -38,7 +39,9 @@ def write_campaign(
     camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
     planned = standard_design() if recordings is None else recordings
     size = checked_shape(shape)
-    takes = [_take(p, size, checked_count(frames if p.frames is None else p.frames)) for p in planned]
+    lengths = [checked_count(frames if p.frames is None else p.frames) for p in planned]
+    checked_disk(sum(lengths) * packed_bytes(size), folder, f"{sum(lengths)} frames of {size[0]} x {size[1]} pixels")
+    takes = [_take(p, size, length) for p, length in zip(planned, lengths, strict=True)]
     return record_takes(folder, camera, takes, shape=size, seed=seed, engine=engine, progress=progress)
 
 
@@ -61,4 +64,5 @@ def second_voltage(recordings: Sequence[Planned], v_d: float) -> tuple[Planned, 
 
 
 def _take(planned: Planned, shape: tuple[int, int], frames: int) -> Take:
+    planned.check()
     return Take(planned.file_name, planned.light(shape, frames), frames, planned.use, planned.v_d, planned.kind)

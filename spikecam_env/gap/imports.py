@@ -24,15 +24,17 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.calibration import Campaign, flat_maps, read_campaign
-from spikecam_env.calibration.campaign import USES
+from spikecam_env.calibration.campaign import USES, read_light, read_rates
 from spikecam_env.calibration.campaign_files import finish_campaign, save_light, save_rates, save_spikes
 from spikecam_env.calibration.flats import even_light
+from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.gap.labels import READING, RELATIVE, UNKNOWN, Label
+from spikecam_env.names import file_name, inside
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import read_recording
-from spikecam_env.streams.files import existing_file
 from spikecam_env.streams.recording import reading_options
+from spikecam_env.untrusted import array_names
 from spikecam_env.whole import whole_folder
 
 _BLOCK = 256
@@ -48,6 +50,7 @@ def import_campaign(
     columns: tuple[int, int] | None = None,
     holdout_share: float = 0.0,
     radiance_per_unit: float = 1.0,
+    outside: bool = False,
     progress: bool = False,
     **reading: Any,
 ) -> Campaign:
@@ -55,6 +58,7 @@ def import_campaign(
 
     frame_rate_hz: of the camera; None where every file says it.  rows, columns: first and stop of the part to keep.
     holdout_share: this share of each stream of use fit, its end, becomes a recording of use holdout.
+    outside: read files that lie outside of `folder` too, by `..`, from the root, or over symbolic links.
     reading: options of `read_recording` for all files they apply to; a label's own come first.
     Errors: InputError for no labels, missing files, files of another size or frame rate than the first, an unknown
     frame rate, a part that is not in the picture, light of another size, and all that the readers refuse.
@@ -66,6 +70,8 @@ def import_campaign(
         raise InputError(
             f"no labels: say of each recording what it was shown, a number or `unknown`; {_listing(source)}"
         )
+    frame_rate_hz = None if frame_rate_hz is None else checked_number(frame_rate_hz, "frame_rate_hz", 0.0, above=True)
+    radiance_per_unit = checked_number(radiance_per_unit, "radiance_per_unit", 0.0, above=True)
     if not 0.0 <= holdout_share < 1.0:
         raise InputError(f"holdout_share = {holdout_share}; it must be 0 up to, not including, 1")
     for name in reading:
@@ -76,7 +82,7 @@ def import_campaign(
     shape: tuple[int, int] | None = None
     with whole_folder(out) as beside:
         for label in tqdm(labels, desc="import", unit="file", disable=not progress):
-            for piece in _pieces(source, label, reading, part, holdout_share, radiance_per_unit):
+            for piece in _pieces(_Source(source, outside), label, reading, part, holdout_share, radiance_per_unit):
                 _check_same_size(piece, shape, entries)
                 shape = piece.shape
                 frame_rate_hz = _agreed_frame_rate(frame_rate_hz, piece)
@@ -85,6 +91,20 @@ def import_campaign(
             raise InputError("the files do not say their frame rate; give frame_rate_hz (40000 for a Vidar)")
         finish_campaign(beside, shape, frame_rate_hz, entries)
     return read_campaign(out)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """The folder of the recordings; outside: whether labels may name files beyond it."""
+
+    folder: Path
+    outside: bool
+
+    def file(self, text: str, label: Label) -> Path:
+        path = inside(self.folder, text, f"the label of {label.file!r}: file", outside=self.outside)
+        if not path.is_file():
+            raise InputError(f"there is no file {path} for the label {label.file!r}; {_listing(self.folder)}")
+        return path
 
 
 @dataclass(frozen=True)
@@ -126,27 +146,24 @@ class _Piece:
 
 
 def _pieces(
-    folder: Path, label: Label, reading: Mapping[str, Any], part: _Part, holdout_share: float, unit: float
+    source: _Source, label: Label, reading: Mapping[str, Any], part: _Part, holdout_share: float, unit: float
 ) -> list[_Piece]:
     """The recordings that a file becomes."""
-    path = folder / label.file
-    if not path.is_file():
-        raise InputError(f"there is no file {path} for the label {label.file!r}; {_listing(folder)}")
+    path = source.file(label.file, label)
     if label.use not in USES:
         raise unknown_name(f"use of {label.file}", label.use, USES)
-    name = label.name or path.stem
-    names = _npz_names(path)
+    name = file_name(label.name or path.stem, f"the label of {label.file!r}: name")
+    names = array_names(path) if path.suffix.lower() == ".npz" else set()
     if names >= flat_maps.KEYS:
         return _flat_maps(path, label, name, part)
     if label.radiance == RELATIVE:
         raise InputError(
             f"{label.file}: `relative` is for flat maps (D_light, Nd); give a radiance, an npz, or `unknown`"
         )
-    light = _light(folder, label, part, unit)
+    light = _light(source, label, part, unit)
     if {"rate", "frames"} <= names:
-        with np.load(path) as arrays:
-            rate, frames = part.of(np.atleast_2d(arrays["rate"]), label.file), int(arrays["frames"])
-        return [_Piece(label, name, label.use, light, frames, rate, note=label.note)]
+        rate, frames = read_rates(path, label.file)
+        return [_Piece(label, name, label.use, light, frames, part.of(rate, label.file), note=label.note)]
     allowed = reading_options(path)
     recording = read_recording(path, **{k: v for k, v in reading.items() if k in allowed} | dict(label.reading))
     spikes = part.of(recording.spikes, label.file)
@@ -177,17 +194,16 @@ def _flat_maps(path: Path, label: Label, name: str, part: _Part) -> list[_Piece]
     return pieces
 
 
-def _light(folder: Path, label: Label, part: _Part, unit: float) -> Keyframes | None:
+def _light(source: _Source, label: Label, part: _Part, unit: float) -> Keyframes | None:
     if label.radiance == UNKNOWN:
         return None
     if not isinstance(label.radiance, str):
-        return even_light(label.radiance * unit)
-    path = existing_file(folder / label.radiance)
-    try:
-        with np.load(path) as arrays:
-            frame, radiance = np.atleast_1d(arrays["frame"]), np.asarray(arrays["radiance"])
-    except (KeyError, OSError, ValueError) as error:
-        raise InputError(f"{path} is no light: it needs frame (K,) and radiance (K, H, W) ({error})") from error
+        most = float(np.finfo(np.float32).max)
+        return even_light(checked_number(label.radiance * unit, f"the label of {label.file!r}: radiance", 0.0, most))
+    path = source.file(label.radiance, label)
+    frame, radiance = read_light(path, f"the label of {label.file!r}")
+    if radiance.ndim != 3:
+        raise InputError(f"{path} is no light: radiance is {radiance.shape}; it must be (keys, rows, columns)")
     light = Keyframes(frame, part.of(radiance, path.name) * np.float32(unit))
     return _later(light, int(label.reading.get("first", 0)))
 
@@ -241,16 +257,6 @@ def _agreed_frame_rate(frame_rate_hz: float | None, piece: _Piece) -> float | No
         f"recording {piece.name!r} says {piece.frame_rate_hz:g} frames a second, so far it was {frame_rate_hz:g}; "
         "a campaign has one frame rate"
     )
-
-
-def _npz_names(path: Path) -> set[str]:
-    if path.suffix.lower() != ".npz":
-        return set()
-    try:
-        with np.load(path) as arrays:
-            return set(arrays.files)
-    except (OSError, ValueError, AttributeError) as error:
-        raise InputError(f"{path} is not a readable npz: {error}") from error
 
 
 def _listing(folder: Path) -> str:

@@ -8,7 +8,6 @@ relative            (flat maps only) the unit itself is the light meter, see `im
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.streams.files import existing_file
+from spikecam_env.checked import LARGEST_COUNT, shown
+from spikecam_env.errors import InputError
+from spikecam_env.untrusted import read_table
 
 UNKNOWN, RELATIVE = "unknown", "relative"
 
@@ -50,21 +50,10 @@ def labels_from_table(path: str | Path) -> tuple[Label, ...]:
 
     Errors: InputError for an unknown or missing column, an empty label, and a cell that is not a number, with its line.
     """
-    source = existing_file(path)
-    with source.open(newline="", encoding="utf-8-sig") as lines:
-        table = csv.DictReader(lines, skipinitialspace=True, restkey="", restval="")
-        names = table.fieldnames or []
-        for name in names:
-            if name not in _COLUMNS:
-                raise unknown_name(f"column of {source}", name, _COLUMNS)
-        for name in ("file", "radiance"):
-            if name not in names:
-                raise InputError(
-                    f"{source} has no column {name!r}; its first line must name the columns: file,radiance"
-                )
-        labels = tuple(_label(row, f"{source}, line {table.line_num}") for row in table)
+    rows = read_table(path, _COLUMNS, ("file", "radiance"))
+    labels = tuple(_label(row, f"{path}, line {line}") for line, row in rows)
     if not labels:
-        raise InputError(f"{source} lists no recordings; give one a line below the columns' names")
+        raise InputError(f"{path} lists no recordings; give one a line below the columns' names")
     return labels
 
 
@@ -72,8 +61,8 @@ def label_from_text(text: str) -> Label:
     """A label written as FILE=RADIANCE, e.g. `wall.npz=unknown`."""
     file, equals, radiance = text.rpartition("=")
     if not equals or not file:
-        raise InputError(f"label {text!r} is not of the form FILE=RADIANCE, e.g. wall.npz=unknown or flat.dat=0.2")
-    return Label(file, parse_radiance(radiance, f"label {text!r}"))
+        raise InputError(f"label {shown(text)} is not of the form FILE=RADIANCE, e.g. wall.npz=unknown or flat.dat=0.2")
+    return Label(file, parse_radiance(radiance, f"label {shown(text)}"))
 
 
 def parse_radiance(text: str, where: str) -> float | str:
@@ -86,9 +75,7 @@ def parse_radiance(text: str, where: str) -> float | str:
 
 
 def _label(row: Mapping[str, str], where: str) -> Label:
-    if "" in row:
-        raise InputError(f"{where} has more cells than there are columns")
-    cells = {name: text.strip() for name, text in row.items() if text.strip()}
+    cells = {name: text for name, text in row.items() if text}
     if "file" not in cells:
         raise InputError(f"{where}: the file's name is missing")
     reading = {name: _reading_cell(name, cells[name], where) for name in READING if name in cells}
@@ -106,8 +93,8 @@ def _reading_cell(name: str, text: str, where: str) -> Any:
             raise InputError(f"{where}: flip is {text!r}; it must be true or false")
         return text.lower() in ("true", "1")
     value = _number(text, f"{where}: {name}")
-    if value != int(value):
-        raise InputError(f"{where}: {name} is {text!r}; it must be a whole number")
+    if value != int(value) or value > LARGEST_COUNT:
+        raise InputError(f"{where}: {name} is {shown(text)}; it must be a whole number, at most {LARGEST_COUNT}")
     return int(value)
 
 
@@ -117,5 +104,5 @@ def _number(text: str, what: str, otherwise: str = "") -> float:
     except ValueError:
         value = np.nan
     if not 0 <= value < np.inf:
-        raise InputError(f"{what} is {text!r}; it must be a number, 0 or more{otherwise}")
+        raise InputError(f"{what} is {shown(text)}; it must be a number, 0 or more{otherwise}")
     return value

@@ -13,18 +13,23 @@ which the light changes and no others.  Radiance 1.0 makes the nominal pixel fir
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes import TEXTURES, RotatingDisk
+from scenes.protocol import MOST_LIGHT
+from spikecam_env.checked import checked_number, checked_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
 MOTION_PER_KEY = 1.2
 """Most pixels of motion between two keys; beyond it linear light is no motion any more (DESIGN section 4)."""
+
+SLOWEST = 1e-9
+"""Least speed of what moves [pixels/frame]: a pixel in 7 hours at 40 kHz."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +50,15 @@ class Planned:
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
         """Keys over frames [0, frames]; radiance is (K, H, W), or (K, 1, W), ... where it is even along an axis."""
         raise NotImplementedError
+
+    def check(self) -> None:
+        """Raises InputError for a number that is not finite, or larger than any light is."""
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, float):
+                checked_number(value, f"{self.kind}.{f.name}", -MOST_LIGHT, MOST_LIGHT)
+            elif isinstance(value, int) and not isinstance(value, bool):
+                checked_whole(value, f"{self.kind}.{f.name}")
 
     @property
     def file_name(self) -> str:
@@ -120,10 +134,10 @@ class Bars(Planned):
     down: bool = False
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
-        if not abs(self.speed) <= MOTION_PER_KEY or not 2.0 <= self.period < np.inf:
+        if not (self.speed == 0 or SLOWEST <= abs(self.speed) <= MOTION_PER_KEY) or not 2.0 <= self.period < np.inf:
             raise InputError(
                 f"bars of period {self.period} at speed {self.speed}; need a period of 2 pixels or more and at most "
-                f"{MOTION_PER_KEY} pixels a frame either way"
+                f"{MOTION_PER_KEY} pixels a frame either way, 0 or {SLOWEST:g} at least"
             )
         every = frames if self.speed == 0 else max(int(1.0 / abs(self.speed) + 1e-9), 1)
         frame = np.arange(-(-frames // every) + 1) * every

@@ -34,6 +34,7 @@ from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.twin import simulate
 from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.untrusted import Declared, Name, declared, numbers, parse_json, read_arrays
 from spikecam_env.whole import whole_file
 
 Array = NDArray[np.float64]
@@ -127,8 +128,18 @@ def _kept(path: Path, make: Callable[[], Template]) -> Template:
         entry = make()
         with whole_file(path) as beside, beside.open("wb") as file:
             np.savez(file, about=json.dumps(_about(entry)), shift=entry.shift)
-    with np.load(path) as made:
-        return Template(**json.loads(str(made["about"])), shift=made["shift"])
+    made = read_arrays(path, ("about", "shift"))
+    about = declared(_About, parse_json(str(made["about"]), f"{path}: about"), f"{path}: about")
+    return Template(about.name, about.parameters, numbers(made["shift"], "shift", str(path)), about.times, about.white)
+
+
+class _About(Declared):
+    """A template's file, but for its `shift`."""
+
+    name: Name
+    parameters: dict[str, float]
+    times: float
+    white: float
 
 
 def _about(entry: Template) -> dict[str, Any]:

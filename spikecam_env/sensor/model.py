@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import zlib
 from dataclasses import asdict, dataclass, fields, replace
 from importlib import resources
@@ -12,20 +11,36 @@ from typing import Any
 
 import numpy as np
 import tomli_w
+from pydantic import ConfigDict, Field
 
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.effects.base import build
 from spikecam_env.sensor.unit import Circuit, PixelArray, Unit, firing_law
+from spikecam_env.untrusted import Declared, Name, Positive, checked_format, declared, parse_toml, read_toml
 from spikecam_env.whole import write_text_whole
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 FORMAT = "spikecam-model/1"
 PRESETS = ("ideal", "measured", "physical", "scsim")
+
+
+_CIRCUIT = {f.name for f in fields(Circuit)}
+
+
+class _EffectEntry(Declared):
+    """An [[effect]] of a model file: its name, and parameters that the effect itself declares."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: Name
+
+
+class _ModelFile(Declared):
+    format: str
+    name: Name = "unnamed"
+    frame_rate_hz: Positive
+    circuit: dict[str, float] = Field(default_factory=dict)
+    effect: list[_EffectEntry] = Field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -62,18 +77,16 @@ class SensorModel:
             raise InputError(f"script=True belongs to the preset 'scsim', not to {name!r}")
         file = "scsim-script" if script else name
         text = (resources.files("spikecam_env.sensor") / "presets" / f"{file}.toml").read_text(encoding="utf-8")
-        return cls._from_dict(tomllib.loads(text), where=f"preset {file}")
+        return cls._from_data(parse_toml(text, f"preset {file}"), where=f"preset {file}")
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> SensorModel:
         """Read a model file; raises InputError for a missing file, broken TOML, unknown effect or parameter."""
         try:
-            data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"cannot read model file {path}: {error.strerror}") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"{path} is not a TOML file: {error}") from error
-        return cls._from_dict(data, where=str(path))
+            data = read_toml(os.fspath(path))
+        except InputError as error:
+            raise InputError(f"cannot read model file {path}: {error}") from error
+        return cls._from_data(data, where=str(path))
 
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str]) -> SensorModel:
@@ -83,30 +96,16 @@ class SensorModel:
         return cls.preset(str(name_or_path))
 
     @classmethod
-    def _from_dict(cls, data: dict[str, Any], where: str) -> SensorModel:
-        if data.get("format") != FORMAT:
-            raise InputError(f"{where}: format is {data.get('format')!r}, expected {FORMAT!r}")
-        allowed = {"format", "name", "frame_rate_hz", "circuit", "effect"}
-        for key in data:
-            if key not in allowed:
-                raise unknown_name(f"entry of {where}", key, allowed)
-        circuit_keys = {f.name for f in fields(Circuit)}
-        circuit = data.get("circuit", {})
-        for key, value in circuit.items():
-            if key not in circuit_keys:
-                raise unknown_name(f"circuit entry of {where}", key, circuit_keys)
-            if not isinstance(value, (int, float)) or not np.isfinite(value):
-                raise InputError(f"{where}: circuit.{key} = {value!r} must be a finite number")
-        effects = []
-        for entry in data.get("effect", []):
-            if "name" not in entry:
-                raise InputError(f"{where}: an [[effect]] has no name; it needs one of {', '.join(CATALOGUE)}")
-            effects.append(build(CATALOGUE, entry["name"], {k: v for k, v in entry.items() if k != "name"}))
+    def _from_data(cls, data: dict[str, Any], where: str) -> SensorModel:
+        file = declared(_ModelFile, checked_format(data, FORMAT, where), where)
+        for key in file.circuit:
+            if key not in _CIRCUIT:
+                raise unknown_name(f"circuit entry of {where}", key, _CIRCUIT)
         try:
-            frame_rate_hz = float(data["frame_rate_hz"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"{where}: frame_rate_hz must be a number (40000.0 for a Vidar)") from error
-        return cls(str(data.get("name", "unnamed")), Circuit(**circuit), frame_rate_hz, tuple(effects))
+            effects = tuple(build(CATALOGUE, entry.name, entry.model_extra or {}) for entry in file.effect)
+            return cls(file.name, Circuit(**file.circuit), file.frame_rate_hz, effects)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
 
     def to_toml(self, path: str | os.PathLike[str]) -> None:
         """Write the model; the file appears whole and loads back equal."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.checked import checked_count, checked_seed, checked_shape
+from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Effect, Exposure
@@ -77,15 +77,15 @@ class SpikeSensor:
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
         self.shape = checked_shape(shape)
         self.take = checked_seed(take, "take")
-        self._given = None if unit is None else (checked_unit(unit, self.shape), checked_seed(seed))
+        self._given = None if unit is None else (checked_unit(unit, self.shape), _checked(seed))
         self.engine = _chosen_engine(engine, self.model, unit)
         self._optics = tuple(e for e in self.model.effects if e.overrides("image"))
         self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
-        self._start(checked_seed(seed), phase=None)
+        self._start(_checked(seed), phase=None)
 
     def reset(self, seed: int | None = None) -> None:
         """Back to frame 0; with a seed, as another unit, or as another recording of the unit that was given."""
-        self._start(self.seed if seed is None else checked_seed(seed), phase=None)
+        self._start(self.seed if seed is None else _checked(seed), phase=None)
 
     def step(
         self, radiance: Keyframes | ArrayLike, frames: int = 1, *, out: NDArray[np.uint8] | None = None
@@ -216,6 +216,10 @@ def _recycled(out: NDArray[np.uint8] | None, shape: tuple[int, int, int]) -> NDA
     if out.shape != shape or out.dtype != np.uint8 or not (out.flags.c_contiguous and out.flags.writeable):
         raise InputError(f"out is {out.dtype} {out.shape}; it must be uint8 {shape}, C-contiguous and writeable")
     return out
+
+
+def _checked(seed: Any) -> int:
+    return checked_seed(seed, most=LARGEST_DERIVED_SEED)
 
 
 def checked_unit(unit: Any, shape: tuple[int, int]) -> Unit:

@@ -63,7 +63,7 @@ def test_a_wrong_length_is_named_with_the_right_one(folder: Path) -> None:
         (lambda d: d["recordings"][0].update(use="train"), "fit, holdout"),
         (lambda d: d["recordings"][0].update(gain=2), "entry"),
         (lambda d: d["recordings"][0].pop("spikes"), "either spikes"),
-        (lambda d: d["recordings"][1].update(name="dark-00"), "2 times"),
+        (lambda d: d["recordings"][1].update(name="dark-00"), "2 recordings are named 'dark-00'"),
     ],
 )
 def test_a_wrong_entry_is_named(folder: Path, change, message: str) -> None:

@@ -83,7 +83,7 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
         ),
         (("record", "--out", "x.h5", "--model", "no.toml"), "cannot read model file no.toml"),
         (("record", "--out", "x.h5", "--frames", "0"), "--frames 0"),
-        (("record", "--out", "x.h5", "--size", "0", "400"), "shape = (0, 400)"),
+        (("record", "--out", "x.h5", "--size", "0", "400"), "--size 0 400"),
         (("demo", "--frames", "10"), "10 frames are too few"),
         (("demo", "--model", "scs"), "unknown preset 'scs'"),
         (("demo", "--rpm", "nan"), "rpm"),

@@ -182,7 +182,7 @@ def test_what_a_worker_refuses_reaches_the_caller(tmp_path: Path) -> None:
         ({"frames": 0}, "frames = 0"),
         ({"shape": (0, 5)}, "two positive whole numbers"),
         ({"truth_every": -1}, "truth_every = -1"),
-        ({"mean_interval": 0.5}, "mean_interval is 0.5"),
+        ({"mean_interval": 0.5}, "mean_interval = 0.5"),
         ({"entries": ()}, "no scenes"),
     ],
 )

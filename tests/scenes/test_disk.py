@@ -185,15 +185,15 @@ def test_disk_is_a_scene() -> None:
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        ({"rpm": np.nan}, "rpm is nan"),
-        ({"radius": 0.2}, "radius is 0.2"),
-        ({"light": (0.5, 0.4)}, r"light\[1\] is 0.4"),
-        ({"light": (-0.1, 0.4)}, r"light\[0\] is -0.1"),
-        ({"shape": (0, 5)}, "shape is"),
+        ({"rpm": np.nan}, "rpm = nan"),
+        ({"radius": 0.2}, "radius = 0.2"),
+        ({"light": (0.5, 0.4)}, r"light\[1\] = 0.4"),
+        ({"light": (-0.1, 0.4)}, r"light\[0\] = -0.1"),
+        ({"shape": (0, 5)}, "shape ="),
         ({"texture": np.zeros((4, 5))}, "square"),
         ({"texture": np.full((4, 4), 2.0)}, r"lie in \[0, 1\]"),
         ({"background": -1.0}, "background must be"),
-        ({"frame_rate_hz": 0.0}, "frame_rate_hz is 0.0"),
+        ({"frame_rate_hz": 0.0}, "frame_rate_hz = 0.0"),
     ],
 )
 def test_bad_options_are_named(option: dict, message: str) -> None:

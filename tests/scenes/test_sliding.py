@@ -69,12 +69,12 @@ def test_keys_lie_on_a_grid_of_0_6_pixels() -> None:
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        ({"shape": (0, 5)}, "shape is"),
-        ({"velocity_px_s": (np.nan, 0.0)}, "velocity_px_s is"),
+        ({"shape": (0, 5)}, "shape ="),
+        ({"velocity_px_s": (np.nan, 0.0)}, r"velocity_px_s\[0\] ="),
         ({"texture": np.full((4, 4), 2.0)}, r"values in \[0, 1\]"),
-        ({"texel_px": 0.0}, "texel_px is 0"),
+        ({"texel_px": 0.0}, "texel_px = 0"),
         ({"light": (0.5, 0.4)}, "light is"),
-        ({"frame_rate_hz": -1.0}, "frame_rate_hz is -1"),
+        ({"frame_rate_hz": -1.0}, "frame_rate_hz = -1"),
     ],
 )
 def test_bad_options_are_named(option: dict, message: str) -> None:
