@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict
 
-from spikecam_env.checked import checked_number
+from spikecam_env.checked import checked_number, shown
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.streams.files import check_range
 from spikecam_env.streams.packing import as_spikes, check_shape, pack_checked, packed_bytes, unpack_frames
@@ -85,7 +85,8 @@ class SpikeWriter:
     def __enter__(self) -> SpikeWriter:
         self._file = h5py.File(self._beside, "w", libver=LIBRARY_VERSIONS, rdcc_nbytes=CACHE_BYTES)
         for name, value in self._attributes.items():
-            self._file.attrs.create(name, value, dtype=_stored_type(value))
+            text = h5py.string_dtype("utf-8", max(1, len(value))) if isinstance(value, bytes) else None
+            self._file.attrs.create(name, value, dtype=text)
         self._make_stream("spikes")
         return self
 
@@ -180,7 +181,7 @@ def read_hdf5(
 
 def read_truth(path: str | Path) -> dict[str, NDArray[Any]]:
     """Ground truth beside a recording: name -> (N, ...), with "frame" (N,); empty where there is none."""
-    with open_recording(path) as recording:
+    with open_recording(path) as recording, _damage_named(path):
         if "truth" not in recording.file.keys():  # noqa: SIM118 - `in` follows links
             return {}
         group = hdf5_item(recording.file, "truth", str(path))
@@ -237,17 +238,33 @@ class _Header(Declared):
 @contextmanager
 def open_recording(path: str | Path) -> Iterator[OpenRecording]:
     """The recording, open for reading inside the `with` block; raises InputError as `read_hdf5` does."""
-    where = str(path)
     with open_hdf5(path) as file:
-        attributes = hdf5_attributes(file, where)
-        if attributes.get("format") != FORMAT:
-            found = attributes.get("format", "no format attribute")
-            raise InputError(f"{where} is not a recording of this package: found {found!r}, need {FORMAT!r}")
-        header = declared(_Header, attributes, where)
-        shape = check_shape((header.height, header.width))
-        held = [name for name in ("spikes", "clean") if name == "spikes" or name in file.keys()]  # noqa: SIM118
-        streams = {name: _stream(file, name, shape, where) for name in held}
-        yield OpenRecording(file, Path(path), shape, attributes, streams)
+        with _damage_named(path):
+            recording = _opened(file, Path(path))
+        yield recording
+
+
+def _opened(file: h5py.File, path: Path) -> OpenRecording:
+    where = str(path)
+    attributes = hdf5_attributes(file, where)
+    if attributes.get("format") != FORMAT:
+        found = attributes.get("format", "no format attribute")
+        raise InputError(f"{where} is not a recording of this package: found {shown(found)}, need {FORMAT!r}")
+    header = declared(_Header, attributes, where)
+    shape = check_shape((header.height, header.width), f"{where}: (height, width)")
+    held = [name for name in ("spikes", "clean") if name == "spikes" or name in file.keys()]  # noqa: SIM118
+    return OpenRecording(file, path, shape, attributes, {name: _stream(file, name, shape, where) for name in held})
+
+
+@contextmanager
+def _damage_named(path: str | Path) -> Iterator[None]:
+    """Whatever h5py raises over a damaged file becomes an InputError that names it."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # OSError, RuntimeError, KeyError, ...: as many as there are ways to damage a file
+        raise InputError(f"{path} cannot be read ({shown(str(error))}); it is damaged") from error
 
 
 def is_recording(path: str | Path) -> bool:
@@ -286,9 +303,6 @@ def _file_attributes(
     for name, value in added.items():
         if name in RESERVED:
             raise InputError(f"attribute {name} is written by the recording itself; choose another name")
-        if not isinstance(value, str | int | float | bool | np.integer | np.floating):
-            raise InputError(f"attribute {name} is a {type(value).__name__}; give text, a number or a bool")
-        _stored_type(value, f"attribute {name}")
     own: dict[str, object] = {
         "format": FORMAT,
         "height": shape[0],
@@ -297,7 +311,7 @@ def _file_attributes(
     }
     if frame_rate_hz is not None:
         own["frame_rate_hz"] = checked_number(frame_rate_hz, "frame_rate_hz", 0, above=True, unit="Hz")
-    return {**own, **added}
+    return {name: _storable(value, name) for name, value in {**own, **added}.items()}
 
 
 def _grow(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
@@ -305,13 +319,17 @@ def _grow(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
     dataset[len(dataset) - len(rows) :] = rows
 
 
-def _stored_type(value: object, name: str = "attribute") -> Any:
-    """What a value is stored as: text as its bytes, in place; the rest as h5py chooses."""
+def _storable(value: object, name: str) -> object:
+    """A value as h5py takes it: text as bytes, which lie in place; raises InputError for what HDF5 cannot hold."""
     if isinstance(value, str):
+        if "\0" in value:
+            raise InputError(f"attribute {name} has a zero character; give other text")
         try:
-            return h5py.string_dtype("utf-8", max(1, len(value.encode())))
+            return value.encode()
         except UnicodeEncodeError as error:
-            raise InputError(f"{name} = {value!r} has no UTF-8; give other text") from error
+            raise InputError(f"attribute {name} = {shown(value)} has no UTF-8; give other text") from error
+    if not isinstance(value, int | float | bool | np.integer | np.floating):
+        raise InputError(f"attribute {name} is a {type(value).__name__}; give text, a number or a bool")
     if isinstance(value, int) and not -(2**63) <= value < 2**64:
-        raise InputError(f"{name} = {value if abs(value) < 10**40 else 'a number of many digits'}; it has 64 bits")
-    return None
+        raise InputError(f"attribute {name} = {shown(value)}; it must be a number of 64 bits")
+    return value
