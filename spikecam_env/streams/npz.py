@@ -28,9 +28,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.errors import InputError
-from spikecam_env.streams.files import check_range, existing_file
+from spikecam_env.streams.files import check_range
 from spikecam_env.streams.packing import BitOrder, as_spikes, check_bit_order
 from spikecam_env.streams.vidar import KNOWN_SHAPES
+from spikecam_env.untrusted import existing_file
 from spikecam_env.whole import whole_file
 
 

@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.errors import InputError
-from spikecam_env.streams.files import check_range, existing_file
+from spikecam_env.streams.files import check_range
 from spikecam_env.streams.packing import BitOrder, as_spikes, check_shape, pack_frames, packed_bytes, unpack_frames
+from spikecam_env.untrusted import existing_file
 from spikecam_env.whole import whole_file
 
 KNOWN_SHAPES = ((250, 400), (250, 416), (500, 800), (250, 250), (1000, 1000), (256, 448))
