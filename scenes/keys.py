@@ -53,6 +53,13 @@ def painted(
     else:
         inner = np.arange(start // interval + 1, -(-stop // interval)) * interval
         frame = np.concatenate([[start], inner, [stop]])
+    return paint_keys(shape, frame, paint)
+
+
+def paint_keys(
+    shape: tuple[int, int], frame: NDArray[np.int64], paint: Callable[[float, NDArray[np.float32]], None]
+) -> Keyframes:
+    """Keys at these frames (K,), rising, painted side by side by paint(frame, picture (H, W))."""
     light = np.empty((len(frame), *shape), np.float32)
     side_by_side(lambda key: paint(float(frame[key]), light[key]), len(frame))
     return Keyframes.known(frame.astype(np.float64), light)

@@ -2,39 +2,50 @@
 
 from __future__ import annotations
 
+from copy import copy
 from os import PathLike
-from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
-from tqdm import tqdm
+from numpy.typing import ArrayLike, NDArray
 
-from scenes.keys import interval_for, painted
+from scenes.film import Film, Reading, fitted, given_times, read_film
+from scenes.keys import LONGEST_INTERVAL, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth
-from spikecam_env.errors import InputError
+from scenes.transfer import CHANNELS, curve, grey, light_of
+from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import Keyframes
 
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Of linear red, green and blue.  Source: ITU-R BT.709."""
+INTERPOLATIONS = ("linear", "hold")
 
 
 class VideoScene:
-    """Scene: a film, played forth and back without end, its light linear in time between two pictures.
+    """Scene: a film, played forth and back without end.
 
-    film           path of a video file that OpenCV reads, or an array (T, h, w) or (T, h, w, 3: red, green, blue):
-                   whole numbers of full scale (uint8, uint16), or floats in [0, 1]
-    film_rate_hz   pictures a second when it was taken (a slow-motion film plays slower than that); default: what the
-                   file says.  An array needs it.
+    film           path of a video file, of a folder of pictures, or of a CSV file of name,time_s; or an array
+                   (T, h, w) or (T, h, w, 3: red, green, blue): whole numbers of full scale (uint8, uint16), or floats
+    film_rate_hz   pictures a second when it was taken (a slow-motion film plays slower than that); default: the file's
+                   time stamps.  An array or a folder needs it, or times_s.
     shape          (rows, columns) of the sensor, filled by the middle of the film, averaged over area; default: its own
-    light          radiance of black and of full scale: (dark, bright)
-    gamma          of the film: linear light = (value / full scale) ^ gamma; 1 where it is linear already
+    light          radiance of black and of full scale: (dark, bright); linear light above 1 goes beyond bright
+    gamma          linear light = (value / full scale) ^ gamma; the same as transfer=f"gamma{gamma}", and 1 as "linear"
     most_pictures  leave out what comes later
     frame_rate_hz  of the sensor
+    transfer       from values to linear light, as `scenes.transfer` names it: "srgb", "bt709", "gamma2.2", "linear",
+                   "pq", "hlg"; default: what the file states, "gamma2.2" for arrays
+    channel        "luminance", "red", "green" or "blue"
+    interpolation  of light in time between two pictures: "linear", or "hold": the former until the next, within a frame
+    times_s        (T,) the time of every picture [s]
+    slow           the file plays so many times slower than life: its time stamps are divided by it
+    seconds        of the film's true time to be read; default: all
+    mean_interval  scale the light so that pixels fire every so many frames on average over the film; default: not
 
     Truth: radiance alone.  Flow is NaN, for a film does not tell it; all is object 0.  A gaze beyond the edge sees the
     film mirrored.
-    Errors: InputError for a film that cannot be read or has fewer than two pictures, and a value out of range.
+    Warns where a file holds fewer pictures, or lasts shorter, than it states, and where a video states no transfer.
+    Errors: InputError for a film that cannot be read or has fewer than two pictures, time stamps that do not rise, a
+    transfer that is not read, or not stated with more than 8 bits a value, and a value out of range.
     """
 
     def __init__(
@@ -43,38 +54,97 @@ class VideoScene:
         film_rate_hz: float | None = None,
         shape: tuple[int, int] | None = None,
         light: tuple[float, float] = (0.0, 0.6),
-        gamma: float = 2.2,
+        gamma: float | None = None,
         most_pictures: int | None = None,
         frame_rate_hz: float = 40_000.0,
+        *,
+        transfer: str | None = None,
+        channel: str = "luminance",
+        interpolation: Literal["linear", "hold"] = "linear",
+        times_s: ArrayLike | None = None,
+        slow: float = 1.0,
+        seconds: float | None = None,
+        mean_interval: float | None = None,
     ) -> None:
         if not 0 <= light[0] < light[1] < np.inf:
             raise InputError(f"light is {light}; it must be (dark, bright) with 0 <= dark < bright")
-        for name, value in {"gamma": gamma, "frame_rate_hz": frame_rate_hz}.items():
-            if not 0 < value < np.inf:
+        numbers = {"gamma": gamma, "frame_rate_hz": frame_rate_hz, "film_rate_hz": film_rate_hz}
+        for name, value in {**numbers, "slow": slow, "seconds": seconds}.items():
+            if value is not None and not 0 < value < np.inf:
                 raise InputError(f"{name} is {value}; it must be positive and finite")
         if most_pictures is not None and most_pictures < 2:
             raise InputError(f"most_pictures is {most_pictures}; a film has 2 or more")
-        if isinstance(film, (str, PathLike)):
-            pictures, rate = _read(Path(film), gamma, shape, most_pictures)
-            film_rate_hz = film_rate_hz or rate
-        else:
-            pictures = _from_array(np.asarray(film), gamma, shape, most_pictures)
-        if film_rate_hz is None or not 0 < film_rate_hz < np.inf:
-            raise InputError(f"film_rate_hz is {film_rate_hz}; say how many pictures a second were taken")
-        self._light = (light[0] + (light[1] - light[0]) * pictures).astype(np.float16)
-        self.shape = (int(pictures.shape[1]), int(pictures.shape[2]))
+        if mean_interval is not None and not 1 <= mean_interval < np.inf:
+            raise InputError(f"mean_interval is {mean_interval}; it must be 1 frame or more, e.g. 10")
+        if shape is not None and (len(shape) != 2 or min(shape) < 1):
+            raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
+        if interpolation not in INTERPOLATIONS:
+            raise unknown_name("interpolation", interpolation, INTERPOLATIONS)
+        if channel not in CHANNELS:
+            raise unknown_name("channel", channel, CHANNELS)
+        if sum((film_rate_hz is not None, times_s is not None, slow != 1)) > 1:
+            raise InputError("give one of film_rate_hz, times_s and slow; each says by itself when pictures were taken")
+        how = Reading(
+            shape,
+            _transfer(transfer, gamma),
+            channel,
+            film_rate_hz,
+            None if times_s is None else np.asarray(times_s, np.float64),
+            slow,
+            most_pictures,
+            seconds,
+        )
+        taken = read_film(film, how) if isinstance(film, (str, PathLike)) else _from_array(film, how)
+        kept = np.float16 if taken.bits <= 8 else np.float32
+        self._light = (light[0] + (light[1] - light[0]) * taken.light).astype(kept)
+        self._gain = np.float32(1)
+        self._hold = interpolation == "hold"
+        self.shape = (int(taken.light.shape[1]), int(taken.light.shape[2]))
         self.frame_rate_hz = float(frame_rate_hz)
-        self.frames_per_picture = self.frame_rate_hz / film_rate_hz
+        self.transfer, self.interpolation = taken.transfer, interpolation
+        self._rate_hz = taken.rate_hz
+        self._knots = taken.time_s * self.frame_rate_hz
+        if self._hold:
+            self._knots = np.append(self._knots, self._knots[-1] + taken.last_s * self.frame_rate_hz)
+        if mean_interval is not None:
+            self._gain = np.float32(1 / (mean_interval * self._mean()))
 
     def __repr__(self) -> str:
-        return f"VideoScene(pictures={len(self._light)}, shape={self.shape}, {self.frames_per_picture:g} frames each)"
+        return f"VideoScene(pictures={self.pictures}, shape={self.shape}, {self.frames_per_picture:g} frames each)"
+
+    @property
+    def pictures(self) -> int:
+        """That were read."""
+        return len(self._light)
+
+    @property
+    def frames_per_picture(self) -> float:
+        """Sensor frames from picture to picture; their mean where times are not even."""
+        if self._rate_hz is not None:
+            return self.frame_rate_hz / self._rate_hz
+        return float(self._knots[-1]) / (len(self._knots) - 1)
+
+    @property
+    def frames(self) -> float:
+        """Sensor frames of the film played once."""
+        return float(self._knots[-1])
+
+    def lit(self, gain: float) -> VideoScene:
+        """The same with `gain` times its light."""
+        other = copy(self)
+        other._gain = self._gain * np.float32(gain)
+        return other
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
-        """Keys that cover frames [start, stop], one a picture of the film where that is a whole number up to 64."""
-        interval = interval_for(1.0, self.frames_per_picture)
+        """Keys that cover frames [start, stop], at most 64 apart: the whole frames next to every picture's time."""
+        if not start < stop:
+            raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+        frame = self._key_frames(start, stop)
         if gaze is not None:
-            interval = min(interval, interval_for(float(np.hypot(*gaze.rate)), 0.6))
-        return painted(self.shape, start, stop, interval, gaze, lambda t, picture: self._paint(t, gaze, picture))
+            interval = interval_for(float(np.hypot(*gaze.rate)), 0.6)
+            turns = np.arange(start // interval + 1, -(-stop // interval)) * interval
+            frame = np.unique(np.concatenate([[start, stop], turns, frame[(frame > start) & (frame < stop)]]))
+        return paint_keys(self.shape, frame, lambda t, picture: self._paint(t, gaze, picture))
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Radiance and gaze; flow is NaN."""
@@ -85,72 +155,104 @@ class VideoScene:
         return Truth(radiance, flow, np.zeros(self.shape, np.int32), poses={"camera": camera})
 
     def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
-        last = len(self._light) - 1
-        place = last - abs(frame / self.frames_per_picture % (2 * last) - last)
-        before = min(int(place), last - 1)
-        share = np.float32(place - before)
-        seen = self._light[before] * (1 - share) + self._light[before + 1] * share
+        place = self._place(frame)
+        if self._hold:
+            seen = self._light[min(int(place), self.pictures - 1)].astype(np.float32, copy=False)
+        else:
+            before = min(int(place), self.pictures - 2)
+            share = np.float32(place - before)
+            seen = self._light[before] * (1 - share) + self._light[before + 1] * share
         pan, tilt = gaze.at(frame) if gaze else (0.0, 0.0)
         if (pan, tilt) != (0.0, 0.0):
             shift = np.array([[1.0, 0.0, pan], [0.0, 1.0, tilt]])
             flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
             seen = cv2.warpAffine(seen, shift, self.shape[::-1], flags=flags, borderMode=cv2.BORDER_REFLECT)
-        picture[:] = seen
+        np.multiply(seen, self._gain, out=picture)
+
+    def _place(self, frame: float) -> float:
+        """Where in the film a frame is, in pictures and shares of one; it turns round at either end."""
+        last = len(self._knots) - 1
+        if self._rate_hz is not None:
+            return last - abs(frame / self.frames_per_picture % (2 * last) - last)
+        end = self.frames
+        return float(np.interp(end - abs(frame % (2 * end) - end), self._knots, np.arange(last + 1)))
+
+    def _key_frames(self, start: int, stop: int) -> NDArray[np.int64]:
+        """Whole frames that do not depend on where a stream is cut: on both sides of every change, and multiples of 64
+        where changes are further apart than that."""
+        low, high = start - 2 * LONGEST_INTERVAL, stop + 2 * LONGEST_INTERVAL
+        changes = self._changes(low, high)
+        inner = np.concatenate([[low - LONGEST_INTERVAL], changes, [high + LONGEST_INTERVAL]])
+        grid = np.arange(low // LONGEST_INTERVAL, high // LONGEST_INTERVAL + 1) * LONGEST_INTERVAL
+        after = np.searchsorted(inner, grid, "right").clip(1, len(inner) - 1)
+        wide = inner[after] - inner[after - 1] > LONGEST_INTERVAL
+        frame = np.union1d(changes, grid[wide])
+        first = np.searchsorted(frame, start, "right") - 1
+        return np.asarray(frame[first : np.searchsorted(frame, stop) + 1], np.int64)
+
+    def _changes(self, low: int, high: int) -> NDArray[np.int64]:
+        """The whole frames in [low, high] next to times at which the light takes another course."""
+        period = 2 * self.frames
+        rounds = np.arange(np.floor(low / period) - 1, np.ceil(high / period) + 1)[:, None] * period
+        times = np.concatenate([rounds + self._knots, rounds - self._knots]).ravel()
+        times = times[(times > low - 2) & (times < high + 2)]
+        near = np.round(times, 6)  # a whole number of frames, but for how it was computed
+        sides = [np.ceil(near) - 1, np.floor(near) + 1] if self._hold else []
+        frame = np.unique(np.concatenate([np.floor(near), np.ceil(near), *sides])).astype(np.int64)
+        return frame[(frame >= low) & (frame <= high)]
+
+    def _mean(self) -> float:
+        """Radiance over the whole film and picture, by the time that each picture has.
+
+        Errors: InputError for a film without light.
+        """
+        spans = np.diff(self._knots)
+        weights = spans if self._hold else (np.append(spans, 0) + np.insert(spans, 0, 0)) / 2
+        means = np.array([picture.mean(dtype=np.float64) for picture in self._light])
+        mean = float(np.average(means, weights=weights))
+        if not mean > 0:
+            raise InputError("the film has no light to expose; all its pictures are black")
+        return mean
 
 
-def _read(
-    path: Path, gamma: float, shape: tuple[int, int] | None, most: int | None
-) -> tuple[NDArray[np.float32], float | None]:
-    """(T, H, W) linear in [0, 1], and the rate that the file says [Hz]."""
-    if not path.is_file():
-        raise InputError(f"there is no film {path}")
-    capture = cv2.VideoCapture(str(path))
-    rate = capture.get(cv2.CAP_PROP_FPS) or None
-    pictures: list[NDArray[np.float32]] = []
-    with tqdm(desc=f"read {path.name}", unit="picture", leave=False) as bar:
-        while len(pictures) != most:
-            there, bgr = capture.read()
-            if not there:
-                break
-            pictures.append(_fitted(_linear(bgr[..., ::-1], gamma), shape))
-            bar.update()
-    capture.release()
-    if len(pictures) < 2:
-        raise InputError(f"{path} holds {len(pictures)} pictures that OpenCV can read; a film needs 2 or more")
-    return np.stack(pictures), rate
+def _transfer(transfer: str | None, gamma: float | None) -> str | None:
+    """The name of one; errors: InputError for an unknown one, and where both are given."""
+    if gamma is not None:
+        if transfer is not None:
+            raise InputError(f"transfer is {transfer!r} and gamma {gamma}; give one of the two")
+        transfer = "linear" if gamma == 1 else f"gamma{float(gamma)!r}"
+    if transfer is not None:
+        curve(transfer)
+    return transfer
 
 
-def _from_array(
-    film: NDArray[np.generic], gamma: float, shape: tuple[int, int] | None, most: int | None
-) -> NDArray[np.float32]:
-    if film.ndim not in (3, 4) or len(film) < 2 or (film.ndim == 4 and film.shape[3] != 3):
+def _from_array(film: NDArray[np.generic], how: Reading) -> Film:
+    if isinstance(film, np.ma.MaskedArray):
+        raise InputError("the film is a masked array; fill it first, every pixel has light")
+    film = np.asarray(film)
+    if film.ndim not in (3, 4) or len(film) < 2 or film.size == 0 or (film.ndim == 4 and film.shape[3] != 3):
         raise InputError(f"the film has shape {film.shape}; it must be (T, h, w) or (T, h, w, 3) with T of 2 or more")
-    return np.stack([_fitted(_linear(picture, gamma), shape) for picture in film[:most]])
-
-
-def _linear(picture: NDArray[np.generic], gamma: float) -> NDArray[np.float32]:
-    """(h, w[, 3]) as encoded to (h, w) linear light in [0, 1]."""
-    if picture.dtype.kind == "u":
-        full = 256**picture.dtype.itemsize - 1
-        values = picture.astype(np.float32) / np.float32(full)
-    elif picture.dtype.kind == "f":
-        values = picture.astype(np.float32)
+    if film.dtype.kind not in "uf":
+        raise InputError(f"the film's values are {film.dtype}; they must be uint8, uint16, or floats in [0, 1]")
+    if how.film_rate_hz is None and how.times_s is None:
+        raise InputError("film_rate_hz is None; say how many pictures a second were taken, or give times_s")
+    count = min(len(film), how.most or len(film))
+    if how.times_s is not None:
+        rate = None
+        time_s = given_times(how.times_s, count, how, "the film")
     else:
-        raise InputError(f"the film's values are {picture.dtype}; they must be uint8, uint16, or floats in [0, 1]")
-    if not (values.min() >= 0 and values.max() <= 1):
-        raise InputError(f"the film's values run from {values.min()} to {values.max()}; floats must lie in [0, 1]")
-    light = values ** np.float32(gamma)
-    return light if light.ndim == 2 else light @ np.asarray(LUMINANCE, np.float32)
-
-
-def _fitted(picture: NDArray[np.float32], shape: tuple[int, int] | None) -> NDArray[np.float32]:
-    """The middle of the picture that has the shape's proportions, at its size."""
-    if shape is None or picture.shape == tuple(shape):
-        return picture
-    rows, columns = picture.shape
-    zoom = min(rows / shape[0], columns / shape[1])
-    high, wide = max(1, round(zoom * shape[0])), max(1, round(zoom * shape[1]))
-    top, left = (rows - high) // 2, (columns - wide) // 2
-    way = cv2.INTER_AREA if zoom > 1 else cv2.INTER_LINEAR
-    middle = np.ascontiguousarray(picture[top : top + high, left : left + wide])
-    return np.asarray(cv2.resize(middle, (shape[1], shape[0]), interpolation=way), np.float32)
+        rate = how.film_rate_hz
+        time_s = np.arange(count) / np.float64(rate)
+    if how.seconds is not None:
+        count = min(count, int(np.searchsorted(time_s, how.seconds)) + 1)
+        time_s = time_s[:count]
+    transfer = how.transfer or "gamma2.2"
+    full = np.float32(256**film.dtype.itemsize - 1) if film.dtype.kind == "u" else np.float32(1)
+    light = np.stack(
+        [
+            fitted(grey(light_of(picture.astype(np.float32) / full, transfer, "the film"), how.channel), how.shape)
+            for picture in film[:count]
+        ]
+    )
+    bits = 32 if film.dtype.kind == "f" else 8 * film.dtype.itemsize
+    return Film(light, time_s, rate, float(time_s[-1] - time_s[-2]), transfer, bits)
