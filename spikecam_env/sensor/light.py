@@ -30,6 +30,13 @@ GRAINS = 1 << 23
 MAX_GRAINS_PER_FRAME = 2 * GRAINS
 """Light is capped at two thresholds a frame: from one on, a pixel fires in every frame anyway."""
 
+MOST_GRAINS = 128 * GRAINS
+"""Charge of a frame at most, whatever effects add to light and dark: below twice that, sums on the fast engine's grid
+are exact, and a frame's crossings are few."""
+
+LEAST_LIMIT = GRAINS // 64
+"""Charge at which a comparator trips at least, however far noise moves its reference down: each crossing takes some."""
+
 MAX_SEGMENT = 64
 """Longest key interval [frames] integrated as one ramp; longer ones are divided."""
 
