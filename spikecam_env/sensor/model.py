@@ -17,7 +17,7 @@ import tomli_w
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.effects.base import build
-from spikecam_env.sensor.ranges import check_parameters, parameter
+from spikecam_env.sensor.ranges import check_parameters, parameter, shown
 from spikecam_env.sensor.unit import Circuit, PixelArray, Unit, firing_law
 from spikecam_env.whole import write_text_whole
 
@@ -48,6 +48,8 @@ class SensorModel:
 
     def __post_init__(self) -> None:
         check_parameters(self, "")
+        if not isinstance(self.name, str):
+            raise InputError(f"name = {shown(self.name)}; it must be text")
         if not isinstance(self.circuit, Circuit):
             raise InputError(f"circuit is a {type(self.circuit).__name__}; it must be a Circuit")
         object.__setattr__(self, "effects", _in_physical_order(self.effects))
@@ -135,6 +137,14 @@ class SensorModel:
             raise unknown_name(f"effect of {self.name}", name, [e.name for e in self.effects])
         return replace(self, effects=tuple(e for e in self.effects if e.name != name))
 
+    def difference(self, other: SensorModel) -> str:
+        """The first thing in which another model differs, as `what: this, that`; empty where only names do."""
+        ours, theirs = _flat(self), _flat(other)
+        for what in ours | theirs:
+            if ours.get(what) != theirs.get(what):
+                return f"{what}: {ours.get(what, 'none')}, {theirs.get(what, 'none')}"
+        return ""
+
     def noise_free(self) -> SensorModel:
         """The ideal pixel with this circuit and frame rate."""
         return replace(self, name="ideal", effects=())
@@ -144,13 +154,20 @@ class SensorModel:
 
         Adding or removing one effect leaves the draws of the others as they were.
         """
-        return firing_law(self._pixels(shape, lambda effect: generator(seed, effect.name)))
+        return firing_law(self._pixels(shape, lambda effect: generator(seed, effect.name))).owned()
 
     def _pixels(self, shape: tuple[int, int], generator_of: Callable[[Effect], np.random.Generator]) -> PixelArray:
         pixels = PixelArray.nominal(self.circuit, self.frame_rate_hz, shape)
         for effect in self.effects:
             pixels = effect.imprint(pixels, generator_of(effect))
         return pixels
+
+
+def _flat(model: SensorModel) -> dict[str, Any]:
+    """All values of a model by their places."""
+    circuit = {f"circuit.{name}": value for name, value in asdict(model.circuit).items()}
+    effects = {f"{e.name}.{name}": value for e in model.effects for name, value in e.parameters().items()}
+    return {"frame_rate_hz": model.frame_rate_hz, **circuit, **effects}
 
 
 def _in_physical_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:

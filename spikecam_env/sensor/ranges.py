@@ -60,16 +60,16 @@ def range_text(field: dataclasses.Field[Any]) -> str:
 def _checked(value: Any, field: dataclasses.Field[Any], place: str) -> bool | int | float:
     if isinstance(field.default, bool):
         if not isinstance(value, (bool, np.bool_)):
-            raise InputError(f"{place} = {_shown(value)} must be true or false")
+            raise InputError(f"{place} = {shown(value)} must be true or false")
         return bool(value)
     low, high = field.metadata["bounds"]
     largest = field.metadata["largest"]
     number = _number(value)
     if not low <= number <= high or (largest is not None and largest < number < math.inf):
-        raise InputError(f"{place} = {_shown(value)} is outside {range_text(field)} {field.metadata['unit']}".rstrip())
+        raise InputError(f"{place} = {shown(value)} is outside {range_text(field)} {field.metadata['unit']}".rstrip())
     if isinstance(field.default, int):
         if not number.is_integer():
-            raise InputError(f"{place} = {_shown(value)} must be a whole number")
+            raise InputError(f"{place} = {shown(value)} must be a whole number")
         return int(number)
     return number + 0.0  # of -0.0 too: 0.0
 
@@ -84,7 +84,8 @@ def _number(value: Any) -> float:
         return math.inf if value > 0 else -math.inf
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value as an error names it: its text, of which the first 60 letters."""
     try:
         text = repr(value)
     except ValueError:  # a whole number of more than 4300 digits has no text

@@ -6,8 +6,10 @@ with shot noise the charge arrives as a Poisson stream of `electrons` to a thres
 
 from __future__ import annotations
 
+import hashlib
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,6 +153,18 @@ class PixelArray:
         return replace(self, reset_noise_mV=math.hypot(self.reset_noise_mV, sigma_mV))
 
 
+UNIT_RANGES = {
+    "gain": (0.0, 1e30),
+    "dark": (0.0, 1e30),
+    "electrons": (FEWEST_ELECTRONS, 1e15),
+    "kappa": (0.0, MOST_KAPPA),
+    "swing_V": (1e-6, 1e3),
+    "threshold_fC": (1e-9, 1e9),
+}
+"""Lowest and highest value of a pixel in a unit, in what `Unit` says.  Light is capped at two thresholds a frame, so
+gain and dark need only stay finite in single precision."""
+
+
 @dataclass(frozen=True)
 class Unit:
     """The firing law of every pixel; arrays are (H*W,) float64.
@@ -170,6 +184,28 @@ class Unit:
     shot: bool
     dark_is_noisy: bool
 
+    def owned(self) -> Unit:
+        """This unit, its arrays read-only; of arrays that somebody may change in place, copies."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name in UNIT_RANGES}
+        shared = {name: array for name, array in arrays.items() if array.flags.writeable or array.base is not None}
+        copies = {name: np.array(array, dtype=np.float64) for name, array in shared.items()}
+        for copy in copies.values():
+            copy.flags.writeable = False
+        return replace(self, **copies) if copies else self
+
+    def limited(self) -> Unit:
+        """This unit, its electrons and kappa within UNIT_RANGES, as those of single pixels of a spread may not be."""
+        within = {name: np.clip(getattr(self, name), *UNIT_RANGES[name]) for name in ("electrons", "kappa")}
+        return replace(self, **within)
+
+    @cached_property
+    def digest(self) -> str:
+        """Tells units apart: SHA-256 of all that they hold."""
+        sha = hashlib.sha256()
+        for f in fields(self):
+            sha.update(np.ascontiguousarray(getattr(self, f.name)).tobytes())
+        return sha.hexdigest()
+
     @property
     def grains_per_frame(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Gain and dark in the light law's unit, (P,) float32 each."""
@@ -185,10 +221,10 @@ def firing_law(pixels: PixelArray) -> Unit:
     return Unit(
         gain=(pixels.gain * nominal_fC / threshold_fC).reshape(-1),
         dark=(dark_fC_per_frame / threshold_fC).reshape(-1),
-        electrons=np.maximum(quanta * threshold_fC / nominal_fC, FEWEST_ELECTRONS).reshape(-1),
-        kappa=np.minimum(1e-3 * pixels.reset_noise_mV / pixels.swing_V, MOST_KAPPA).reshape(-1),
+        electrons=(quanta * threshold_fC / nominal_fC).reshape(-1),
+        kappa=(1e-3 * pixels.reset_noise_mV / pixels.swing_V).reshape(-1),
         swing_V=pixels.swing_V.reshape(-1),
         threshold_fC=threshold_fC.reshape(-1),
         shot=pixels.quanta > 0,
         dark_is_noisy=pixels.dark_is_noisy,
-    )
+    ).limited()
