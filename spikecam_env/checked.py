@@ -9,10 +9,9 @@ import math
 import operator
 import os
 import shutil
+from numbers import Real
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from spikecam_env.errors import InputError
 
@@ -80,10 +79,12 @@ def checked_above_zero(value: Any, name: str) -> float:
 
 
 def as_number(value: Any) -> float:
-    """A number as a float; NaN for text, true and false, and whatever else is no number or too large for a float."""
+    """A number as a float; NaN for text, true and false, arrays, and whatever else is no real number or too large."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return math.nan
     try:
-        return math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
-    except (TypeError, ValueError, OverflowError):
+        return float(value)
+    except (ValueError, OverflowError):
         return math.nan
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
+from spikecam_env.sensor.ranges import range_text
 from spikecam_env.whole import write_text_whole
 
 SECTIONS = ("Stage", "Seen in", "Twins", "Source")
@@ -99,11 +100,9 @@ def engines(effect: type[Effect]) -> str:
 
 
 def _row(f: Field[Any], effect: type[Effect]) -> str:
-    low_high = f.metadata["bounds"]
-    bounds = "" if low_high is None else f"{low_high[0]:g} .. {low_high[1]:g}"
     strength = f"; **strength**, {effect.neutral:g} changes nothing" if f.name == effect.strength else ""
     default = f"{f.default:.5g}" if isinstance(f.default, float) else str(f.default).lower()
-    return f"| `{f.name}` | {default} | {f.metadata['unit']} | {bounds} | {f.metadata['doc']}{strength} |"
+    return f"| `{f.name}` | {default} | {f.metadata['unit']} | {range_text(f)} | {f.metadata['doc']}{strength} |"
 
 
 def _title(stage: Stage) -> str:
