@@ -12,7 +12,7 @@ rest.  The same calls write the same bytes: the file holds no time of its making
 
 from __future__ import annotations
 
-import os
+import sys
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -24,8 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.streams.files import check_range, existing_file
 from spikecam_env.streams.packing import as_spikes, check_shape, pack_frames, packed_bytes, unpack_frames
+from spikecam_env.streams.whole_hdf5 import WholeHDF5
 from spikecam_env.version import __version__
-from spikecam_env.whole import beside_path
+from spikecam_env.whole import check_file
 
 FORMAT = "spikecam-recording/1"
 CHUNK_FRAMES = 32
@@ -44,7 +45,8 @@ class SpikeWriter:
             writer.append(spikes)
 
     shape: (rows, columns).  frame_rate_hz: None where unknown.  attributes: text, numbers or bools.
-    Errors: InputError for an attribute of another type or a reserved name, or spikes of another shape.
+    Errors: InputError for an attribute of another type or a reserved name, spikes of another shape, or a place that
+    cannot be written to, e.g. because the disk is full.
     """
 
     def __init__(
@@ -56,25 +58,26 @@ class SpikeWriter:
     ) -> None:
         self.path = Path(path)
         self.shape = check_shape(shape)
-        self._beside = beside_path(self.path)
+        check_file(self.path)
         self._attributes = _file_attributes(self.shape, frame_rate_hz, attributes)
+        self._whole = WholeHDF5(self.path, libver=LIBRARY_VERSIONS, rdcc_nbytes=CACHE_BYTES)
         self._file: h5py.File | None = None
 
     def __enter__(self) -> SpikeWriter:
-        self._file = h5py.File(self._beside, "w", libver=LIBRARY_VERSIONS, rdcc_nbytes=CACHE_BYTES)
-        self._file.attrs.update(self._attributes)
-        self._make_stream("spikes")
+        self._file = self._whole.__enter__()
+        try:
+            self._file.attrs.update(self._attributes)
+            self._make_stream("spikes")
+        except BaseException:
+            self.__exit__(*sys.exc_info())
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._open_file().close()
         self._file = None
-        if kind is None:
-            os.replace(self._beside, self.path)
-        else:
-            self._beside.unlink(missing_ok=True)
+        self._whole.__exit__(kind, error, trace)
 
     def append(self, spikes: ArrayLike, clean: ArrayLike | None = None) -> None:
         """Add frames: (T, H, W) spikes, and those of the noise-free twin, in every call or in none.
@@ -91,6 +94,7 @@ class SpikeWriter:
             raise InputError("spikes and clean must come together, as many frames of each, in every call or in none")
         for name, frames in streams.items():
             _grow(file[name], pack_frames(frames))
+        self._whole.check()
 
     def append_truth(self, frame: float, **arrays: ArrayLike) -> None:
         """Add ground truth at a frame, e.g. radiance, flow: the same names, shapes and dtypes at each call."""
@@ -109,6 +113,7 @@ class SpikeWriter:
             if group[name].shape[1:] != array.shape:
                 raise InputError(f"truth {name} is {array.shape}; it was {group[name].shape[1:]} before")
             _grow(group[name], array[None])
+        self._whole.check()
 
     def _make_stream(self, name: str) -> None:
         size = packed_bytes(self.shape)
