@@ -65,8 +65,8 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def made_folder(path: str | Path) -> Iterator[Path]:
-    """A folder for results, made if needed with those it is in; what was made goes again if the block fails before
+def made_folder(path: str | Path, use: str = "results") -> Iterator[Path]:
+    """A folder for `use`, made if needed with those it is in; what was made goes again if the block fails before
     anything is in it.
 
     Errors: WriteError where it cannot be made, or takes no new files.
@@ -78,7 +78,8 @@ def made_folder(path: str | Path) -> Iterator[Path]:
             with suppress(OSError):
                 folder.rmdir()
 
-    target = _resolved(path, "use")
+    unusable = f"cannot use {_shown(path)} as a folder for {use}"
+    target = _resolved(path, unusable)
     with when_stopped(remove):
         try:
             try:
@@ -91,7 +92,7 @@ def made_folder(path: str | Path) -> Iterator[Path]:
             except InputError:
                 raise
             except OSError as error:
-                raise WriteError(f"cannot use {path} as a folder for results: {reason(error)}") from error
+                raise WriteError(f"{unusable}: {reason(error)}") from error
             yield Path(path)
         except BaseException:
             remove()
@@ -164,7 +165,7 @@ def _file_at(path: str | Path) -> Path:
     return target
 
 
-def _resolved(path: str | Path, verb: str = "write") -> Path:
+def _resolved(path: str | Path, unusable: str = "") -> Path:
     """Links followed, those too that lead to nothing yet."""
     try:
         target = Path(os.path.realpath(path))
@@ -173,7 +174,7 @@ def _resolved(path: str | Path, verb: str = "write") -> Path:
         return target
     except (OSError, ValueError) as error:
         why = reason(error) if isinstance(error, OSError) else str(error)
-        raise WriteError(f"cannot {verb} {_shown(path)}: {why}; choose another name") from error
+        raise WriteError(f"{unusable or f'cannot write {_shown(path)}'}: {why}; choose another name") from error
 
 
 def _shown(path: str | Path) -> str:

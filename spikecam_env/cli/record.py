@@ -39,12 +39,12 @@ class Record:
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
         from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
+        from spikecam_env.whole import check_file
 
         suffix = self.out.suffix.lower()
         if suffix not in (".h5", ".hdf5", ".dat", ".npz"):
             raise InputError(f"--out {self.out}: unknown file type {suffix!r}; use .h5, .dat or .npz")
-        if not self.out.parent.is_dir():
-            raise InputError(f"--out {self.out}: there is no folder {self.out.parent}; make it first")
+        check_file(self.out)
         if self.frames < 1:
             raise InputError(f"--frames {self.frames}; record at least 1")
         model = self.camera.load()
