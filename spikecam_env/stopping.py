@@ -1,12 +1,12 @@
 """How the `spikecam` command stops: on the first SIGINT, SIGTERM or SIGHUP, within two seconds, whatever it is at.
 
     signal ──▶ handler raises `Stopped` in the main thread ──▶ everything unwinds and cleans up behind itself ──▶ leave
-          └──▶ a thread, woken through a pipe, waits GRACE_S, in case that is swallowed or takes too long ─────▶ leave
+          │                                               └──▶ it is swallowed, and so deleted ─────────────────▶ leave
+          └──▶ a thread, woken through a pipe, waits GRACE_S, for a call that does not come back ────────────────▶ leave
 
-An exception that a signal handler raises can be swallowed: by callbacks of compiled code, finalisers, a bare `except`.
-The main thread may also be in a call that does not come back.  So `leave` needs nobody's help: it kills the processes
-that were started, does what `when_stopped` was given, writes one line, and ends the process.  A second signal leaves
-at once.
+Callbacks of compiled code, finalisers and a bare `except` swallow what a signal handler raises.  So `leave` needs
+nobody's help: it kills the processes that were started, does what `when_stopped` was given, writes one line, and ends
+the process.  A second signal leaves at once.
 
 Only the command stops so: in a library's user the handlers are the user's.
 """
@@ -18,6 +18,7 @@ import signal
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
@@ -42,6 +43,7 @@ class _State:
     """Of this process.  code: exit code, once a signal has come.  done: the command's work is over."""
 
     code: int | None = None
+    raised: weakref.ref[Stopped] | None = None
     done = False
     watching = False
     leaving = threading.Lock()
@@ -120,6 +122,11 @@ def without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+def is_stopping() -> bool:
+    """Whether a signal has come: what goes wrong from then on follows from it, and is not worth a word."""
+    return _State.code is not None
+
+
 def leave(code: int) -> NoReturn:
     """End this process now: its children, what is half made, one line, exit code."""
     if not _State.leaving.acquire(blocking=False):
@@ -131,8 +138,19 @@ def leave(code: int) -> NoReturn:
             action()
     with suppress(OSError):
         # Not through sys.stderr: the main thread may hold its lock.
-        os.write(2, b"spikecam: stopped\n" if _State.done or "tqdm" not in sys.modules else b"\nspikecam: stopped\n")
+        os.write(2, b"\n" * _is_bar_open() + b"spikecam: stopped\n")
     os._exit(code)
+
+
+def _swallowed(reference: object) -> None:
+    if _State.code is not None:
+        leave(_State.code)
+
+
+def _is_bar_open() -> bool:
+    """Whether a progress bar waits at the end of its line."""
+    bars = getattr(sys.modules.get("tqdm"), "tqdm", None)
+    return bool(getattr(bars, "_instances", ()))
 
 
 def _on_signal(signum: int, frame: object) -> None:
@@ -142,7 +160,13 @@ def _on_signal(signum: int, frame: object) -> None:
         leave(128 + signum)
     if _State.code is None:
         _State.code = 128 + signum
-        raise Stopped(signum)
+        raise _noticed(Stopped(signum))  # no variable here: its traceback would keep it alive
+
+
+def _noticed(stopped: Stopped) -> Stopped:
+    """While it unwinds it is alive; when it no longer is, somebody has swallowed it."""
+    _State.raised = weakref.ref(stopped, _swallowed)
+    return stopped
 
 
 def _wait_for_signals(pipe: int) -> None:

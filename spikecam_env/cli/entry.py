@@ -47,7 +47,9 @@ def _with_streams(args: list[str] | None) -> int:
 
 
 def say(text: str) -> None:
-    """A line on standard error, if anybody can be told."""
+    """A line on standard error, if anybody can be told, and while nothing else is to be said."""
+    if stopping.is_stopping():
+        return
     with suppress(OSError):
         print(f"spikecam: {text}", file=sys.stderr, flush=True)
 
