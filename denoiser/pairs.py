@@ -30,6 +30,7 @@ from denoiser.window import RollingWindow, Window, WindowLayout, without_gain
 from scenes.collage import Collage
 from scenes.textures import random_texture
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
+from spikecam_env.stopping import without_interrupts
 from spikecam_env.streams import isi_planes
 
 TRAINING_KINDS = ("fractal_noise", "dead_leaves", "stripes", "blobs", "rectangles", "gradient")
@@ -167,7 +168,8 @@ class ClipFeed:
 
     def __next__(self) -> list[Sample]:
         while len(self._waiting) < self._ahead:
-            job = self._workers.submit(_draw_with, self._recipe, self._seed, self._next, self.weights)
+            with without_interrupts():  # it starts the workers
+                job = self._workers.submit(_draw_with, self._recipe, self._seed, self._next, self.weights)
             self._waiting.append(job)
             self._next += 1
         return self._waiting.popleft().result()

@@ -6,6 +6,7 @@ package version).  It is read with `weights_only=True`, so a foreign file cannot
 
 from __future__ import annotations
 
+import io
 import os
 import pickle
 from importlib import resources
@@ -68,6 +69,8 @@ def read_plain(path: str | os.PathLike[str]) -> Any:
 
 
 def write_whole(path: str | os.PathLike[str], data: Any) -> None:
-    """`torch.save` beside, then rename."""
+    """`torch.save`, whole; the same data give the same bytes under any name."""
+    held = io.BytesIO()
+    torch.save(data, held)
     with whole_file(Path(path)) as beside:
-        torch.save(data, beside)
+        beside.write_bytes(held.getbuffer())

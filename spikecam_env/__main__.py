@@ -1,5 +1,5 @@
 """`python -m spikecam_env` is the `spikecam` command."""
 
-from spikecam_env.cli.main import main
+from spikecam_env.cli.entry import main
 
 main()

@@ -2,9 +2,10 @@
 
 - `InputError`: a value, file or option from the user is unusable.  The message names the value, what is
   allowed, and what to do; the command line prints it in one line and exits with code 2.
+- `WriteError`: an `InputError` of a file that cannot be written: a full disk, a read-only folder.
 - `NotReadyError`: a call came before the one it needs (stepping before reset).
 
-Both are subclasses of the built-in a caller would expect, so `except ValueError` keeps working.
+All are subclasses of the built-in a caller would expect, so `except ValueError` or `OSError` keeps working.
 """
 
 from __future__ import annotations
@@ -15,6 +16,10 @@ from difflib import get_close_matches
 
 class InputError(ValueError):
     """An unusable value: says which, what is allowed, what to do."""
+
+
+class WriteError(InputError, OSError):
+    """A file or folder that cannot be written: says which and why."""
 
 
 class NotReadyError(RuntimeError):

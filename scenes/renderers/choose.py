@@ -86,6 +86,7 @@ def problem(name: str) -> str | None:
             capture_output=True,
             text=True,
             timeout=LONGEST_TRIAL_S,
+            start_new_session=True,  # out of reach of Ctrl-C, which `run` passes on by killing it
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
     except subprocess.TimeoutExpired:

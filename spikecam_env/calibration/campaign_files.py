@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.calibration.campaign import FORMAT, Campaign, read_campaign
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, WriteError
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import pack_frames
-from spikecam_env.whole import whole_file, write_text_whole
+from spikecam_env.whole import reason, whole_file, write_text_whole
 
 
 def campaign_folder(folder: str | Path) -> Path:
@@ -32,7 +32,7 @@ def campaign_folder(folder: str | Path) -> Path:
     try:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot use {target} as a folder for a campaign: {error.strerror}") from error
+        raise WriteError(f"cannot use {target} as a folder for a campaign: {reason(error)}") from error
     return target
 
 
@@ -40,7 +40,7 @@ def save_spikes(path: Path, blocks: Iterable[ArrayLike]) -> None:
     """Blocks of (T, H, W) spikes -> one `.dat`, unflipped; only a block at a time is in memory."""
     with whole_file(path) as beside, beside.open("wb") as file:
         for block in blocks:
-            pack_frames(block).tofile(file)
+            file.write(pack_frames(block).data)
 
 
 def save_light(path: Path, light: Keyframes) -> None:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from spikecam_env.calibration.findings import findings
 from spikecam_env.calibration.population import FLAGS, fitted_model
 from spikecam_env.calibration.report import report
 from spikecam_env.calibration.snee import Calibration
-from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
+from spikecam_env.streams.whole_hdf5 import WholeHDF5
 from spikecam_env.version import __version__
-from spikecam_env.whole import whole_file
+from spikecam_env.whole import made_folder, write_text_whole
 
 MAPS_FORMAT = "spikecam-maps/1"
 
@@ -22,15 +21,11 @@ MAPS_FORMAT = "spikecam-maps/1"
 def save_calibration(calibration: Calibration, folder: str | Path) -> list[Path]:
     """Write all three files; returns their paths."""
     target = Path(folder)
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot use {target} as a folder for results: {error.strerror}") from error
     paths = [target / name for name in ("model.toml", "maps.h5", "report.html")]
-    calibrated_model(calibration).to_toml(paths[0])
-    save_maps(calibration, paths[1])
-    with whole_file(paths[2]) as beside:
-        beside.write_text(report(calibration, findings(calibration)), encoding="utf-8")
+    with made_folder(target):
+        calibrated_model(calibration).to_toml(paths[0])
+        save_maps(calibration, paths[1])
+        write_text_whole(paths[2], report(calibration, findings(calibration)))
     return paths
 
 
@@ -62,7 +57,7 @@ def calibrated_model(calibration: Calibration) -> SensorModel:
 def save_maps(calibration: Calibration, path: str | Path) -> None:
     """Per-pixel maps (H, W) as HDF5: flags, swing_V, and a group a setting with gain, dark, their errors and fit."""
     c = calibration
-    with whole_file(path) as beside, h5py.File(beside, "w") as file:
+    with WholeHDF5(path) as file:
         file.attrs.update(
             format=MAPS_FORMAT,
             version=__version__,

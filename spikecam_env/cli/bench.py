@@ -32,7 +32,10 @@ class Bench:
         from spikecam_env.datasets.bench import bench_dataset
         from spikecam_env.sensor.bench import bench_sensor, machine
         from spikecam_env.sensor.effect_costs import bench_effects
+        from spikecam_env.whole import check_file
 
+        if self.out is not None:
+            check_file(self.out)
         print(machine())
         benches: dict[str, Callable[[], list[dict[str, Any]] | dict[str, list[dict[str, Any]]]]] = {
             "sensor": bench_sensor,

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 
 from spikecam_env.cli.options import Positive
+
+if TYPE_CHECKING:
+    from spikecam_env.calibration.findings import Finding
 
 
 @dataclass
@@ -28,16 +32,18 @@ class Calibrate:
 
     def run(self) -> None:
         from spikecam_env.calibration import calibrate, findings, read_campaign, save_calibration
+        from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.table import table
 
         campaign = read_campaign(self.campaign, outside=self.outside)
-        calibration = calibrate(campaign, reset_noise_mV=self.reset_noise_mv, progress=True)
-        rows = [
-            {"quantity": f.quantity, "value (90 %)": f.text, "unit": f.unit or "-", "status": f.status, "from": f.basis}
-            for f in findings(calibration)
-        ]
-        print(table(rows))
-        for warning in calibration.warnings:
-            print(f"note: {warning}")
-        for path in save_calibration(calibration, self.out):
-            print(f"wrote {path}")
+        with out_folder(self.out) as folder:
+            calibration = calibrate(campaign, reset_noise_mV=self.reset_noise_mv, progress=True)
+            print(table([_row(finding) for finding in findings(calibration)]))
+            for warning in calibration.warnings:
+                print(f"note: {warning}")
+            for path in save_calibration(calibration, folder):
+                print(f"wrote {path}")
+
+
+def _row(f: Finding) -> dict[str, str]:
+    return {"quantity": f.quantity, "value (90 %)": f.text, "unit": f.unit or "-", "status": f.status, "from": f.basis}

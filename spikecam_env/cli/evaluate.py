@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -34,9 +35,11 @@ class Evaluate:
 
     def run(self) -> None:
         from denoiser.evaluate import evaluate_quick, report
+        from spikecam_env.cli.files import out_folder
 
         weights = {mode: path for mode, path in (("paper", self.paper), ("best", self.best)) if path is not None}
-        result = evaluate_quick(weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=self.out)
+        with nullcontext() if self.out is None else out_folder(self.out):
+            result = evaluate_quick(weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=self.out)
         print(report(result), end="")
         if self.out is not None:
             print(f"wrote evaluate.json and evaluate.txt in {self.out}")

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 
-import imageio.v2 as imageio
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from tqdm import tqdm
 
-from spikecam_env.whole import whole_file
+from spikecam_env.cli.encoder import encoder
+from spikecam_env.whole import check_file, whole_file
 
 BACKGROUND, INK, FAINT = (16, 18, 22), (235, 238, 242), (150, 158, 170)
 MARGIN, CAPTION = 10, 50
@@ -68,35 +68,36 @@ def sheet(panels: Sequence[Panel], columns: int) -> NDArray[np.uint8]:
 
 
 def write_film(
-    path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], fps: float = 30.0, total: int | None = None
+    path: str | Path, frames: Iterable[NDArray[np.uint8]], fps: float = 30.0, total: int | None = None
 ) -> None:
     """Write (rows, columns, 3) uint8 frames as an H.264 MP4; the file appears when it is complete.
 
     total: how many frames there are, for the progress bar, where `frames` cannot say.
     """
-    with (
-        whole_file(Path(path)) as beside,
-        imageio.get_writer(beside, fps=fps, codec="libx264", quality=8, macro_block_size=2) as writer,
-    ):
-        for frame in tqdm(frames, desc="film", unit="frame", total=total, leave=False):
-            writer.append_data(frame)  # type: ignore[attr-defined]
+    with whole_file(path) as beside:
+        pictures = iter(tqdm(frames, desc="film", unit="frame", total=total, leave=False))
+        first = next(pictures)
+        with encoder(beside, first.shape[:2], fps) as add:
+            for picture in chain((first,), pictures):
+                add(picture)
 
 
 def write_gif(
-    path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], fps: float = 25.0, total: int | None = None
+    path: str | Path, frames: Iterable[NDArray[np.uint8]], fps: float = 25.0, total: int | None = None
 ) -> None:
     """Write (rows, columns, 3) uint8 frames as an animated GIF of 64 greys; the file appears when it is complete."""
+    check_file(path)
     first, *rest = (
         Image.fromarray(frame).convert("L").quantize(64)
         for frame in tqdm(frames, desc="film", unit="frame", total=total, leave=False)
     )
-    with whole_file(Path(path)) as beside:
+    with whole_file(path) as beside:
         first.save(beside, save_all=True, append_images=rest, duration=round(1000 / fps), loop=0)
 
 
-def write_picture(path: str | os.PathLike[str], picture: NDArray[np.uint8]) -> None:
+def write_picture(path: str | Path, picture: NDArray[np.uint8]) -> None:
     """Write a grey or RGB uint8 picture as PNG; the file appears whole."""
-    with whole_file(Path(path)) as beside:
+    with whole_file(path) as beside:
         Image.fromarray(picture).save(beside)
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
 from typing import Annotated, Any, Union
 
 import tyro
@@ -18,13 +15,17 @@ from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
+from spikecam_env.cli.entry import say
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.options import check_options
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
+from spikecam_env.cli.warned import warnings_as_lines
 from spikecam_env.errors import InputError
+from spikecam_env.stopping import Stopped
+from spikecam_env.whole import reason
 
 DESCRIPTION = """The spike camera you can step: simulate it, record it, denoise it online.
 
@@ -54,30 +55,37 @@ COMMANDS: dict[str, Any] = {
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run a subcommand; unusable input ends in one line on standard error and exit code 2."""
-    # Torch's threads spin long while they wait; beside other work on the same cores that can cost a factor of seven.
-    os.environ.setdefault("GOMP_SPINCOUNT", "10000")
-    # Asked to stop, clean up as after an interrupt: no half-written file, no simulation left running.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    sys.exit(run(args))
+    """The command, from signals to exit code (`cli.entry`)."""
+    from spikecam_env.cli.entry import main
+
+    main(args)
 
 
 def run(args: list[str] | None = None) -> int:
-    """Parse and run; returns the exit code."""
+    """Parse and run; returns the exit code.  Unusable input and faults of the disk end in one line."""
     union: Any = None
     for name, options in COMMANDS.items():
         command_type: Any = Annotated[options, tyro.conf.subcommand(name)]  # type: ignore[valid-type]
         union = command_type if union is None else Union[union, command_type]  # noqa: UP007
-    command = tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=args, config=(tyro.conf.OmitArgPrefixes,))
+    config = (tyro.conf.OmitArgPrefixes,)
     try:
-        check_options(command)
-        command.run()
+        with warnings_as_lines():
+            command = tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=args, config=config)
+            check_options(command)
+            command.run()
     except InputError as error:
-        print(f"spikecam: {error}", file=sys.stderr)
-        return 2
+        say(str(error))
+    except MemoryError as error:
+        say(f"out of memory ({error}); give a smaller --size or fewer --frames" if str(error) else "out of memory")
     except BrokenPipeError:
-        return 0
+        raise
+    except OSError as error:
+        say(f"{reason(error)}: {error.filename}" if error.filename is not None else f"cannot write: {reason(error)}")
+    except Stopped:
+        raise
     except KeyboardInterrupt:
-        print("spikecam: stopped", file=sys.stderr)
+        say("stopped")
         return 130
-    return 0
+    else:
+        return 0
+    return 2

@@ -42,12 +42,12 @@ class Record:
         from spikecam_env.sensor import SpikeSensor
         from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
         from spikecam_env.streams.packing import packed_bytes
+        from spikecam_env.whole import check_file
 
         suffix = self.out.suffix.lower()
         if suffix not in (".h5", ".hdf5", ".dat", ".npz"):
             raise InputError(f"--out {self.out}: unknown file type {suffix!r}; use .h5, .dat or .npz")
-        if not self.out.parent.is_dir():
-            raise InputError(f"--out {self.out}: there is no folder {self.out.parent}; make it first")
+        check_file(self.out)
         if suffix in (".h5", ".hdf5"):
             checked_disk(self.frames * packed_bytes(self.size), self.out, f"--frames {self.frames}")
         else:

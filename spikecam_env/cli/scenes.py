@@ -93,9 +93,11 @@ class Scenes:
 
         from scenes.catalogue import SCENES
         from spikecam_env.cli.film import Panel, sheet, write_picture
+        from spikecam_env.whole import check_file
 
         if path.suffix.lower() != ".png":
             raise InputError(f"--out {path}: unknown file type {path.suffix!r}; use .png")
+        check_file(path)
         names = (self.name,) if self.name else SCENES
         panels = []
         for name in tqdm(names, desc="scenes", unit="scene", leave=False):

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
@@ -25,7 +26,9 @@ from spikecam_env.datasets.ray_cluster import on_ray
 from spikecam_env.datasets.renderer import AUTO, first_that_works
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
+from spikecam_env.stopping import when_stopped
 from spikecam_env.streams.packing import packed_bytes
+from spikecam_env.whole import made_folder
 
 UNFINISHED = ".*.partial.*"
 """Files that a killed run leaves behind (`spikecam_env.whole`)."""
@@ -55,11 +58,7 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     frames = plan.frames * len(plan.entries)
     checked_disk(frames * packed_bytes(plan.shape), folder, f"a dataset of {frames} frames")
     target = Path(folder).resolve()
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot use {target} as a folder for a dataset: {error.strerror}") from error
-    with _alone_in(target):
+    with made_folder(target, "a dataset"), _alone_in(target), when_stopped(partial(_clear_unfinished, target)):
         plan = _with_renderer(plan, target)
         manifest = _begun(plan, target)
         _clear_unfinished(target)

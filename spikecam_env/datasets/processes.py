@@ -7,7 +7,6 @@ that dies is replaced, and its scene made again.  Workers end with the run that 
 from __future__ import annotations
 
 import os
-import signal
 import threading
 import traceback
 from collections import deque
@@ -23,6 +22,7 @@ from spikecam_env.datasets.plan import Entry, Plan
 from spikecam_env.datasets.worker import use_one_thread
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
+from spikecam_env.stopping import without_interrupts
 
 ATTEMPTS = 3
 """Deaths of workers over one scene before the run gives up."""
@@ -75,7 +75,8 @@ class _Worker:
         context = get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_work, args=(theirs, plan, folder), daemon=True)
-        process.start()
+        with without_interrupts():
+            process.start()
         theirs.close()
         worker = cls(process, ours, entry)
         worker.give(entry)
@@ -105,7 +106,6 @@ def _count_death(deaths: dict[str, int], entry: Entry) -> None:
 
 def _work(pipe: Connection, plan: Plan, folder: Path) -> None:
     """A worker's life: scenes from the pipe, news back."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     use_one_thread()
     try:

@@ -16,6 +16,7 @@ from scenes.protocol import Scene
 from spikecam_env.datasets.plan import Entry, Plan
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import SpikeWriter
+from spikecam_env.whole import said_of
 
 BLOCK = 64
 """Frames simulated and written at a time; a multiple of the chunks of the file."""
@@ -42,7 +43,8 @@ def write_scene(plan: Plan, entry: Entry, folder: Path) -> Iterator[int | Writte
         camera = SpikeSensor(plan.model, plan.shape, entry.unit_seed, engine="auto")
         twin = camera.clean_twin()
         path = folder / entry.path
-        path.parent.mkdir(exist_ok=True)
+        with said_of(path):
+            path.parent.mkdir(exist_ok=True)
         noisy, clean = (np.empty((BLOCK, *plan.shape), np.uint8) for _ in range(2))
     attributes = {**_attributes(plan, entry), "engine": camera.engine}
     with SpikeWriter(path, plan.shape, plan.model.frame_rate_hz, **attributes) as writer:

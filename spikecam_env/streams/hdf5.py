@@ -17,7 +17,7 @@ checksums, from earlier versions of this package, open as well.
 from __future__ import annotations
 
 import math
-import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -34,6 +34,7 @@ from spikecam_env.checked import checked_number, shown
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.streams.files import check_range
 from spikecam_env.streams.packing import as_spikes, check_shape, pack_checked, packed_bytes, unpack_frames
+from spikecam_env.streams.whole_hdf5 import WholeHDF5
 from spikecam_env.untrusted import (
     Count,
     Declared,
@@ -45,7 +46,7 @@ from spikecam_env.untrusted import (
     open_hdf5,
 )
 from spikecam_env.version import __version__
-from spikecam_env.whole import beside_path
+from spikecam_env.whole import check_file
 
 FORMAT = "spikecam-recording/1"
 CHUNK_FRAMES = 32
@@ -66,7 +67,8 @@ class SpikeWriter:
             writer.append(spikes)
 
     shape: (rows, columns).  frame_rate_hz: None where unknown.  attributes: text, numbers or bools.
-    Errors: InputError for an attribute of another type or a reserved name, or spikes of another shape.
+    Errors: InputError for an attribute of another type or a reserved name, spikes of another shape, or a place that
+    cannot be written to, e.g. because the disk is full.
     """
 
     def __init__(
@@ -78,27 +80,28 @@ class SpikeWriter:
     ) -> None:
         self.path = Path(path)
         self.shape = check_shape(shape)
-        self._beside = beside_path(self.path)
+        check_file(self.path)
         self._attributes = _file_attributes(self.shape, frame_rate_hz, attributes)
+        self._whole = WholeHDF5(self.path, libver=LIBRARY_VERSIONS, rdcc_nbytes=CACHE_BYTES)
         self._file: h5py.File | None = None
 
     def __enter__(self) -> SpikeWriter:
-        self._file = h5py.File(self._beside, "w", libver=LIBRARY_VERSIONS, rdcc_nbytes=CACHE_BYTES)
-        for name, value in self._attributes.items():
-            text = h5py.string_dtype("utf-8", max(1, len(value))) if isinstance(value, bytes) else None
-            self._file.attrs.create(name, value, dtype=text)
-        self._make_stream("spikes")
+        self._file = self._whole.__enter__()
+        try:
+            for name, value in self._attributes.items():
+                text = h5py.string_dtype("utf-8", max(1, len(value))) if isinstance(value, bytes) else None
+                self._file.attrs.create(name, value, dtype=text)
+            self._make_stream("spikes")
+        except BaseException:
+            self.__exit__(*sys.exc_info())
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._open_file().close()
         self._file = None
-        if kind is None:
-            os.replace(self._beside, self.path)
-        else:
-            self._beside.unlink(missing_ok=True)
+        self._whole.__exit__(kind, error, trace)
 
     def append(self, spikes: ArrayLike, clean: ArrayLike | None = None) -> None:
         """Add frames: (T, H, W) spikes, and those of the noise-free twin, in every call or in none.
@@ -115,6 +118,7 @@ class SpikeWriter:
             raise InputError("spikes and clean must come together, as many frames of each, in every call or in none")
         for name, frames in streams.items():
             _grow(file[name], pack_checked(frames))
+        self._whole.check()
 
     def append_truth(self, frame: float, **arrays: ArrayLike) -> None:
         """Add ground truth at a frame, e.g. radiance, flow: the same names, shapes and dtypes at each call."""
@@ -140,6 +144,7 @@ class SpikeWriter:
                     f"it was {before.dtype} of shape {before.shape[1:]} before"
                 )
             _grow(group[name], array[None])
+        self._whole.check()
 
     def _make_stream(self, name: str) -> None:
         size = packed_bytes(self.shape)

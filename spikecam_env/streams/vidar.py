@@ -63,7 +63,7 @@ def save_vidar_dat(path: str | Path, spikes: ArrayLike, *, flip: bool = False, b
     frames = as_spikes(spikes)
     packed = pack_frames(frames[:, ::-1] if flip else frames, bit_order=bit_order)
     with whole_file(path) as beside:
-        packed.tofile(beside)
+        beside.write_bytes(packed.data)
 
 
 def _count_frames(source: Path, shape: tuple[int, int]) -> int:

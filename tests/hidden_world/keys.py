@@ -60,8 +60,11 @@ def key_text(case: Case) -> str:
 def write_whole(path: Path, text: str) -> None:
     """Write beside, then rename."""
     beside = path.with_name(f".{path.name}.{os.getpid()}")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, path)
+    try:
+        beside.write_text(text, encoding="utf-8")
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def _hash(text: str) -> str:

@@ -24,6 +24,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from spikecam_env.stopping import without_interrupts
 from tests.hidden_world.cases import GROUPS, Case, cases
 from tests.hidden_world.keys import open_key, seal, write_whole
 from tests.hidden_world.score import Figure, Scored, by_effect, confusion, figures, score_case
@@ -77,7 +78,8 @@ def run_trial(
             yield done, len(picked)
         return
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        futures = [pool.submit(run_case, case, out, diagnose, threads, keep) for case in waiting]
+        with without_interrupts():  # it starts the workers
+            futures = [pool.submit(run_case, case, out, diagnose, threads, keep) for case in waiting]
         try:
             for future in as_completed(futures):
                 future.result()

@@ -1,0 +1,77 @@
+"""Where the `spikecam` command begins and ends: signals, standard streams, exit codes.
+
+0    done                          130, 143, 129   stopped by SIGINT, SIGTERM, SIGHUP (`spikecam_env.stopping`)
+1    an error of this package      141             whoever read the output has closed it
+2    unusable input, or a fault of the disk, said in one line
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from contextlib import suppress
+
+from spikecam_env import stopping
+
+UNREAD = 141
+"""Exit code of a command that a closed pipe ends, 128 + SIGPIPE."""
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run a subcommand and exit."""
+    with stopping.watched():
+        # Torch's threads spin long while they wait: beside other work on the same cores that costs a factor of seven.
+        os.environ.setdefault("GOMP_SPINCOUNT", "10000")
+        code = _with_streams(args)
+    sys.exit(code)
+
+
+def _with_streams(args: list[str] | None) -> int:
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - for as long as the process lives
+    if sys.stdout is None:
+        say("standard output is closed; give it somewhere to go, e.g. > /dev/null")
+        return 2
+    from spikecam_env.cli.main import run
+
+    try:
+        code = run(args)
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    except BrokenPipeError:
+        if not _is_unread():
+            raise
+        code = UNREAD
+    return _flushed(code)
+
+
+def say(text: str) -> None:
+    """A line on standard error, if anybody can be told, and while nothing else is to be said."""
+    if stopping.is_stopping():
+        return
+    with suppress(OSError):
+        print(f"spikecam: {text}", file=sys.stderr, flush=True)
+
+
+def _is_unread() -> bool:
+    """Whether it is our own output that nobody reads any more."""
+    if not hasattr(select, "poll"):
+        return True
+    poll = select.poll()
+    for number in (1, 2):
+        poll.register(number, select.POLLOUT)
+    return any(event & select.POLLERR for _, event in poll.poll(0))
+
+
+def _flushed(code: int) -> int:
+    """The exit code, once what was printed has been written; output that nobody takes is dropped."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        if isinstance(error, BrokenPipeError):
+            return code or UNREAD
+        say(f"cannot write to standard output: {error.strerror}")
+        return code or 2
+    return code
