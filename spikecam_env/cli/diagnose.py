@@ -33,7 +33,7 @@ class Diagnose:
     """Of every simulation; the same seed gives the same result."""
     jobs: int = 1
     """Simulations at a time."""
-    effort: float = 60.0
+    effort: float = 200.0
     """Times the campaign may be simulated before nothing more is begun that an answer can do without; inf: no end."""
 
     def run(self) -> None:

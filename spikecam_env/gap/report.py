@@ -124,12 +124,14 @@ def _opening_class(d: Diagnosis) -> Iterator[str]:
 
 
 def _opening_unknown(d: Diagnosis) -> Iterator[str]:
+    about = d.unknown or {}
+    one = "no single candidate" if "not_looked_for" in about else "no candidate"
     yield element(
         "p",
-        "The recordings and the model differ by more than chance, and no candidate of the catalogue leaves the noise "
+        f"The recordings and the model differ by more than chance, and {one} of the catalogue leaves the noise "
         "alone once it is fitted. What the difference looks like:",
     )
-    yield _structure_table(d.unknown or {})
+    yield _structure_table(about)
     yield element(
         "p",
         "The patched model below makes the gap smaller by an empirical correction. It describes; it claims no physics "
@@ -233,6 +235,8 @@ _STRUCTURE = {
     "where": "Where",
     "when": "When",
     "best_candidate": "Nearest candidate",
+    "not_looked_for": "Not looked for",
+    "effort": "--effort that looks for it",
     "worst_group": "Statistics that are off most",
     "groups": "Share of what is off, by statistics",
     "patch": "What the patched model holds",

@@ -153,6 +153,13 @@ def _class(d: Diagnosis) -> str:
 
 def _unknown(d: Diagnosis) -> str:
     least = _removed(d, "an empirical patch")
+    about = d.unknown or {}
+    if "not_looked_for" in about:
+        best = f"; {human(about['best_candidate'])} comes nearest" if about["best_candidate"] else ""
+        return (
+            f"Your camera does something that no single candidate explains{best}{least}. "
+            f"{about['not_looked_for'].capitalize()} was not looked for: --effort {about['effort']} looks for it."
+        )
     return f"Your camera does something that no candidate explains{least}."
 
 
