@@ -93,12 +93,13 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Bound:
-    """Upper bound (about 95 %, see `templates.bounds`) of an effect that was not found."""
+    """Upper bound (95 %, see `bounds`) of an effect that was not found.  at: its other parameters there, by name."""
 
     name: str
     parameter: str
     unit: str
     below: float
+    at: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
