@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ from spikecam_env.gap.observe import observe
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.search import of_fit
 from spikecam_env.gap.strength import bounded, with_effect
-from spikecam_env.gap.templates import load
+from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.twin import at_any_phase
 from spikecam_env.gap.world import planned
 from spikecam_env.sensor import SensorModel, SpikeSensor
@@ -97,12 +97,13 @@ def trial(bound: Bound, number: int) -> Trial:
     return Trial(bound.name, number, found[0].below if found else None, alarm)
 
 
-def _of_shape(bound: Bound) -> Any:
+def _of_shape(bound: Bound) -> Templates:
     """The templates, of the effect those of the bound's shape alone."""
-    from dataclasses import replace
 
     shipped = load()
-    alike = [e for e in shipped.weakest if e.name == bound.name and all(e.parameters[k] == v for k, v in bound.at.items())]
+    alike = [
+        e for e in shipped.weakest if e.name == bound.name and all(e.parameters[k] == v for k, v in bound.at.items())
+    ]
     return replace(shipped, entries=tuple(alike))
 
 
@@ -110,7 +111,7 @@ def rows(found: Sequence[Bound], done: Sequence[Trial]) -> Iterator[dict[str, An
     """A row an effect: its bound, how many of its trials it covers, and how many ring the alarm."""
     for b in found:
         own = [t for t in done if t.name == b.name]
-        covered = sum(t.alarm or t.below is None or t.below >= 0.999 * b.below for t in own)
+        covered = sum(covers(b, t) for t in own)
         low, high = wilson(covered, len(own))
         yield {
             "effect": b.name,
@@ -122,6 +123,11 @@ def rows(found: Sequence[Bound], done: Sequence[Trial]) -> Iterator[dict[str, An
             "95 % interval": f"{100 * low:.0f} to {100 * high:.0f} %",
             "alarm": f"{sum(t.alarm for t in own)} of {len(own)}",
         }
+
+
+def covers(bound: Bound, told: Trial) -> bool:
+    """Whether a campaign does not exclude the effect that is hidden in it."""
+    return told.alarm or told.below is None or told.below >= bound.below * (1 - 1e-9)
 
 
 def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
@@ -147,7 +153,9 @@ def main(out: Path, trials: int = 20, jobs: int = 1, only: tuple[str, ...] = ())
             now = {"bounds": [asdict(b) for b in found], "trials": [asdict(t) for t in done]}
             write_text_whole(out, json.dumps(now, indent=1))
     print(table(list(rows(found, done))))
-    covered = [t.alarm or t.below is None or t.below >= 0.999 * b.below for b in found for t in done if t.name == b.name]
+    covered = [
+        t.alarm or t.below is None or t.below >= 0.999 * b.below for b in found for t in done if t.name == b.name
+    ]
     if covered:
         low, high = wilson(sum(covered), len(covered))
         print(f"together {sum(covered)} of {len(covered)}: {100 * low:.1f} to {100 * high:.1f} %")

@@ -50,14 +50,18 @@ FARTHEST = 5.0
 LOOKS, TRIES, TESTED = 5, 5, 4
 """Strengths at which an effect is looked at for its score, and tried to be refuted, at most; campaigns a try."""
 
+LIKELY = 1.8
+"""Standard deviations of the score by which a refuted strength is likely to be above what is seen."""
+
 NEAR, FARTHER = 0.6, 1.2
 """A bound is at most 1 / NEAR times the least strength that would be refuted; the first that is tried is FARTHER times
 what the score lets expect."""
 
-COST = 100
+COST = 150
 """Campaigns that the bounds of all candidates take, by and large."""
 
-LONGER, MORE_EFFORT = "longer recordings, or more of them: even the strongest would hardly show", "a larger --effort"
+LONGER = "longer recordings, or more of them: in these the strongest would hardly show"
+MORE_EFFORT = "a larger --effort: enough had been simulated"
 """What is needed for a bound."""
 
 
@@ -65,8 +69,8 @@ LONGER, MORE_EFFORT = "longer recordings, or more of them: even the strongest wo
 class Score:
     """One number of a campaign that an effect makes larger.
 
-    of: (S,) statistics -> score.  without: (n,) of campaigns without the effect.  error: of the score, what labels and
-    laws are not known to.  shows_by: score at `parameters`, the mean without it 0.
+    of: (S,) statistics -> score.  without: (n,) of campaigns without the effect.  error: of the score, by what labels
+    and laws are not known to.  shows_by: how much more it is at `parameters`, where the unit `bare` settled as `unit`.
     """
 
     of: Callable[[Array], float]
@@ -74,6 +78,8 @@ class Score:
     error: float
     parameters: Parameters
     shows_by: float
+    bare: BaseFit | None = None
+    unit: BaseFit | None = None
 
     @property
     def middle(self) -> float:
@@ -82,26 +88,32 @@ class Score:
 
     @property
     def sd(self) -> float:
-        """Standard deviation of a campaign's score without the effect, beside the mean of these."""
+        """Standard deviation of a campaign's score without the effect, beside that mean."""
         n = len(self.without)
         return float(np.sqrt(np.var(self.without, ddof=1) * (1 + 1 / n) + self.error**2))
+
+    @property
+    def shows(self) -> float:
+        """Noises by which the effect shows."""
+        return self.shows_by / self.sd
 
 
 @dataclass(frozen=True)
 class Tried:
-    """A strength that was simulated.  score: mean of its campaigns'; sd: of the distance of one from that mean.
+    """A strength that was simulated.  more: mean score of its campaigns, beyond that without the effect; sd: of the
+    distance of a campaign from that mean; quantile: of that distance, CERTAIN of campaigns are nearer or above.
 
     events: expected of what can be counted, infinite elsewhere.
     """
 
-    score: float
+    more: float
     sd: float
-    events: float
     quantile: float
+    events: float
 
-    def refuted_by(self, seen: float) -> bool:
-        """Whether a campaign scores too little for it."""
-        return self.events > EVENTS and seen < self.score - self.quantile * self.sd
+    def refuted_by(self, more: float) -> bool:
+        """Whether a campaign that scores so much scores too little for it."""
+        return self.events > EVENTS and more < self.more - self.quantile * self.sd
 
 
 def bounds(
@@ -116,85 +128,108 @@ def bounds(
     by_name = dict.fromkeys(name for name, _ in starts)
     if not case.effort.allows("upper bounds", COST * len(case.conditions)):
         return [], [(name, MORE_EFFORT) for name in by_name]
+
+    def look(start: tuple[str, Parameters]) -> Look:
+        name, parameters = start
+        return looked_at(_OfUnits(case, model, null, name) if is_pattern(name) else
+                         _OfTwins(case, model, null, measured, name), measured, parameters)  # fmt: skip
+
     with ThreadPoolExecutor(case.jobs) as pool:
-        looks = list(pool.map(lambda start: _look(case, model, null, measured, *start), starts))
-        worst = {name: max((look for look in looks if look.name == name), key=lambda look: look.expected) for name in by_name}
-        found = list(pool.map(_bound, worst.values()))
+        looks = list(pool.map(look, starts))
+        worst = [max((k for k in looks if k.probe.name == name), key=lambda k: k.expected) for name in by_name]
+        found = list(pool.map(partial(bound_of, measured), worst))
     kept = [bound for bound in found if isinstance(bound, Bound)]
     return sorted(kept, key=lambda b: b.name), sorted(b for b in found if not isinstance(b, Bound))
 
 
 def _both_signs(name: str, parameters: Parameters) -> list[Parameters]:
-    key = CATALOGUE[name].strength
+    key = _key(name)
     return [parameters, {**parameters, key: -parameters[key]}] if may_be_negative(name) else [parameters]
 
 
 @dataclass(frozen=True)
-class _Look:
-    """A candidate of one shape, as it was looked at.  score: None where it does not show.  seen: the measurement's,
-    or what is usual without the effect where that is more: a campaign that happens to score little tells no more."""
+class Look:
+    """A candidate of one shape, as it was looked at.  score: None where it does not show.
 
-    name: str
+    more: what the measurement scores beyond what is usual without the effect; 0 where that is less, since a campaign
+    that happens to score little tells no more.
+    """
+
     probe: _OfTwins | _OfUnits
     score: Score | None
-    seen: float
+    more: float
 
     @property
     def expected(self) -> float:
         """Strength at which the bound is expected, infinite where the effect does not show."""
-        if self.score is None or self.score.shows_by < 0.5 * SHOWS * self.score.sd:
+        if self.score is None or self.score.shows < 0.5 * SHOWS:
             return np.inf
-        wanted = self.seen - self.score.middle + 1.8 * self.score.sd
-        return abs(self.score.parameters[_key(self.name)]) * (wanted / self.score.shows_by) ** (1 / _power(self.name))
+        factor = ((self.more + LIKELY * self.score.sd) / self.score.shows_by) ** (1 / _power(self.probe.name))
+        return float(abs(self.score.parameters[_key(self.probe.name)]) * factor)
 
 
-def _look(case: Case, model: SensorModel, null: Null, measured: Array, name: str, start: Parameters) -> _Look:
-    probe = _OfUnits(case, model, null, name) if is_pattern(name) else _OfTwins(case, model, null, measured, name)
-    score, parameters = None, bounded(name, start)
+def looked_at(probe: _OfTwins | _OfUnits, measured: Array, start: Parameters) -> Look:
+    """A candidate at a strength where it shows well, from a start."""
+    name, score = probe.name, None
+    parameters = bounded(name, start)
     for _ in range(LOOKS):
         score = probe.score(parameters) or score
-        shows = score.shows_by / score.sd if score else 0.0
+        shows = score.shows if score else 0.0
         factor = float(np.clip(AIM / max(shows, 0.3), 1 / 40, 40.0)) ** (1 / _power(name))
         louder = bounded(name, {**parameters, _key(name): parameters[_key(name)] * factor})
         if SHOWS <= shows <= TOO_LOUD or louder == parameters:
             break
         parameters = louder
-    return _Look(name, probe, score, max(score.of(measured), score.middle) if score else 0.0)
+    return Look(probe, score, more_of(score, measured))
 
 
-def _bound(look: _Look) -> Bound | tuple[str, str]:
-    """The least of the strengths that were tried above which none is open; or the name, with what is needed."""
+def more_of(score: Score | None, measured: Array) -> float:
+    """What a measurement scores beyond what is usual, at least 0."""
+    return max(score.of(measured) - score.middle, 0.0) if score else 0.0
+
+
+def bound_of(measured: Array, look: Look) -> Bound | tuple[str, str]:
+    """The least strength that was refuted and has none above it that was not; or the name, with what is needed."""
+    probe, name, key = look.probe, look.probe.name, _key(look.probe.name)
     if look.score is None or not np.isfinite(look.expected):
-        return look.name, LONGER
-    key, metadata = _key(look.name), CATALOGUE[look.name].__dataclass_fields__[_key(look.name)].metadata
-    at = dict(look.score.parameters)
-    at[key] *= FARTHER * look.expected / abs(at[key])
-    if (events := look.probe.events(at)) < 2 * EVENTS:
-        at[key] *= 2 * EVENTS / max(events, 1e-9) if look.probe.events({**at, key: 2 * at[key]}) > events else 1.0
+        return name, LONGER
+    score = probe.surer(look.score)
+    more = more_of(score, measured)
+    at = first_tried(look)
     least, most_open = np.inf, 0.0
     for _ in range(TRIES):
-        at = bounded(look.name, at)
-        size, tried = abs(at[key]), look.probe.tried(look.score, at)
-        wanted = look.seen - look.score.middle + tried.quantile * tried.sd
-        ratio = float(np.clip(wanted / max(tried.score - look.score.middle, 0.1 * wanted), 0.1, 10.0)) ** (1 / _power(look.name))
-        if tried.events <= EVENTS:
-            ratio = max(ratio, EVENTS / tried.events)
-        if tried.refuted_by(look.seen):
+        size, tried = abs(at[key]), probe.tried(score, at)
+        wanted = more + tried.quantile * tried.sd
+        ratio = float(np.clip(wanted / max(tried.more, 0.1 * wanted), 0.1, 10.0)) ** (1 / _power(name))
+        if tried.refuted_by(more):
             least = size
             if ratio > NEAR or most_open > NEAR * size:
                 break
-            step = FARTHER * ratio
         else:
             most_open = size
-            step = FARTHER * max(ratio, FARTHER)
-        between = np.sqrt(most_open * least) if most_open and np.isfinite(least) else size * step
-        if between * step == size:
+            ratio = max(ratio, FARTHER)
+        between = most_open and np.isfinite(least)
+        then = float(np.sqrt(most_open * least)) if between else FARTHER * ratio * size
+        then_at = bounded(name, {**at, key: np.sign(at[key]) * then})
+        if then_at == at:
             break
-        at = {**at, key: np.sign(at[key]) * between}
+        at = then_at
     if not np.isfinite(least):
-        return look.name, LONGER
-    others = {k: v for k, v in at.items() if k != key}
-    return Bound(look.name, key, metadata["unit"], float(least), others)
+        return name, LONGER
+    unit = CATALOGUE[name].__dataclass_fields__[key].metadata["unit"]
+    return Bound(name, key, unit, float(least), {k: v for k, v in at.items() if k != key})
+
+
+def first_tried(look: Look) -> Parameters:
+    """The parameters at a strength that is likely to be refuted: above where the bound is expected, and of what is
+    counted twice EVENTS at least, where more of the strength makes them more."""
+    assert look.score is not None
+    name, key, at = look.probe.name, _key(look.probe.name), dict(look.score.parameters)
+    at[key] *= FARTHER * look.expected / abs(at[key])
+    share = candidate(name).share
+    if share and share[0] == key:
+        at[key] *= max(2 * EVENTS / look.probe.events(at), 1.0)
+    return bounded(name, at)
 
 
 def _key(name: str) -> str:
@@ -205,125 +240,136 @@ def _power(name: str) -> float:
     return candidate(name).power
 
 
-class _OfTwins:
-    """Scores of twins of the campaign: of those with the effect, where it is strong, the last draws; the first say what
-    it scores where it is weak."""
-
-    def __init__(self, case: Case, model: SensorModel, null: Null, measured: Array, name: str):
-        self.case, self.model, self.null, self.name = case, model, null, name
-        everywhere = np.full(len(null.keys), np.inf)
-        self.only = concerned(case, [name], null, measured, everywhere)
-        used = {case.conditions[i].name for i in self.only}
-        self.there = np.array([k.group != "pattern" and k.recording in used for k in null.keys])
-        what = candidate(name)
-        several = WANDER if what.wanders else twins_of(name) if what.share else 1
-        self.looked = min(several, len(null.draws) // 2)
-        self.base: BaseFit | None = None
-        self.bare: BaseFit | None = None
-
-    def score(self, parameters: Parameters) -> Score | None:
-        """The score by the statistics that the effect clearly changes at some strength; None where it changes none."""
-        there = with_effect(self.model, self.name, parameters)
-        self.bare = within(there, within(self.model, self.case.base))
-        probe = partial(predict, self.case, null=self.null, count=self.looked, only=self.only)
-        made, self.base = settled_there(lambda m, b: probe(m, b), self.null, there, self.bare, [])
-        return self._score(made, parameters)
-
-    def _score(self, made: Prediction, parameters: Parameters) -> Score | None:
-        null, known = self.null, self.there
-        change = np.where(known, np.nan_to_num(made.mean - null.mean), 0.0)
-        draws = [d.values for d in null.draws[: -self.looked]]
-        if candidate(self.name).wanders:
-            z2 = np.mean([np.nan_to_num((d.values - null.mean) / null.noise) ** 2 for d in made.draws], axis=0)
-            moves = np.where(known, np.maximum(pooled(null.keys, z2) - 2.0, 0.0), 0.0)
-            if not moves.any():
-                return None
-            weight = moves / (1.0 + moves)
-            of = partial(_scatter, null, weight / weight.sum())
-        else:
-            own2 = (of_a_pair(null.keys) * null.noise) ** 2 / len(made.draws)
-            clear = is_clear(change, np.maximum(own2, 1e-300))
-            return _linear(null, np.where(clear, change, 0.0), draws, parameters, self._own_sd(made))
-        without = np.array([of(v) for v in draws])
-        shows_by = float(np.mean([of(d.values) for d in made.draws]) - without.mean())
-        return Score(of, without, 0.0, parameters, shows_by)
-
-    def events(self, parameters: Parameters) -> float:
-        """Expected of what can be counted; infinite elsewhere."""
-        return expected_events(self.name, parameters, self.case.conditions, self.case.observations)
-
-    def _own_sd(self, made: Prediction) -> Array:
-        """(S,) standard deviation of what the effect changes, where several campaigns tell, beyond that of pairs."""
-        without = {d.number: d.values for d in self.null.draws}
-        changes = np.nan_to_num([d.values - without[d.number] for d in made.draws])
-        return changes.std(axis=0, ddof=1) if len(changes) > 1 else np.zeros(len(self.null.keys))
-
-    def tried(self, score: Score, parameters: Parameters) -> Tried:
-        """What campaigns with the effect at a strength score."""
-        key, power = CATALOGUE[self.name].strength, candidate(self.name).power
-        assert self.bare is not None and self.base is not None
-        there = with_effect(self.model, self.name, parameters)
-        times = abs(parameters[key] / score.parameters[key]) ** power
-        wanders = candidate(self.name).wanders
-        count = min(WANDER if wanders else TESTED, len(self.null.draws) - self.looked)
-        null = replace(self.null, draws=self.null.draws[:count])
-        made = predict(self.case, there, shifted(self.bare, self.base, min(times, 1.0)), null, count, self.only)
-        scores = np.array([score.of(d.values) for d in made.draws])
-        without = np.array([score.of(d.values) for d in null.draws])
-        events = self.events(parameters)
-        if wanders:
-            sd, quantile = scores.std(ddof=1) * np.sqrt(1 + 1 / count), stats.t.ppf(CERTAIN, count - 1)
-            return Tried(float(scores.mean()), float(sd), events, float(quantile))
-        change = scores - without
-        mean = float(change.mean()) + float(score.without.mean())
-        own2 = max(float(np.var(scores, ddof=1)), float(np.var(score.without, ddof=1)) + change.mean() ** 2 / events)
-        sd = np.sqrt(own2 * (1 + 1 / len(score.without)) + np.var(change, ddof=1) / count + score.error**2)
-        return Tried(mean, float(sd), events, float(stats.t.ppf(CERTAIN, len(score.without) - 1)))
-
-
-class _OfUnits:
-    """Scores of drawn units, which differ by the model's pattern and by the effect's."""
+class _Probe:
+    """A candidate on the campaign at hand."""
 
     def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
         self.case, self.model, self.null, self.name = case, model, null, name
-        self.without = with_pattern(case, model, null, null.prediction).units
-
-    def score(self, parameters: Parameters) -> Score | None:
-        """The score by the statistics of the pattern that the effect changes; None where it changes none."""
-        assert self.without is not None
-        change = np.nan_to_num((self._units(parameters) - self.without).mean(axis=0))
-        return _linear(self.null, change, self.without, parameters)
-
-    def tried(self, score: Score, parameters: Parameters) -> Tried:
-        """What units with the effect at a strength score."""
-        scores = np.array([score.of(v) for v in self._units(parameters)])
-        events = self.events(parameters)
-        change = scores.mean() - score.without.mean()
-        own2 = max(float(np.var(scores, ddof=1)), float(np.var(score.without, ddof=1)) + change**2 / events)
-        sd = float(np.sqrt(own2 * (1 + 1 / UNITS) + score.error**2))
-        return Tried(float(scores.mean()), sd, events, float(stats.t.ppf(CERTAIN, UNITS - 1)))
 
     def events(self, parameters: Parameters) -> float:
         """Expected of what can be counted; infinite elsewhere."""
         return expected_events(self.name, parameters, self.case.conditions, self.case.observations)
 
-    def _units(self, parameters: Parameters) -> Array:
+    @staticmethod
+    def variance(score: Score, scores: Array, more: float, events: float) -> float:
+        """Of a campaign's score with the effect, which scores `more`: what few campaigns show, and at least what there
+        is without it and what so few events make."""
+        by_chance = more**2 / events
+        return max(float(np.var(scores, ddof=1)), float(np.var(score.without, ddof=1)) + by_chance)
+
+
+class _OfTwins(_Probe):
+    """Scores of twins of the campaign.  The last draws, with the effect where it is strong, say what to look at; the
+    first what that is where the effect is weak."""
+
+    def __init__(self, case: Case, model: SensorModel, null: Null, measured: Array, name: str):
+        super().__init__(case, model, null, name)
+        self.only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
+        used = {case.conditions[i].name for i in self.only}
+        self.there = np.array([k.group != "pattern" and k.recording in used for k in null.keys])
+        self.wanders = candidate(name).wanders
+
+    def score(self, parameters: Parameters, count: int = 1) -> Score | None:
+        """The score by the statistics that the effect clearly changes at some strength; None where it changes none."""
+        count = min(WANDER if self.wanders else count, len(self.null.draws) // 2)
         there = with_effect(self.model, self.name, parameters)
-        units = with_pattern(self.case, there, self.null, self.null.prediction).units
+        bare = within(there, within(self.model, self.case.base))
+
+        def probe(model: SensorModel, unit: BaseFit) -> Prediction:
+            return predict(self.case, model, unit, self.null, count, self.only)
+
+        made, unit = settled_there(probe, self.null, there, bare, [])
+        found = (self._scatter if self.wanders else self._change)(made, parameters)
+        return replace(found, bare=bare, unit=unit) if found else None
+
+    def surer(self, score: Score) -> Score:
+        """The score of single events by more campaigns: of few, which statistics they change is chance."""
+        if not candidate(self.name).share:
+            return score
+        return self.score(score.parameters, twins_of(self.name)) or score
+
+    def _change(self, made: Prediction, parameters: Parameters) -> Score | None:
+        null, count = self.null, len(made.draws)
+        change = np.where(self.there, np.nan_to_num(made.mean - null.mean), 0.0)
+        own2 = (of_a_pair(null.keys) * null.noise) ** 2 / count
+        change = np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0)
+        without = {d.number: d.values for d in null.draws}
+        each = np.nan_to_num([d.values - without[d.number] for d in made.draws])
+        scatter = each.std(axis=0, ddof=1) if count > 1 else 0.0
+        return _linear(null, change, [d.values for d in null.draws[:-count]], parameters, scatter)
+
+    def _scatter(self, made: Prediction, parameters: Parameters) -> Score | None:
+        null = self.null
+        z2 = np.mean([np.nan_to_num((d.values - null.mean) / null.noise) ** 2 for d in made.draws], axis=0)
+        moves = np.where(self.there, np.maximum(pooled(null.keys, z2) - 2.0, 0.0), 0.0)
+        if not moves.any():
+            return None
+        weight = moves / (1.0 + moves)
+        of = partial(_log_scatter, null, weight / weight.sum())
+        without = np.array([of(d.values) for d in null.draws[: -len(made.draws)]])
+        shows_by = float(np.mean([of(d.values) for d in made.draws]) - without.mean())
+        return Score(of, without, 0.0, parameters, shows_by)
+
+    def tried(self, score: Score, parameters: Parameters) -> Tried:
+        """What campaigns with the effect at a strength score."""
+        assert score.bare is not None and score.unit is not None
+        key, events = _key(self.name), self.events(parameters)
+        times = abs(parameters[key] / score.parameters[key]) ** _power(self.name)
+        count = min(WANDER if self.wanders else TESTED, len(score.without))
+        null = replace(self.null, draws=self.null.draws[:count])
+        unit = shifted(score.bare, score.unit, min(times, 1.0))
+        made = predict(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
+        scores, without = (np.array([score.of(d.values) for d in draws]) for draws in (made.draws, null.draws))
+        if self.wanders:
+            sd = float(scores.std(ddof=1)) * np.sqrt(1 + 1 / count)
+            return Tried(float(scores.mean()) - score.middle, sd, float(stats.t.ppf(CERTAIN, count - 1)), events)
+        change, n = scores - without, len(score.without)
+        more = float(change.mean())
+        own2 = self.variance(score, scores, more, events)
+        sd = float(np.sqrt(own2 * (1 + 1 / n) + np.var(change, ddof=1) / count + score.error**2))
+        return Tried(more, sd, float(stats.t.ppf(CERTAIN, n - 1)), events)
+
+
+class _OfUnits(_Probe):
+    """Scores of drawn units, which differ by the model's pattern and by the effect's."""
+
+    def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
+        super().__init__(case, model, null, name)
+        self.without = self._units(model)
+
+    def score(self, parameters: Parameters) -> Score | None:
+        """The score by the statistics of the pattern that the effect changes; None where it changes none."""
+        units = self._units(with_effect(self.model, self.name, parameters))
+        change = np.nan_to_num((units - self.without).mean(axis=0))
+        return _linear(self.null, change, self.without, parameters)
+
+    def surer(self, score: Score) -> Score:
+        """The same: units are many."""
+        return score
+
+    def tried(self, score: Score, parameters: Parameters) -> Tried:
+        """What units with the effect at a strength score."""
+        units, events = self._units(with_effect(self.model, self.name, parameters)), self.events(parameters)
+        scores = np.array([score.of(v) for v in units])
+        more = float(scores.mean()) - score.middle
+        sd = float(np.sqrt(self.variance(score, scores, more, events) * (1 + 1 / UNITS) + score.error**2))
+        return Tried(more, sd, float(stats.t.ppf(CERTAIN, UNITS - 1)), events)
+
+    def _units(self, model: SensorModel) -> Array:
+        units = with_pattern(self.case, model, self.null, self.null.prediction).units
         assert units is not None
         return units
 
 
 def _linear(
-    null: Null, change: Array, without: Sequence[Array] | Array, parameters: Parameters, own_sd: Array | float = 0.0
+    null: Null, change: Array, without: Sequence[Array] | Array, parameters: Parameters, scatter: Array | float = 0.0
 ) -> Score | None:
     """The score along what an effect changes (S,) at some strength; None where it changes nothing.
 
-    own_sd: (S,) by which that differs from campaign to campaign: what few events change by much tells little.
+    scatter: (S,) by which that differs from campaign to campaign: what few events change by much tells little.
     """
     shows = np.clip(change / null.noise, -FARTHEST, FARTHEST)
-    own2 = np.minimum(own_sd / null.noise, FARTHEST) ** 2
-    weight = null.weight * shows / (1.0 + own2)
+    weight = null.weight * shows / (1.0 + np.minimum(scatter / null.noise, FARTHEST) ** 2)
     if not weight.any():
         return None
     of = partial(_along, null, weight)
@@ -336,6 +382,6 @@ def _along(null: Null, weight: Array, values: Array) -> float:
     return float(weight @ np.clip(np.nan_to_num((values - null.mean) / null.noise), -FARTHEST, FARTHEST))
 
 
-def _scatter(null: Null, weight: Array, values: Array) -> float:
+def _log_scatter(null: Null, weight: Array, values: Array) -> float:
     """Score of statistics (S,) that an effect scatters, each way alike: the logarithm of their mean square."""
     return float(np.log(weight @ np.nan_to_num((values - null.mean) / null.noise) ** 2))
