@@ -98,8 +98,8 @@ def hidden_world(folder: Path) -> Any:
     """Its module `trial`; raises InputError where the folder is not the hidden world."""
     if not (folder / "trial.py").is_file():
         raise InputError(
-            f"there is no hidden world at {folder}; it comes with the source checkout (tests/hidden_world), "
-            "not with the installed package: clone the repository and give its folder as --world"
+            f"there is no hidden world at {folder}; it comes with the source checkout, not with the installed "
+            "package: clone the repository and give its tests/hidden_world as --world"
         )
     root = str(folder.resolve().parents[1])
     if root not in sys.path:

@@ -35,7 +35,7 @@ class Diagnose:
     """Of every simulation; the same seed gives the same result."""
     jobs: Workers = 1
     """Simulations at a time."""
-    effort: Effort = 60.0
+    effort: Effort = 200.0
     """Times the campaign may be simulated before nothing more is begun that an answer can do without; inf: no end."""
     outside: bool = False
     """Read files of the campaign that lie outside of its folder too."""
@@ -85,6 +85,8 @@ def summary(diagnosis: Diagnosis) -> str:
     found = _found(diagnosis)
     if found:
         parts += ["", table(found)]
+    if diagnosis.not_bounded and diagnosis.verdict == "none":
+        parts += [f"not bounded by these data: {', '.join(name for name, _ in diagnosis.not_bounded)}"]
     if diagnosis.class_ and diagnosis.class_.get("experiment"):
         parts += ["", f"to tell them apart: {diagnosis.class_['experiment']}"]
     parts += [f"note: {line}" for line in diagnosis.data]
@@ -95,7 +97,7 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
-    from spikecam_env.gap.words import bare, quantity, unit_of
+    from spikecam_env.gap.words import at_most, bare, quantity, shape_of_bound, unit_of
 
     rows = [
         {
@@ -113,7 +115,12 @@ def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         return [{"parameter": name, **values} for name, values in diagnosis.parameters.items()]
     if diagnosis.verdict == "none":
         return [
-            {"effect": b.name, "parameter": bare(b.name, b.parameter), "at most (95 %)": quantity(b.below, b.unit)}
+            {
+                "effect": b.name,
+                "parameter": bare(b.name, b.parameter),
+                "at most (95 %)": at_most(b),
+                "where it shows least": shape_of_bound(b),
+            }
             for b in diagnosis.bounds
         ]
     return []

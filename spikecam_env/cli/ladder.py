@@ -38,11 +38,12 @@ class Ladder:
 
         SensorModel.load(self.model)
         campaign = read_campaign(self.campaign, outside=self.outside)
-        from spikecam_env.gap import ladder
+        from spikecam_env.gap.ladder import ladder
+        from spikecam_env.gap.ladder import table as rungs
 
         with out_folder(self.out) as folder:
-            made = ladder.ladder(campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
+            made = ladder(campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
             made.write(folder)
-            print(table(ladder.table(made)))
+            print(table(rungs(made)))
             print(f"\ngap: mean square of {made.statistics} statistics' held-out part, in noise; 1 is chance")
             print(f"the figure: {folder / 'ladder.png'}   the model: {folder / 'model.toml'}")

@@ -1,10 +1,18 @@
-"""Where model and measurement disagree: campaigns, and what is made of them."""
+"""Where model and measurement disagree: campaigns, and what is made of them.
+
+`diagnose` and `ladder` are functions of the modules of these names.  They are imported here, after their modules, so
+that the package's attribute is the function whichever is imported first.
+"""
 
 from spikecam_env.calibration import Campaign, CampaignRecording, read_campaign
 from spikecam_env.gap.campaign import second_voltage, standard_design, write_campaign
+from spikecam_env.gap.diagnose import diagnose
 from spikecam_env.gap.imports import import_campaign
 from spikecam_env.gap.labels import Label, label_from_text, labels_from_table
+from spikecam_env.gap.ladder import ladder
 from spikecam_env.gap.recordings import KINDS, Bars, Dark, Disk, Flat, MaskedRows, Planned, Step
+from spikecam_env.gap.report import write_report
+from spikecam_env.gap.result import Diagnosis
 
 __all__ = [
     "KINDS",
@@ -12,17 +20,21 @@ __all__ = [
     "Campaign",
     "CampaignRecording",
     "Dark",
+    "Diagnosis",
     "Disk",
     "Flat",
     "Label",
     "MaskedRows",
     "Planned",
     "Step",
+    "diagnose",
     "import_campaign",
     "label_from_text",
     "labels_from_table",
+    "ladder",
     "read_campaign",
     "second_voltage",
     "standard_design",
     "write_campaign",
+    "write_report",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-CAMPAIGNS = 60.0
+CAMPAIGNS = 200.0
 """Default: so many times the campaign's recordings, with the twins that tell its noise (about 15)."""
 
 NEEDED = 1.3

@@ -56,7 +56,10 @@ FEWEST, TRIED = 3, 5
 MOST = 3
 """Effects that one diagnosis names together."""
 
-ANOTHER = {1: "a second effect", 2: "a third effect"}
+SECOND = "a second effect"
+"""Without having looked for it, nothing is named where something is left."""
+
+ANOTHER = {1: SECOND, 2: "a third effect"}
 """What is looked for beside so many."""
 
 BESIDE = 16

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -26,7 +27,7 @@ from spikecam_env.gap.missing import Missing
 from spikecam_env.gap.parameters import Off, with_strengths
 from spikecam_env.gap.place import when, where
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
-from spikecam_env.gap.search import Round
+from spikecam_env.gap.search import BESIDE, SECOND, Round
 from spikecam_env.gap.structure import structure
 from spikecam_env.gap.words import HELD_OUT_ALONE, LENT
 from spikecam_env.sensor import SensorModel
@@ -85,16 +86,17 @@ def concluded(
         replace(named(f, r, removed_instead(case, null, values, given, r)), where=there, when=then) for f, r in found
     )
     rivals = next(((f.name, *r.rivals) for f, r in found if r.rivals), ())
-    explained = explains(null, before, rho, last)
+    explained, left_open = explains(null, before, rho, last), SECOND in case.effort.left_out
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     if explained or chance or not rounds:
         effects = (*(named_missing(m) for m in lacking), *effects)
     unknown, class_ = None, None
     if contradictions:
         verdict = "data"
-    elif rounds and not chance and not (found and explained):
+    elif rounds and not chance and not (found and explained and not left_open):
         verdict, effects = "unknown", ()
         unknown = {**structure(case, null, before), "best_candidate": found[0][0].name if found else None}
+        unknown |= {"not_looked_for": SECOND, "effort": enough(case)} if left_open else {}
     elif rivals and not lacking:
         verdict = "class"
         class_ = {"members": list(rivals), "experiment": candidate(rivals[0]).experiment}
@@ -122,6 +124,11 @@ def concluded(
         seed=case.seed,
         stages={},
     )
+
+
+def enough(case: Case) -> int:
+    """Effort with which another effect would have been looked for beside those found, in tens."""
+    return 10 * math.ceil((case.effort.simulated / len(case.conditions) + BESIDE + 1) / 10)
 
 
 def accepted(rounds: Sequence[Round]) -> list[tuple[Fit, Round]]:

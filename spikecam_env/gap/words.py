@@ -8,7 +8,7 @@ import math
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap.effort import Effort
-from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect
+from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Gap, NamedEffect
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.catalogue_page import Sheet
 
@@ -123,6 +123,19 @@ def sizes(parameters: dict[str, Estimate], effect: str) -> str:
     return ", ".join(f"{bare(effect, p)} {quantity(e.value, unit_of(effect, p), e.sd)}" for p, e in parameters.items())
 
 
+def at_most(bound: Bound) -> str:
+    """A bound to two digits, rounded up: no less can be stated."""
+    scale, unit = _readable(bound.below, bound.unit)
+    value = bound.below * scale
+    digit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0 else 1.0
+    return f"{math.ceil(value / digit - 1e-9) * digit:.2g} {unit}".rstrip()
+
+
+def shape_of_bound(bound: Bound) -> str:
+    """The other parameters of an effect for which its bound is stated."""
+    return ", ".join(f"{bare(bound.name, k)} {quantity(v, unit_of(bound.name, k))}" for k, v in bound.at.items())
+
+
 def bare(effect: str, parameter: str) -> str:
     """A parameter's name in plain words, without its unit."""
     unit = unit_of(effect, parameter)
@@ -153,6 +166,13 @@ def _class(d: Diagnosis) -> str:
 
 def _unknown(d: Diagnosis) -> str:
     least = _removed(d, "an empirical patch")
+    about = d.unknown or {}
+    if "not_looked_for" in about:
+        best = f"; {human(about['best_candidate'])} comes nearest" if about["best_candidate"] else ""
+        return (
+            f"Your camera does something that no single candidate explains{best}{least}. "
+            f"{about['not_looked_for'].capitalize()} was not looked for: --effort {about['effort']} looks for it."
+        )
     return f"Your camera does something that no candidate explains{least}."
 
 

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import small
+from small import effect, recorded
 
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.gap import polish
 from spikecam_env.gap import search as searching
-from spikecam_env.gap.compare import Null, Prediction, judged
+from spikecam_env.gap.compare import Null, Prediction, judged, residual, values_of
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.fit import Fit
-from spikecam_env.gap.search import Round, cancelling, joined, may_be_rejoined, may_be_shaped, revisited
+from spikecam_env.gap.parameters import Off
+from spikecam_env.gap.search import BESIDE, SECOND, Round, cancelling, joined, may_be_rejoined, may_be_shaped, revisited
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.words import unfinished
+from spikecam_env.gap.verdict import concluded
+from spikecam_env.gap.words import sentence, unfinished
 
 
 def test_nothing_is_left_out_while_there_is_less_than_the_most():
@@ -162,3 +166,29 @@ def test_what_is_not_simulated_together_is_judged_by_the_model_given(monkeypatch
 
 def test_the_command_asks_for_what_the_function_does():
     assert Diagnose.__dataclass_fields__["effort"].default == pytest.approx(CAMPAIGNS)
+
+
+@pytest.mark.parametrize("left_out, verdict", [([], "named"), (["a third effect"], "named"), ([SECOND], "unknown")])
+def test_nothing_is_named_where_a_second_effect_was_not_looked_for(left_out: list[str], verdict: str):
+    """A dead time leaves so little that it may be named, once a second effect was looked for beside it."""
+    found = effect("dead_time", tau_us=0.5)
+    null, model = small.null(), small.MODEL.with_effect(found)
+    case = replace(recorded(found), effort=Effort(400, [300], left_out))
+    values = values_of(case.bank, null.keys)
+    close = Prediction(values, null.noise, null.sd, null.draws)
+    fit = Fit("dead_time", {"tau_us": 0.5}, {"tau_us": 0.01}, close, case.base, np.zeros(len(values)), 1.0, model)
+    first = Round(small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0, (fit,))
+    rounds = [first, Round(model, case.base, close, fit.rho, 1.0)]
+    off = Off({}, case.base)
+    said = concluded(case, small.MODEL, null, null.mean, values, (), off, rounds, (), ())
+    assert said.verdict == verdict and said.patched == model
+    if verdict == "unknown":
+        asked = said.unknown["effort"]
+        assert said.unknown["not_looked_for"] == SECOND and said.unknown["best_candidate"] == "dead_time"
+        assert len(case.conditions) * asked > 300 + BESIDE * len(case.conditions) and asked % 10 == 0
+        assert f"--effort {asked}" in sentence(said) and "dead time comes nearest" in sentence(said)
+
+
+def test_the_most_by_default_is_enough_to_look_for_a_second_effect():
+    """Of thirteen recordings: after the twins of the noise, a first effect and all its shapes."""
+    assert Effort(CAMPAIGNS * 13, [100 * 13]).allows(SECOND, BESIDE * 13, needed=True)
