@@ -13,7 +13,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, shown
 
 MOST_PIXELS = 1 << 26
 """Largest picture [pixels], 8192 x 8192: 64 times that of the largest spike camera."""
@@ -86,15 +86,6 @@ def as_number(value: Any) -> float:
         return float(value)
     except (ValueError, OverflowError):
         return math.nan
-
-
-def shown(value: Any) -> str:
-    """A value in an error's text: at most 60 characters."""
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
-        return f"a {type(value).__name__}"
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def checked_memory(size: int, what: str) -> None:
