@@ -300,7 +300,7 @@ def _stream(file: h5py.File, name: str, shape: tuple[int, int], where: str) -> h
 def _file_attributes(
     shape: tuple[int, int], frame_rate_hz: float | None, added: dict[str, object]
 ) -> dict[str, object]:
-    for name, value in added.items():
+    for name in added:
         if name in RESERVED:
             raise InputError(f"attribute {name} is written by the recording itself; choose another name")
     own: dict[str, object] = {
