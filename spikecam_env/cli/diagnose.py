@@ -47,7 +47,7 @@ class Diagnose:
 
         SensorModel.load(self.model)
         self._known_effects()
-        campaign = read_campaign(self.campaign, outside=self.outside)
+        campaign = read_campaign(self.campaign, outside=True) if self.outside else self.campaign
         from spikecam_env.gap.diagnose import diagnose
         from spikecam_env.gap.report import write_report
 

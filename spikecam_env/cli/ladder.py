@@ -37,7 +37,7 @@ class Ladder:
         from spikecam_env.sensor import SensorModel
 
         SensorModel.load(self.model)
-        campaign = read_campaign(self.campaign, outside=self.outside)
+        campaign = read_campaign(self.campaign, outside=True) if self.outside else self.campaign
         from spikecam_env.gap import ladder
 
         with out_folder(self.out) as folder:

@@ -1,0 +1,71 @@
+"""Every case of malformed input goes through `meets`, which knows what may come of it; counts are printed at the end."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from spikecam_env.cli.main import run
+
+TALLY: dict[str, Counter[str]] = {}
+
+
+@pytest.fixture
+def meets(request, tmp_path: Path, capfd) -> Callable[..., int]:
+    """Runs a command on malformed input: code 2 with one line and nothing left behind, or it was good after all.
+
+    A third outcome fails the test.  folder: where the command may write, looked at before and after.
+    """
+
+    def call(target: str, *args: object, folder: Path = tmp_path, good_codes: tuple[int, ...] = (0,)) -> int:
+        before = listing(folder)
+        capfd.readouterr()
+        try:
+            code = run([str(a) for a in args])
+        except SystemExit as end:
+            code = end.code
+        printed = capfd.readouterr()
+        assert "Traceback" not in printed.err
+        if code == 2:
+            said = [line for line in printed.err.splitlines() if line.strip() and not _is_aside(line)]
+            assert len(said) == 1 and said[0].startswith("spikecam: "), printed.err
+            assert len(said[0]) < 1000
+            left = listing(folder) - before
+            assert not left, left
+        else:
+            assert code in good_codes, printed.err
+            for name in listing(folder) - before:
+                path = folder / name
+                shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+        count(target, "refused" if code == 2 else "taken")
+        return code
+
+    return call
+
+
+def _is_aside(line: str) -> bool:
+    """Progress bars, and warnings."""
+    return "%|" in line or line.startswith("spikecam: warning: ")
+
+
+def count(target: str, outcome: str) -> None:
+    """One more case of a reader or command."""
+    TALLY.setdefault(target, Counter())[outcome] += 1
+
+
+def listing(folder: Path) -> set[str]:
+    """Names of all that is in a folder; folders without files do not count."""
+    return {str(p.relative_to(folder)) for p in folder.rglob("*") if not p.is_dir() or any(p.iterdir())}
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    if not TALLY:
+        return
+    total = sum(sum(outcomes.values()) for outcomes in TALLY.values())
+    terminalreporter.write_line(f"\nmalformed input: {total} cases, refused in one line or taken as good after all")
+    for target, outcomes in sorted(TALLY.items()):
+        terminalreporter.write_line(f"  {target:42} {outcomes['refused']:5} refused {outcomes['taken']:4} taken")

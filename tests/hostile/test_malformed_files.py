@@ -1,0 +1,337 @@
+"""Malformed files of every format that a command reads: one line, code 2, nothing left behind; never a traceback."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from mutations import damaged, json_files, npz, npz_files, toml_files
+
+from spikecam_env.calibration import write_flats
+from spikecam_env.calibration.campaign_files import save_rates
+from spikecam_env.datasets.manifest import Manifest
+from spikecam_env.sensor import SensorModel
+
+FRAMES, SHAPE = 64, (8, 8)
+RNG = np.random.default_rng(0)
+
+CAMPAIGN = {
+    "format": "spikecam-campaign/1",
+    "camera": {"height": 8, "width": 8, "frame_rate_hz": 40000.0},
+    "recordings": [
+        {
+            "name": "flat-01",
+            "spikes": "flat-01.dat",
+            "frames": FRAMES,
+            "radiance": "flat-01.npz",
+            "use": "fit",
+            "v_d": 1.1,
+            "temperature_k": 300.0,
+            "note": "a lamp",
+        },
+        {"name": "rates", "rates": "rates.npz", "radiance": "flat-02.npz"},
+        {"name": "dark-00", "spikes": "dark-00.dat", "frames": FRAMES, "radiance": "dark-00.npz", "v_d": 1.1},
+        {"name": "flat-02", "spikes": "flat-02.dat", "frames": FRAMES, "radiance": "flat-02.npz", "v_d": 1.1},
+    ],
+}
+MODEL = {
+    "format": "spikecam-model/1",
+    "name": "mine",
+    "frame_rate_hz": 40000.0,
+    "circuit": {
+        "reset_V": 3.3,
+        "reference_V": 2.2,
+        "bias_V": -0.0076,
+        "capacitance_fF": 4.348,
+        "temperature_K": 300.0,
+    },
+    "effect": [
+        {"name": "dead_time", "tau_us": 0.2},
+        {"name": "shot_noise", "quanta": 700.0, "dark_is_noisy": True},
+        {"name": "afterpulsing", "probability": 0.01, "delay_frames": 2},
+    ],
+}
+LIGHT = {"frame": np.zeros(1), "radiance": np.full((1, 1, 1), 0.1, np.float32)}
+BRIGHTER = {"frame": np.zeros(1), "radiance": np.full((1, 1, 1), 0.3, np.float32)}
+RATES = {"rate": np.full(SHAPE, 0.3), "frames": np.array(FRAMES)}
+SPIKES = (RNG.random((FRAMES, *SHAPE)) < 0.3).astype(np.uint8)
+STREAM = {"spikes": SPIKES, "time_axis": np.array(0)}
+MAPS = {"D_light": np.full(SHAPE, 3.0), "Nd": np.full(SHAPE, 2.0)}
+PACKED = {"seq": np.packbits(SPIKES, axis=0), "length": np.array(FRAMES)}
+
+
+def cases(files):
+    """As arguments of parametrize."""
+    return [pytest.param(data, id=label[:80]) for label, data in files]
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory) -> Path:
+    """A good campaign, but for its campaign.json."""
+    folder = tmp_path_factory.mktemp("campaign")
+    write_flats(folder, SensorModel.preset("physical"), levels=(0.0, 0.1, 0.3), frames=FRAMES, shape=SHAPE)
+    save_rates(folder / "rates.npz", RATES["rate"], FRAMES)
+    return folder
+
+
+def changed(folder: Path, name: str, data: bytes, good: dict = CAMPAIGN) -> Path:
+    """The campaign with one file changed; it goes back to what it was with the next."""
+    (folder / "campaign.json").write_text(json.dumps(good))
+    for file, arrays in (("flat-01.npz", LIGHT), ("flat-02.npz", BRIGHTER), ("rates.npz", RATES)):
+        (folder / file).write_bytes(npz(arrays))
+    (folder / name).write_bytes(data)
+    return folder
+
+
+@pytest.mark.parametrize("data", cases(json_files(CAMPAIGN, within=2)))
+def test_a_malformed_campaign_json_is_refused(data: bytes, campaign: Path, tmp_path: Path, meets) -> None:
+    meets("campaign.json (calibrate)", "calibrate", changed(campaign, "campaign.json", data), "--out", tmp_path / "out")
+
+
+@pytest.mark.parametrize("data", cases(npz_files(LIGHT)))
+def test_malformed_light_is_refused(data: bytes, campaign: Path, tmp_path: Path, meets) -> None:
+    meets("light .npz (calibrate)", "calibrate", changed(campaign, "flat-01.npz", data), "--out", tmp_path / "out")
+
+
+@pytest.mark.parametrize("data", cases(npz_files(RATES)))
+def test_malformed_rates_are_refused(data: bytes, campaign: Path, tmp_path: Path, meets) -> None:
+    meets("rates .npz (calibrate)", "calibrate", changed(campaign, "rates.npz", data), "--out", tmp_path / "out")
+
+
+@pytest.mark.parametrize("command", ["diagnose", "ladder"])
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", "[" * 10_000, '{"format": "spikecam-campaign/1"}', "9" * 5000])
+def test_a_malformed_campaign_is_refused_before_it_is_simulated(
+    command: str, text: str, campaign: Path, tmp_path: Path, meets
+) -> None:
+    folder = changed(campaign, "campaign.json", text.encode())
+    assert meets(f"campaign.json ({command})", command, folder, "--out", tmp_path / "out") == 2
+
+
+@pytest.mark.parametrize("data", cases(toml_files(MODEL)))
+def test_a_malformed_model_is_refused(data: bytes, tmp_path: Path, meets) -> None:
+    (tmp_path / "model.toml").write_bytes(data)
+    record = ("record", "--size", 4, 4, "--frames", 2, "--model", tmp_path / "model.toml", "--out")
+    meets("model .toml (record)", *record, tmp_path / "out.dat")
+
+
+TABLE = "file,radiance,name,use,v_d,temperature_k,note,height,width,flip,bit_order,first,count"
+ROW = ["a.dat", "0.3", "flat", "fit", "1.1", "300", "lamp", "8", "8", "false", "little", "0", "64"]
+CELLS = (
+    "",
+    "text",
+    "-1",
+    "0",
+    "1e308",
+    "nan",
+    "9" * 400,
+    "true",
+    "../../evil",
+    "/etc/hostname",
+    "a\x00b",
+    "x" * 200_000,
+)
+
+
+def label_tables():
+    """(what is wrong, the table)."""
+    row = ",".join(ROW)
+    for at, column in enumerate(TABLE.split(",")):
+        for cell in CELLS:
+            yield f"{column} is {cell[:12]!r}", f"{TABLE}\n{','.join([*ROW[:at], cell, *ROW[at + 1 :]])}\n".encode()
+    yield "an unknown column", f"{TABLE},colour\n{row},red\n".encode()
+    yield "a column twice", f"{TABLE},file\n{row},b.dat\n".encode()
+    yield "a cell too many", f"{TABLE}\n{row},more\n".encode()
+    yield "an open quote", f'{TABLE}\n"{row}\n'.encode()
+    yield "a file twice", f"{TABLE}\n{row}\n{row}\n".encode()
+    yield "no rows", f"{TABLE}\n".encode()
+    yield "no table", b"\x89PNG\r\n\x1a\n"
+    yield from damaged(f"{TABLE}\n{row}\n".encode())
+
+
+@pytest.fixture
+def recordings(tmp_path: Path) -> Path:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (folder / "a.dat").write_bytes(np.packbits(SPIKES.reshape(FRAMES, -1), axis=1, bitorder="little").tobytes())
+    return folder
+
+
+@pytest.mark.parametrize("data", cases(label_tables()))
+def test_a_malformed_table_of_labels_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
+    (tmp_path / "labels.csv").write_bytes(data)
+    options = ("--table", tmp_path / "labels.csv", "--frame-rate-hz", 40000)
+    meets("labels .csv (campaign import)", "campaign", "import", recordings, tmp_path / "out", *options)
+
+
+def imported(meets, target: str, folder: Path, out: Path, *labels: str) -> int:
+    """`campaign import` of labelled files, of 8 x 8 pixels."""
+    options = [part for label in labels for part in ("--label", label)]
+    shape = ("--frame-rate-hz", 40000, "--height", 8, "--width", 8)
+    return meets(f"{target} (campaign import)", "campaign", "import", folder, out, *options, *shape)
+
+
+@pytest.mark.parametrize("data", cases([*npz_files(STREAM), *npz_files(PACKED)]))
+def test_a_malformed_stream_in_an_npz_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
+    (recordings / "x.npz").write_bytes(data)
+    imported(meets, "spikes .npz", recordings, tmp_path / "out", "x.npz=0.3")
+
+
+@pytest.mark.parametrize("data", cases(npz_files(MAPS)))
+def test_malformed_flat_maps_are_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
+    (recordings / "maps.npz").write_bytes(data)
+    imported(meets, "flat maps .npz", recordings, tmp_path / "out", "maps.npz=relative")
+
+
+@pytest.mark.parametrize("data", cases(npz_files(LIGHT)))
+def test_malformed_light_of_a_label_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
+    (recordings / "light.npz").write_bytes(data)
+    imported(meets, "light .npz", recordings, tmp_path / "out", "a.dat=light.npz")
+
+
+@pytest.mark.parametrize("data", cases(damaged(bytes(range(256)) * 2)))
+def test_a_malformed_dat_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
+    (recordings / "a.dat").write_bytes(data)
+    imported(meets, "spikes .dat", recordings, tmp_path / "out", "a.dat=0.3")
+
+
+def h5_files():
+    """(what is wrong, the file) for a recording in HDF5."""
+    packed = np.packbits(SPIKES.reshape(FRAMES, -1), axis=1, bitorder="little")
+    attributes = {"format": "spikecam-recording/1", "height": 8, "width": 8, "frame_rate_hz": 40000.0, "seed": 0}
+    odd = {
+        "text": "text",
+        "true": True,
+        "negative": -1,
+        "zero": 0,
+        "huge": 2**62,
+        "a fraction": 7.5,
+        "NaN": np.nan,
+        "an array": np.arange(3),
+        "an empty array": np.zeros(0),
+        "null": h5py.Empty("f4"),
+        "complex": 1j,
+        "bytes": np.bytes_(b"\xff"),
+        "records": np.zeros((), [("a", "i4")]),
+    }
+    for name in attributes:
+        yield f"{name} is missing", _h5({"spikes": packed}, {k: v for k, v in attributes.items() if k != name})
+        for label, value in odd.items():
+            yield f"{name} is {label}", _h5({"spikes": packed}, {**attributes, name: value})
+    streams = {
+        "floats": packed.astype(float),
+        "text": np.array("text", dtype="S4"),
+        "signed": packed.astype(np.int8),
+        "one axis": packed.reshape(-1),
+        "three axes": SPIKES,
+        "no axes": np.uint8(3),
+        "empty": packed[:0],
+        "too wide": np.zeros((4, 9), np.uint8),
+        "complex": packed.astype(complex),
+        "records": np.zeros((4, 8), [("a", "u1")]),
+        "null": h5py.Empty("u1"),
+    }
+    for label, values in streams.items():
+        yield f"spikes are {label}", _h5({"spikes": values}, attributes)
+    yield "no spikes", _h5({}, attributes)
+    yield "spikes are a group", _h5({"spikes/inner": packed}, attributes)
+    yield "spikes declare much", _h5({}, attributes, declared=(1 << 50, 8))
+    yield "spikes are outside", _h5({}, attributes, external=True)
+    yield "spikes are a link", _h5({}, attributes, link=h5py.ExternalLink("/etc/hostname", "/x"))
+    yield "spikes are a broken link", _h5({}, attributes, link=h5py.SoftLink("/nowhere"))
+    yield from damaged(_h5({"spikes": packed}, attributes), flips=40)
+
+
+def _h5(arrays: dict, attributes: dict, declared=None, external: bool = False, link=None) -> bytes:
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        for name, values in arrays.items():
+            file.create_dataset(name, data=values)
+        if declared is not None:
+            file.create_dataset("spikes", declared, np.uint8, chunks=(64, 8))
+        if external:
+            file.create_dataset("spikes", (4, 8), np.uint8, external=[("/etc/hostname", 0, 32)])
+        if link is not None:
+            file["spikes"] = link
+        for name, value in attributes.items():
+            file.attrs[name] = value
+    return memory.getvalue()
+
+
+@pytest.mark.parametrize("data", cases(h5_files()))
+def test_a_malformed_h5_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
+    (recordings / "x.h5").write_bytes(data)
+    labels = ("--label", "x.h5=0.3")
+    meets("spikes .h5 (campaign import)", "campaign", "import", recordings, tmp_path / "out", *labels)
+
+
+DATASET = {
+    "format": "spikecam-dataset/1",
+    "settings": {
+        "package_version": "0",
+        "kind": "phm-n",
+        "shape": [8, 8],
+        "frames": 8,
+        "seed": 0,
+        "truth_every": 0,
+        "mean_interval": 10.0,
+        "model": "",
+        "renderer": "embree",
+    },
+    "files": [
+        {"path": "test/a.h5", "scene": "ball", "scene_seed": 0, "unit_seed": 1, "bytes": 3, "sha256": "0" * 64},
+        {"path": "test/b.h5", "scene": "fan", "scene_seed": 0, "unit_seed": 1, "bytes": None, "sha256": None},
+    ],
+}
+
+
+@pytest.mark.parametrize("data", cases(json_files(DATASET)))
+def test_a_malformed_manifest_is_refused(data: bytes, tmp_path: Path, meets) -> None:
+    (tmp_path / "dataset.json").write_bytes(data)
+    meets("dataset.json (dataset verify)", "dataset", "verify", tmp_path, good_codes=(1,))  # its files are missing
+
+
+@pytest.mark.parametrize("kind", ["a folder", "no file", "a pipe", "unreadable"])
+@pytest.mark.parametrize(
+    "target, args",
+    [
+        ("model .toml (record)", ("record", "--out", "{out}.dat", "--model", "{bad}.toml", "--size", 4, 4)),
+        ("campaign.json (calibrate)", ("calibrate", "{bad}", "--out", "{out}")),
+        ("campaign.json (diagnose)", ("diagnose", "{bad}", "--out", "{out}")),
+        ("campaign.json (ladder)", ("ladder", "{bad}", "--out", "{out}")),
+        ("labels .csv (campaign import)", ("campaign", "import", "{here}", "{out}", "--table", "{bad}")),
+        ("spikes .h5 (denoise)", ("denoise", "{bad}.h5", "--out", "{out}")),
+        ("spikes .dat (denoise)", ("denoise", "{bad}.dat", "--out", "{out}")),
+        ("spikes .npz (denoise)", ("denoise", "{bad}.npz", "--out", "{out}")),
+        ("dataset.json (dataset verify)", ("dataset", "verify", "{bad}")),
+        ("weights .pt (evaluate)", ("evaluate", "--best", "{bad}.pt", "--out", "{out}")),
+    ],
+)
+def test_what_is_no_file_is_refused(kind: str, target: str, args: tuple, tmp_path: Path, meets) -> None:
+    for ending in ("", ".toml", ".h5", ".dat", ".npz", ".pt"):
+        path = tmp_path / f"bad{ending}"
+        if kind == "a folder" or (kind == "unreadable" and not ending):
+            path.mkdir()
+        elif kind == "a pipe":
+            os.mkfifo(path)
+        elif kind == "unreadable":
+            path.symlink_to(path)
+    words = {"bad": tmp_path / "bad", "out": tmp_path / "out", "here": tmp_path}
+    assert meets(target, *(a.format(**words) if isinstance(a, str) else a for a in args)) == 2
+
+
+def test_the_good_ones_are_good(campaign: Path, recordings: Path, tmp_path: Path, meets) -> None:
+    """What the mutations start from opens: otherwise every one of them would be refused for another reason."""
+    folder = changed(campaign, "campaign.json", json.dumps(CAMPAIGN).encode())
+    assert meets("good files", "calibrate", folder, "--out", tmp_path / "out") == 0
+    for name, arrays in (("x.npz", STREAM), ("maps.npz", MAPS), ("light.npz", LIGHT), ("packed.npz", PACKED)):
+        (recordings / name).write_bytes(npz(arrays))
+    labels = ("x.npz=0.3", "a.dat=light.npz", "packed.npz=0.2")
+    assert imported(meets, "good files", recordings, tmp_path / "out", *labels) == 0
+    assert imported(meets, "good files", recordings, tmp_path / "out", "maps.npz=relative") == 0
+    (tmp_path / "dataset.json").write_text(json.dumps(DATASET))
+    assert len(Manifest.read(tmp_path).files) == 2

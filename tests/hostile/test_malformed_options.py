@@ -1,0 +1,265 @@
+"""Options out of their range, of every subcommand: one line, code 2, nothing left behind, before any work begins."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenes import RotatingDisk
+from scenes.catalogue import make_scene
+from scenes.protocol import Gaze
+from scenes.sliding import SlidingTexture
+from spikecam_env.cli.main import COMMANDS
+from spikecam_env.errors import InputError
+
+SEEDS = (-1, 2**63, 2**64, 10**30)
+COUNTS = (0, -3, 10**16, 10**30)
+WORKERS = (0, -1, 10**6, 2**64)
+SIZES = ((0, 8), (8, -3), (10**9, 10**9), (2**63, 1), (1, 10**9))
+FLOATS = ("nan", "inf", "-inf", "-1", "0", "1e400")
+SIZE_8 = ("--size", 8, 8)
+
+COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
+    "record": (
+        ("record", "--out", "{out}.h5", *SIZE_8, "--frames", 2),
+        {
+            "--seed": SEEDS,
+            "--frames": (*COUNTS, 10**15),
+            "--size": SIZES,
+            "--rpm": ("nan", "inf", "-inf", "1e308", "-1e308", "1e10", "1e400"),
+            "--effect": (
+                "dead_time:tau_us=nan",
+                "dead_time:tau_us=inf",
+                "dead_time:tau_us=-1",
+                "dead_time:tau_us=1e400",
+                f"dead_time:tau_us={'9' * 400}",
+                "dead_time:tau_us=",
+                "dead_time:=1",
+                "dead_time:tau_us",
+                "dead_time:tau_us=0x1",
+                "dead_time:tau=1",
+                ":",
+                "",
+                "dead_time,",
+                "shot_noise:dark_is_noisy=1",
+                "shot_noise:quanta=nan",
+                "afterpulsing:delay_frames=1.5",
+                f"afterpulsing:delay_frames={'9' * 5000}",
+                "afterpulsing:delay_frames=-1",
+            ),
+            "--without": ("", "shot", "\x00"),
+            "--model": ("", "scs", "..", "/", "\x00.toml", "x" * 300 + ".toml", "/dev/null.toml"),
+            "--scene": ("", "disks", "\x00"),
+            "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
+        },
+    ),
+    "demo": (
+        ("demo", "--out", "{out}", *SIZE_8),
+        {"--seed": SEEDS, "--frames": (*COUNTS, 499), "--size": SIZES, "--rpm": ("nan", "inf", "1e308")},
+    ),
+    "scenes": (
+        ("scenes", "disk", "--film", "{out}.mp4", "--frames", 1, "--size", 16, 16),
+        {
+            "--seed": SEEDS,
+            "--frames": (*COUNTS, 10**15),
+            "--every": COUNTS[:2],
+            "--size": SIZES,
+            "--film": ("{here}/x.avi", "{here}/x"),
+        },
+    ),
+    "campaign simulate": (
+        ("campaign", "simulate", "{out}", "--shape", 8, 8, "--frames", 2),
+        {
+            "--seed": SEEDS,
+            "--frames": (*COUNTS, 10**15),
+            "--shape": SIZES,
+            "--second-v-d": ("nan", "inf", "-5", "1e308"),
+            "--recording": (
+                "flat",
+                "flat:radiance=nan",
+                "flat:radiance=-1",
+                "flat:radiance=1e308",
+                "flat:radiance=text",
+                "flat:radiance=0.1,frames=0",
+                f"flat:radiance=0.1,frames={10**15}",
+                "flat:radiance=0.1,name=../../evil",
+                "flat:radiance=0.1,name=/etc/evil",
+                "flat:radiance=0.1,name=..",
+                "flat:radiance=0.1,name=a/b",
+                "flat:radiance=0.1,name=nul",
+                "flat:radiance=0.1,name=x.",
+                f"flat:radiance=0.1,name={'x' * 300}",
+                "flat:radiance=0.1,use=train",
+                "flat:radiance=0.1,v_d=nan",
+                "step:half_period=1",
+                "step:half_period=-5",
+                "step:low=nan",
+                "bars:speed=1e-308",
+                "bars:speed=nan",
+                "bars:period=nan",
+                "bars:period=1e308",
+                "disk:rim_speed=1e308",
+                "disk:seed=-1",
+                "masked_rows:band=0",
+                "masked_rows:band=100",
+                "flats:radiance=1",
+            ),
+        },
+    ),
+    "campaign import": (
+        ("campaign", "import", "{here}", "{out}", "--label", "a.dat=0.3", "--frame-rate-hz", 40000, "--height", 8,
+         "--width", 8),
+        {
+            "--frame-rate-hz": FLOATS,
+            "--radiance-per-unit": FLOATS,
+            "--holdout-share": ("nan", "inf", "-1", "1"),
+            "--height": (*COUNTS, 9),
+            "--width": COUNTS,
+            "--crop-width": (*COUNTS, 9),
+            "--time-axis": (10**30,),
+            "--rows": ((-1, 3), (3, 1), (0, 10**30), (0, 9)),
+            "--columns": ((-1, 3), (3, 3), (0, 100)),
+            "--label": ("a.dat=nan", "a.dat=-1", "a.dat=1e400", "a.dat=", "=1", "a.dat", "../a.dat=1", "/etc/hostname=1",
+                        "a.dat=../x.npz", "\x00=1", "x" * 300 + "=1", "a.dat=relative", ".=1", "..=1"),
+            "--table": ("{here}/none.csv", "{here}", "{here}/a.dat"),
+        },
+    ),
+    "calibrate": (("calibrate", "{here}", "--out", "{out}"), {"--reset-noise-mv": FLOATS}),
+    "diagnose": (
+        ("diagnose", "{here}", "--out", "{out}"),
+        {
+            "--seed": SEEDS,
+            "--jobs": WORKERS,
+            "--effort": ("nan", "-1", "0", "-inf"),
+            "--candidates": ("", "lag"),
+            "--exclude": ("", "lag"),
+            "--model": ("scs", "", "{here}/none.toml"),
+        },
+    ),
+    "ladder": (("ladder", "{here}", "--out", "{out}"), {"--seed": SEEDS, "--jobs": WORKERS, "--model": ("scs",)}),
+    "dataset spift-n": (
+        ("dataset", "spift-n", "--out", "{out}", *SIZE_8, "--frames", 2, "--train", 1, "--test", 0),
+        {
+            "--seed": SEEDS,
+            "--frames": (*COUNTS, 10**15),
+            "--size": SIZES,
+            "--truth-every": (-1, 10**30),
+            "--mean-interval": (*FLOATS, "1e308", "0.5"),
+            "--jobs": WORKERS,
+            "--train": (-1, 10**12, 10**30),
+            "--test": (-1, 10**12, 10**30),
+        },
+    ),
+    "dataset phm-n": (
+        ("dataset", "phm-n", "--out", "{out}", *SIZE_8, "--frames", 2),
+        {"--seed": SEEDS, "--scenes": ("", "balls", "\x00")},
+    ),
+    "dataset verify": (("dataset", "verify", "{here}"), {"--jobs": WORKERS}),
+    "denoise": (
+        ("denoise", "{here}/a.dat", "--out", "{out}", "--height", 8, "--width", 8),
+        {
+            "--window": (*COUNTS, 4, 101),
+            "--height": (*COUNTS, 9),
+            "--width": (*COUNTS, 10**9),
+            "--crop-width": (*COUNTS, 9),
+        },
+    ),
+    "train": (
+        ("train", "--out", "{out}", "--steps", 1),
+        {
+            "--seed": SEEDS,
+            "--steps": COUNTS,
+            "--minutes": FLOATS,
+            "--batch": (*COUNTS, 10**9),
+            "--lr": (*FLOATS, "1e308"),
+            "--threads": WORKERS,
+            "--workers": WORKERS,
+            "--steps-per-clip": COUNTS,
+            "--refresh-every": COUNTS,
+            "--device": ("", "gpu", "cuda:99", "\x00"),
+        },
+    ),
+    "evaluate": (("evaluate", "--out", "{out}"), {"--seed": SEEDS, "--scenes": COUNTS, "--best": ("{here}/a.dat",)}),
+    "blind-trial": (
+        ("blind-trial", "--out", "{out}"),
+        {"--jobs": WORKERS, "--threads": WORKERS, "--limit": COUNTS, "--world": ("{here}",), "--only": ("easy",)},
+    ),
+    "effects": (("effects",), {"": ("dead_tim", "..", "\x00", "x" * 1000)}),
+    "bench": (("bench", "sensor", "--out", "{here}/none/x.json"), {}),
+}  # fmt: skip
+
+
+def lines():
+    for name, (line, options) in COMMAND_LINES.items():
+        for option, values in options.items():
+            for value in values:
+                words = value if isinstance(value, tuple) else (value,)
+                said = " ".join(map(repr, words))
+                yield pytest.param(name, line, option, words, id=f"{name} {option} {said}"[:80])
+
+
+@pytest.mark.parametrize("name, line, option, words", lines())
+def test_an_option_out_of_range_is_refused_by_name(
+    name: str, line: tuple, option: str, words: tuple, tmp_path: Path, meets
+) -> None:
+    (tmp_path / "a.dat").write_bytes(bytes(range(256)) * 2)
+    given = [*line]
+    if option in given:
+        at = given.index(option)
+        after = next((i for i in range(at + 1, len(given)) if str(given[i]).startswith("--")), len(given))
+        del given[at:after]
+    separate = f"{option}={words[0]}" if len(words) == 1 and option else None
+    given += [separate] if separate else [*filter(None, [option]), *words]
+    places = {"here": tmp_path, "out": tmp_path / "out"}
+    filled = [_filled(word, places) for word in given]
+    assert meets(f"options of {name}", *filled) == 2
+
+
+def _filled(word: Any, places: dict[str, Path]) -> Any:
+    for place, path in places.items():
+        word = word.replace(f"{{{place}}}", str(path)) if isinstance(word, str) else word
+    return word
+
+
+def test_every_command_is_in_the_table() -> None:
+    assert {name.split()[0] for name in COMMAND_LINES} >= set(COMMANDS)
+
+
+BAD = (np.nan, np.inf, -np.inf, 1e308, -1e308, 10**400, "1", True, None)
+
+
+@pytest.mark.parametrize("value", BAD, ids=repr)
+@pytest.mark.parametrize("name", ["rpm", "angle", "motion_per_key", "frame_rate_hz", "radius"])
+def test_a_number_that_no_disk_has_is_refused(name: str, value: Any) -> None:
+    """rpm 1e308 was an index that is NaN in compiled code: a segmentation fault."""
+    if (name, value) == ("radius", None):
+        pytest.skip("the default")
+    with pytest.raises(InputError, match=name):
+        RotatingDisk((16, 16), **{name: value})
+
+
+@pytest.mark.parametrize("value", BAD, ids=repr)
+def test_a_place_that_no_scene_has_is_refused(value: Any) -> None:
+    disk = RotatingDisk((16, 16))
+    for make in (
+        lambda: disk.placed((value, 0.0)),
+        lambda: disk.placed((0.0, 0.0), drift_px_s=(0.0, value)),
+        lambda: Gaze.fixed(value, 0.0),
+        lambda: Gaze((0.0, 0.0), (0.0, 0.0), (0.0, value)),
+        lambda: SlidingTexture((16, 16), velocity_px_s=(value, 0.0)),
+        lambda: make_scene("disk", (16, 16), frame_rate_hz=value),
+        lambda: make_scene("disk", (16, 16), mean_interval=value),
+    ):
+        if make.__code__.co_consts == disk and value == 1e308:
+            continue
+        with pytest.raises(InputError):
+            make()
+
+
+def test_a_disk_that_has_drifted_far_away_is_out_of_sight() -> None:
+    disk = RotatingDisk((16, 16), drift_px_s=(1e9, -1e9), background=0.1)
+    assert np.all(disk.truth(4e15).radiance == np.float32(0.1))
+    assert disk.radiance(2**52, 2**52 + 4).radiance.max() == np.float32(0.1)
