@@ -35,13 +35,14 @@ def read_foreign_hdf5(
     key: path of the array, default the only one that can be a stream; links are not followed.  The rest as `load_npz`.
     Raises InputError if the file is absent, damaged or no HDF5, and as `load_npz`.
     """
+    choice = Choice(key, item, batch_axis, time_axis, flip, first, count)
     with open_hdf5(path) as file:
         try:
             name = stream_key(named_arrays(file, key, path), key, path)
         except InputError as error:
             raise InputError(f"{error}; it is not a recording of this package (no format attribute)") from error
         array = array_of(file, name, path)
-    return one_stream(array, Choice(key, item, batch_axis, time_axis, flip, first, count), path, name)
+    return one_stream(array, choice, path, name)
 
 
 def named_arrays(file: h5py.File, key: str | None, path: str | Path) -> dict[str, h5py.Dataset]:

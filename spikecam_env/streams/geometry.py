@@ -1,8 +1,8 @@
 """Whether a headerless file was read with the right geometry: what its spikes say.
 
-A pixel of a spike camera integrates light, so its spikes are regular: one that fires less than every second frame hardly
-ever fires in two frames running, and one that fires more often hardly ever misses two.  Call the rarer of spike and
-gap an event, b in {0, 1}.
+A pixel of a spike camera integrates light, so its spikes are regular: one that fires less than every second frame
+hardly ever fires in two frames running, and one that fires more often hardly ever misses two.  Call the rarer of spike
+and gap an event, b in {0, 1}.
 
 1. Coincidence.  In blocks of BLOCK frames, over the pixels with n events in a block,
 
@@ -49,8 +49,8 @@ KNOWN_SHAPES = (
     (480, 640),
     (360, 640),
 )
-"""(rows, columns) of the cameras, dumps and public simulations whose files are about: Vidar, Vidar with the padding of its
-USB dumps, SPIFT and PHM, UHSR, SPS100, and simulated sets (SpikeCV, Spike-Zoo, SpikeGS)."""
+"""(rows, columns) of cameras, dumps and public simulations: Vidar, Vidar with the padding of its USB dumps, SPIFT and
+PHM, UHSR, SPS100, and simulated sets (loaders of SpikeCV, Spike-Zoo and others)."""
 
 BLOCK = 16
 """Frames in which a pixel's light is taken as steady."""
@@ -65,10 +65,10 @@ SURE = 8.0
 WIDTH_MARGIN = 0.15
 """By how much the correlation of rows of another length must be larger."""
 TURNED = 0.7
-"""Ratio of squared differences 15 pixels apart and across a byte's edge; right order 0.95 and more, wrong 0.1 to 0.55."""
+"""Ratio of squared differences 15 pixels apart and across a byte's edge; right order 0.95 and more, wrong to 0.55."""
 DEEP, SHALLOW = 0.2, 0.003
-"""Share of the chance coincidences that is missing at the length of a frame: where it is looked for, and where the reading
-says it is (light that flickers within a block of frames leaves little)."""
+"""Share of the chance coincidences that is missing at the length of a frame: where it is looked for, and where the
+reading says it is (light that flickers within a block of frames leaves little)."""
 MOST_TRIED = 12
 """Lengths that the search looks at closely, the shortest first."""
 LAGS = 6
@@ -150,7 +150,7 @@ class Coincidences:
 
 
 def coincidences(bits: NDArray[np.uint8], lag: int) -> Coincidences:
-    """c of the module's rule 1, of frames of `lag` bits, one after the other in `bits`; c is 0 where nothing is known."""
+    """c of the module's rule 1, of frames of `lag` bits, one after the other in `bits`; 0 where nothing is known."""
     frames = bits[: len(bits) // lag * lag].reshape(-1, lag)[:256]
     block = min(BLOCK, len(frames))
     if block < 4:

@@ -4,8 +4,8 @@
     bits 500 .. 509      line, 1 to 500
     bits 510 .. 511      channel, 0 to 3
 
-A frame is 2000 packets and begins with that of line 500, channel 0, and ends with that of line 500, channel 3; a dump may
-begin in the middle of one.  Rows are taken in the order of the file.
+A frame is 2000 packets and begins with that of line 500, channel 0, and ends with that of line 500, channel 3; a dump
+may begin in the middle of one.  Rows are taken in the order of the file.
 
 This is what the public parser says (SpikeCV, `sps_parser.py` and `load_dat.py`); no dump was at hand to try.  So the
 reader checks what the description allows to be checked, and refuses a file that is out of step.

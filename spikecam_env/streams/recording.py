@@ -52,7 +52,8 @@ def read_recording(path: str | Path, **options: Any) -> Recording:
         .npz          load_npz: key, item, batch_axis, time_axis, flip, bit_order
         .npy          read_npy: item, batch_axis, time_axis, flip
         .mat          read_mat: key, item, batch_axis, time_axis, flip
-        .h5, .hdf5    of this package, read_hdf5: stream; others, read_foreign_hdf5: key, item, batch_axis, time_axis, flip
+        .h5, .hdf5    of this package, read_hdf5: stream
+                      of others, read_foreign_hdf5: key, item, batch_axis, time_axis, flip
 
     Warns (UserWarning) where the spikes say that it was read wrong.
     Raises InputError for another ending, an option the format does not have, and all that its loader refuses.
@@ -84,12 +85,12 @@ def _loader(path: str | Path) -> Callable[..., Any]:
     ending = Path(path).suffix.lower()
     if ending in (".h5", ".hdf5"):
         return read_hdf5 if is_recording(path) else read_foreign_hdf5
-    if ending not in LOADERS:
-        raise InputError(f"{path} ends in {ending!r}; a recording is one of {', '.join([*LOADERS, '.h5', '.hdf5'])}")
-    return LOADERS[ending]
+    if ending not in _LOADERS:
+        raise InputError(f"{path} ends in {ending!r}; a recording is one of {', '.join(ENDINGS)}")
+    return _LOADERS[ending]
 
 
-LOADERS: dict[str, Callable[..., Any]] = {
+_LOADERS: dict[str, Callable[..., Any]] = {
     ".dat": read_dat,
     ".raw": read_raw,
     ".bin": read_raw,
@@ -97,3 +98,5 @@ LOADERS: dict[str, Callable[..., Any]] = {
     ".npy": read_npy,
     ".mat": read_mat,
 }
+ENDINGS = (*_LOADERS, ".h5", ".hdf5")
+"""Of the names of files that `read_recording` reads."""

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.checked import checked_whole
+from spikecam_env.checked import checked_whole, shown
 from spikecam_env.errors import InputError
 from spikecam_env.streams.files import check_range
 from spikecam_env.streams.geometry import KNOWN_SHAPES
@@ -46,6 +46,12 @@ class Choice:
     flip: bool | None = None
     first: int = 0
     count: int | None = None
+
+    def __post_init__(self) -> None:
+        for name, kind in (("key", str), ("flip", bool)):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, kind):
+                raise InputError(f"{name} is {shown(value)}; it must be {'text' if kind is str else 'True or False'}")
 
 
 def stream_key(arrays: Mapping[str, Any], key: str | None, path: str | Path) -> str:
@@ -151,7 +157,8 @@ def time_axis(stored: NDArray[np.uint8], given: int | None, stated: int | None, 
                 raise InputError(f"{path}: time_axis is {axis}; it must be 0, 1 or 2")
             if len(silent) == 1 and axis != 1 and axis not in silent:
                 warnings.warn(
-                    f"{path} of shape {stored.shape} is read with time_axis={axis}; its spikes say time_axis={silent[0]}",
+                    f"{path} of shape {stored.shape} is read with time_axis={axis}; "
+                    f"its spikes say time_axis={silent[0]}",
                     UserWarning,
                     stacklevel=6,
                 )

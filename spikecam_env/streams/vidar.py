@@ -56,8 +56,8 @@ def load_vidar_dat(
     height, width: default the side file's, else 250 x 400.  flip: turn each frame upside down, as public Vidar files
     need.  bit_order: little, or big.  crop_width: keep that many columns from the left.  layout: bits, or packets.
     first, count: frames to read, default all.
-    Warns (UserWarning) where the spikes say that the geometry is wrong, where the last frame is cut, and where an option
-    is not what the side file says.
+    Warns (UserWarning) where the spikes say that the geometry is wrong, where the last frame is cut, and where an
+    option is not what the side file says.
     Raises InputError if the file is absent or holds no frame, its size is a whole number of frames of another known
     geometry only, or the frames or columns asked are not in it.
     """
@@ -197,8 +197,8 @@ def _whole_frames(source: Path, frame: int, taken: Geometry) -> int:
     fitting = [(h, w) for h, w in KNOWN_SHAPES if size and size % (packed_bytes((h, w)) if bits else h * w) == 0]
     if frames and (not fitting or (bits and _regular(source, taken))):
         warnings.warn(
-            f"{source} ends in the middle of a frame of {taken.height} x {taken.width} pixels, {rest} of {frame} bytes; "
-            f"its {frames} whole frames are read",
+            f"{source} ends in the middle of a frame of {taken.height} x {taken.width} pixels, {rest} of {frame} "
+            f"bytes; its {frames} whole frames are read",
             UserWarning,
             stacklevel=5,
         )
