@@ -20,8 +20,8 @@ class Denoise:
     """
 
     file: tyro.conf.Positional[Path]
-    """.h5 (from `spikecam record`, or an array in another's), .npz, .npy or .mat (a spike array), .dat (raw Vidar bits),
-    .raw or .bin (a byte a pixel)."""
+    """.h5 (of `spikecam record`, or an array in another), .npz, .npy, .mat (a spike array), .dat (raw Vidar bits), .raw,
+    .bin (a byte a pixel)."""
     out: Path = Path("denoised")
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Literal["best", "paper"] = "best"

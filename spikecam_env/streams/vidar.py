@@ -148,8 +148,7 @@ def _from_bits(source: Path, taken: Geometry, first: int, count: int | None) -> 
     size = packed_bytes(taken.shape)
     frames = _whole_frames(source, size, taken)
     first, stop = check_range(first, count, frames, str(source))
-    seen = source.stat()
-    doubt = _doubt(str(source), seen.st_mtime_ns, seen.st_size, taken.shape, taken.bit_order)
+    doubt = _doubt_of(source, taken)
     if doubt:
         warnings.warn(
             f"{source} read as {taken.height} x {taken.width} pixels, bit order {taken.bit_order}: {doubt}",
@@ -195,7 +194,9 @@ def _whole_frames(source: Path, frame: int, taken: Geometry) -> int:
         return frames
     bits = frame == packed_bytes(taken.shape)
     fitting = [(h, w) for h, w in KNOWN_SHAPES if size and size % (packed_bytes((h, w)) if bits else h * w) == 0]
-    if frames and (not fitting or (bits and _regular(source, taken))):
+    doubt = _doubt_of(source, taken) if frames and bits else ""
+    regular = bool(frames and bits and fitting) and looks_right(_probe(source, frame), taken.bit_order)
+    if frames and not doubt and (regular or not fitting):
         warnings.warn(
             f"{source} ends in the middle of a frame of {taken.height} x {taken.width} pixels, {rest} of {frame} "
             f"bytes; its {frames} whole frames are read",
@@ -207,13 +208,13 @@ def _whole_frames(source: Path, frame: int, taken: Geometry) -> int:
     hint = f"known geometries that divide it: {names}" if fitting else "no known geometry divides it"
     raise InputError(
         f"{source} has {size} bytes; {taken.height} x {taken.width} pixels take {frame} bytes a frame, "
-        f"remainder {size % frame}.  Give the height and width it was recorded with ({hint})"
+        f"remainder {size % frame}.  Give the height and width it was recorded with ({doubt or hint})"
     )
 
 
-def _regular(source: Path, taken: Geometry) -> bool:
-    """Whether spikes say that the geometry is right, though another known one divides the file."""
-    return looks_right(_probe(source, packed_bytes(taken.shape)), taken.bit_order)
+def _doubt_of(source: Path, taken: Geometry) -> str:
+    seen = source.stat()
+    return _doubt(str(source), seen.st_mtime_ns, seen.st_size, taken.shape, taken.bit_order)
 
 
 @lru_cache(maxsize=256)

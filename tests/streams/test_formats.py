@@ -174,7 +174,7 @@ def test_another_time_axis_than_the_spikes_say_is_warned_of(tmp_path: Path) -> N
 def test_a_recording_of_this_package_takes_its_own_options(tmp_path: Path) -> None:
     write_own(tmp_path / "a.h5", regular())
     assert reading_options(tmp_path / "a.h5") == ("first", "count", "stream")
-    with pytest.raises(InputError, match="flip does not apply to .h5 files of this package"):
+    with pytest.raises(InputError, match=r"flip does not apply to \.h5 files of this package"):
         read_recording(tmp_path / "a.h5", flip=True)
 
 

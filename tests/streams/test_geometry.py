@@ -131,9 +131,8 @@ def test_a_right_reading_is_never_doubted(name: str) -> None:
     packed = pack_frames(spikes)
     found = coincidences(np.unpackbits(packed[:80].ravel(), bitorder="little"), 8 * packed.shape[1])
     doubt = geometry_doubt(packed, spikes.shape[1:])
-    print(
-        f"{name:22s} rate {spikes.mean():.4f}  coincidence {found.next_frame:5.2f} of {found.chance:8.0f}  {doubt or 'no doubt'}"
-    )
+    said = f"coincidence {found.next_frame:5.2f} of {found.chance:8.0f}  {doubt or 'no doubt'}"
+    print(f"{name:22s} rate {spikes.mean():.4f}  {said}")
     assert doubt is None
 
 

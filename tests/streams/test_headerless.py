@@ -67,6 +67,12 @@ def test_a_byte_a_pixel_is_warned_of_and_reads_as_raw(tmp_path: Path) -> None:
     np.testing.assert_array_equal(recording.spikes, spikes)
 
 
+def test_a_size_that_does_not_divide_is_refused_where_the_spikes_say_why(tmp_path: Path) -> None:
+    save_vidar_dat(tmp_path / "a.dat", ramp(30, (300, 500)))
+    with pytest.raises(InputError, match=r"remainder 3500.*height=300, width=500"):
+        load_vidar_dat(tmp_path / "a.dat", height=250, width=416)
+
+
 @pytest.mark.parametrize("cut", [1, 700, 12_499])
 def test_whole_frames_of_a_cut_recording_are_read_with_a_warning(tmp_path: Path, cut: int) -> None:
     path = tmp_path / "a.dat"
