@@ -20,7 +20,7 @@ class Denoise:
     """
 
     file: tyro.conf.Positional[Path]
-    """.h5 (of `spikecam record`, or an array in another), .npz, .npy, .mat (a spike array), .dat (raw Vidar bits), .raw,
+    """.h5 (of `spikecam record`, or an array in another), .npz, .npy, .mat (a spike array), .dat (Vidar bits), .raw,
     .bin (a byte a pixel)."""
     out: Path = Path("denoised")
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
