@@ -40,6 +40,16 @@ MOST_RPM = 1e9
 MOST_RADIUS = 6000.0
 """[pixels] Texels are counted in 32 bits, TEXELS_PER_PIXEL^2 of them to a pixel of the disk's square."""
 
+_RANGES = {
+    "rpm": (-MOST_RPM, MOST_RPM),
+    "radius": (1.0, MOST_RADIUS),
+    "frame_rate_hz": FRAME_RATES_HZ,
+    "centre": (-MOST_PLACE, MOST_PLACE),
+    "drift_px_s": (-MOST_PLACE, MOST_PLACE),
+    "angle": (-MOST_PLACE, MOST_PLACE),
+    "motion_per_key": (1e-9, MOST_PLACE),
+}
+
 
 class RotatingDisk:
     """A disk that spins and drifts over a background.
@@ -79,12 +89,15 @@ class RotatingDisk:
         motion_per_key: float = 0.6,
     ) -> None:
         self.shape, seed = checked_shape(shape), checked_seed(seed, most=LARGEST_DERIVED_SEED)
-        self.radius = 0.44 * min(self.shape) if radius is None else float(radius)
-        self.rpm, self.frame_rate_hz, self.light = float(rpm), float(frame_rate_hz), light
-        self.centre = ((self.shape[1] - 1) / 2, (self.shape[0] - 1) / 2) if centre is None else centre
-        self.drift_px_s, self.angle = drift_px_s, float(angle)
-        self.motion_per_key = float(motion_per_key)
-        self._check_numbers()
+        self.radius = _checked("radius", 0.44 * min(self.shape) if radius is None else radius)
+        self.rpm, self.frame_rate_hz = _checked("rpm", rpm), _checked("frame_rate_hz", frame_rate_hz)
+        checked_number(light[0], "light[0]", 0.0, MOST_LIGHT)
+        checked_number(light[1], "light[1]", light[0], MOST_LIGHT, above=True)
+        self.light = light
+        middle = ((self.shape[1] - 1) / 2, (self.shape[0] - 1) / 2)
+        self.centre = middle if centre is None else _checked_pair("centre", centre)
+        self.drift_px_s, self.angle = _checked_pair("drift_px_s", drift_px_s), _checked("angle", angle)
+        self.motion_per_key = _checked("motion_per_key", motion_per_key)
         textures, backgrounds = np.random.default_rng(seed).spawn(2)
         size = int(np.clip(10 * self.radius, 128, 1024))
         values = disk_texture(textures, size) if texture is None else _checked_texture(texture)
@@ -136,8 +149,8 @@ class RotatingDisk:
     ) -> RotatingDisk:
         """The same disk and background with the disk elsewhere at frame 0; shares the textures, costs nothing."""
         other = copy.copy(self)
-        other.centre, other.drift_px_s, other.angle = centre, drift_px_s, float(angle)
-        other._check_numbers()
+        other.centre, other.drift_px_s = _checked_pair("centre", centre), _checked_pair("drift_px_s", drift_px_s)
+        other.angle = _checked("angle", angle)
         return other
 
     def lit(self, gain: float) -> RotatingDisk:
@@ -205,22 +218,15 @@ class RotatingDisk:
             picture,
         )
 
-    def _check_numbers(self) -> None:
-        dark, bright = self.light
-        ranges: dict[str, tuple[float, float, float]] = {
-            "rpm": (self.rpm, -MOST_RPM, MOST_RPM),
-            "radius": (self.radius, 1.0, MOST_RADIUS),
-            "frame_rate_hz": (self.frame_rate_hz, *FRAME_RATES_HZ),
-            "light[0]": (dark, 0.0, MOST_LIGHT),
-            "light[1]": (bright, dark, MOST_LIGHT),
-            "angle": (self.angle, -MOST_PLACE, MOST_PLACE),
-            "motion_per_key": (self.motion_per_key, 1e-9, MOST_PLACE),
-        }
-        for axis in (0, 1):
-            ranges[f"centre[{axis}]"] = (self.centre[axis], -MOST_PLACE, MOST_PLACE)
-            ranges[f"drift_px_s[{axis}]"] = (self.drift_px_s[axis], -MOST_PLACE, MOST_PLACE)
-        for name, (value, least, most) in ranges.items():
-            checked_number(value, name, least, most, above=name == "light[1]")
+
+def _checked(name: str, value: float) -> float:
+    return checked_number(value, name, *_RANGES[name])
+
+
+def _checked_pair(name: str, pair: tuple[float, float]) -> tuple[float, float]:
+    for value in pair:
+        _checked(name, value)
+    return pair
 
 
 def disk_texture(rng: np.random.Generator, size: int = 1024) -> Texture:

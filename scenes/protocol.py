@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.checked import checked_number
+from spikecam_env.checked import LARGEST_COUNT, checked_number
 from spikecam_env.errors import InputError
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Gaze:
         for value in (*self.start, *self.stop):
             checked_number(value, "gaze offset", -MOST_PLACE, MOST_PLACE)
         for frame in self.frames:
-            checked_number(frame, "gaze frame")
+            checked_number(frame, "gaze frame", -LARGEST_COUNT, LARGEST_COUNT)
         if not self.frames[0] < self.frames[1]:
             raise InputError(f"gaze frames are {self.frames}; the first must be before the second")
 

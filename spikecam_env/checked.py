@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, shown
 
 MOST_PIXELS = 1 << 26
 """Largest picture [pixels], 8192 x 8192: 64 times that of the largest spike camera."""
@@ -85,15 +85,6 @@ def as_number(value: Any) -> float:
         return math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
-
-
-def shown(value: Any) -> str:
-    """A value in an error's text: at most 60 characters."""
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
-        return f"a {type(value).__name__}"
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def checked_memory(size: int, what: str) -> None:

@@ -24,5 +24,14 @@ class NotReadyError(RuntimeError):
 def unknown_name(kind: str, name: object, allowed: Iterable[str]) -> InputError:
     """Error for a name that is not in a list: `unknown scene 'fun'; choose one of ball, fan, train (fan?)`."""
     names = sorted(allowed)
-    nearest = "".join(f" ({near}?)" for near in get_close_matches(str(name), names, n=1))
-    return InputError(f"unknown {kind} {name!r}; choose one of {', '.join(names)}{nearest}")
+    nearest = "".join(f" ({near}?)" for near in get_close_matches(shown(name).strip("'"), names, n=1))
+    return InputError(f"unknown {kind} {shown(name)}; choose one of {', '.join(names)}{nearest}")
+
+
+def shown(value: object) -> str:
+    """A value in an error's text: at most 60 characters."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
+        return f"a {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."

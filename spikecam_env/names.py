@@ -11,8 +11,7 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import Path, PureWindowsPath
 
-from spikecam_env.checked import shown
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, shown
 
 MOST_BYTES = 180
 """Longest name [bytes of UTF-8]: file systems take 255, and endings such as `-holdout-rates.npz` are added to it."""
@@ -56,14 +55,14 @@ def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -
     if not text or not text.isprintable() or not _encodes(text):
         raise InputError(f"{what} {shown(text)} is no path of a file")
     path = root / text
-    if outside:
-        return path
-    absolute = (path.is_absolute() and Path(text).is_absolute()) or bool(PureWindowsPath(text).anchor)
+    absolute = Path(text).is_absolute() or bool(PureWindowsPath(text).anchor)
     try:
+        path.exists()
         leaves = absolute or ".." in PureWindowsPath(text).parts or not path.resolve().is_relative_to(root.resolve())
-    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, names too long
-        raise InputError(f"{what} {shown(text)} cannot be read: {error}") from error
-    if leaves:
+    except (OSError, RuntimeError) as error:  # names too long, links in a circle, folders that cannot be looked into
+        why = getattr(error, "strerror", None) or "a circle of links"
+        raise InputError(f"{what} {shown(text)} cannot be read: {why}") from error
+    if leaves and not outside:
         raise InputError(
             f"{what} {shown(text)} is outside of {root}; copy the file there, or allow it (--outside, outside=True)"
         )

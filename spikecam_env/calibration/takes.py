@@ -76,8 +76,8 @@ def record_takes(
     plan = _plan(takes, shape, seed, engine)
     if (target / "campaign.json").exists() and _same_simulation(target, model, plan):
         return read_campaign(target)
-    _claim(campaign_folder(target), model, plan)
     cameras = {v_d: _camera(model, v_d) for v_d in dict.fromkeys(take.v_d for take in takes)}
+    _claim(campaign_folder(target), model, plan)
     with tqdm(total=sum(take.frames for take in takes), unit="frame", disable=not progress) as bar:
         for number, take in enumerate(takes):
             bar.set_description(f"record {take.name}")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import InputError, shown, unknown_name
 
 
 def named(text: str, catalogue: Mapping[str, type[Any]], kind: str) -> Any:
@@ -28,11 +28,11 @@ def named(text: str, catalogue: Mapping[str, type[Any]], kind: str) -> Any:
         if key not in known:
             raise unknown_name(f"parameter of {name}", key, known)
         if not equals:
-            raise InputError(f"{kind} {text!r}: {key} has no value; write {name}:{key}=...")
+            raise InputError(f"{kind} {shown(text)}: {key} has no value; write {name}:{key}=...")
         values[key] = _value(value, known[key], f"{name}.{key}")
     for f in known.values():
         if f.name not in values and f.default is MISSING and f.default_factory is MISSING:
-            raise InputError(f"{kind} {text!r} needs {f.name}; write {name}:{f.name}=...")
+            raise InputError(f"{kind} {shown(text)} needs {f.name}; write {name}:{f.name}=...")
     return catalogue[name](**values)
 
 
@@ -41,12 +41,12 @@ def _value(text: str, f: Field[Any], what: str) -> Any:
     declared = f.type if isinstance(f.type, str) else f.type.__name__
     if "bool" in declared:
         if text.lower() not in ("true", "false"):
-            raise InputError(f"{what} = {text!r}; it must be true or false")
+            raise InputError(f"{what} = {shown(text)}; it must be true or false")
         return text.lower() == "true"
     for python_type, words in ((float, "a number"), (int, "a whole number")):
         if python_type.__name__ in declared:
             try:
                 return python_type(text)
             except ValueError as error:
-                raise InputError(f"{what} = {text!r}; it must be {words}") from error
+                raise InputError(f"{what} = {shown(text)}; it must be {words}") from error
     return text

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from scenes import TEXTURES, RotatingDisk
 from scenes.protocol import MOST_LIGHT
-from spikecam_env.checked import checked_number, checked_whole
+from spikecam_env.checked import checked_number, checked_seed, checked_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -169,6 +169,7 @@ class Disk(Planned):
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
         if not abs(self.rim_speed) <= MOTION_PER_KEY:
             raise InputError(f"rim_speed = {self.rim_speed}; it must be within {MOTION_PER_KEY} pixels a frame")
+        checked_seed(self.seed, "disk.seed")
         radius = 0.44 * min(shape)
         scene = RotatingDisk(
             shape,

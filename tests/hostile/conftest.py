@@ -1,17 +1,15 @@
-"""Every case of malformed input goes through `meets`, which knows what may come of it; counts are printed at the end."""
+"""Every case of malformed input goes through `meets`, which says what may come of it; counts are printed at the end."""
 
 from __future__ import annotations
 
 import shutil
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tally import TALLY, count
 
 from spikecam_env.cli.main import run
-
-TALLY: dict[str, Counter[str]] = {}
 
 
 @pytest.fixture
@@ -50,11 +48,6 @@ def meets(request, tmp_path: Path, capfd) -> Callable[..., int]:
 def _is_aside(line: str) -> bool:
     """Progress bars, and warnings."""
     return "%|" in line or line.startswith("spikecam: warning: ")
-
-
-def count(target: str, outcome: str) -> None:
-    """One more case of a reader or command."""
-    TALLY.setdefault(target, Counter())[outcome] += 1
 
 
 def listing(folder: Path) -> set[str]:

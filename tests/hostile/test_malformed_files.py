@@ -11,13 +11,17 @@ import h5py
 import numpy as np
 import pytest
 from mutations import damaged, json_files, npz, npz_files, toml_files
+from tally import reads_or_refuses
 
-from spikecam_env.calibration import write_flats
+from spikecam_env.calibration import read_campaign, write_flats
 from spikecam_env.calibration.campaign_files import save_rates
+from spikecam_env.datasets import verify
 from spikecam_env.datasets.manifest import Manifest
 from spikecam_env.sensor import SensorModel
 
 FRAMES, SHAPE = 64, (8, 8)
+SHARE = 7
+"""Of the cases of a reader, every so many go through its command too, which takes thirty times as long."""
 RNG = np.random.default_rng(0)
 
 CAMPAIGN = {
@@ -34,7 +38,7 @@ CAMPAIGN = {
             "temperature_k": 300.0,
             "note": "a lamp",
         },
-        {"name": "rates", "rates": "rates.npz", "radiance": "flat-02.npz"},
+        {"name": "rates", "rates": "rates.npz", "radiance": "flat-02.npz", "v_d": 1.1},
         {"name": "dark-00", "spikes": "dark-00.dat", "frames": FRAMES, "radiance": "dark-00.npz", "v_d": 1.1},
         {"name": "flat-02", "spikes": "flat-02.dat", "frames": FRAMES, "radiance": "flat-02.npz", "v_d": 1.1},
     ],
@@ -62,7 +66,7 @@ RATES = {"rate": np.full(SHAPE, 0.3), "frames": np.array(FRAMES)}
 SPIKES = (RNG.random((FRAMES, *SHAPE)) < 0.3).astype(np.uint8)
 STREAM = {"spikes": SPIKES, "time_axis": np.array(0)}
 MAPS = {"D_light": np.full(SHAPE, 3.0), "Nd": np.full(SHAPE, 2.0)}
-PACKED = {"seq": np.packbits(SPIKES, axis=0), "length": np.array(FRAMES)}
+PACKED = {"seq": np.packbits(SPIKES[:40], axis=0, bitorder="big"), "length": np.array(40)}
 
 
 def cases(files):
@@ -89,6 +93,12 @@ def changed(folder: Path, name: str, data: bytes, good: dict = CAMPAIGN) -> Path
 
 
 @pytest.mark.parametrize("data", cases(json_files(CAMPAIGN, within=2)))
+def test_a_malformed_campaign_json_is_refused_by_its_reader(data: bytes, campaign: Path) -> None:
+    folder = changed(campaign, "campaign.json", data)
+    reads_or_refuses("campaign.json", lambda: [r.light() for r in read_campaign(folder).recordings])
+
+
+@pytest.mark.parametrize("data", cases(json_files(CAMPAIGN, within=2))[::SHARE])
 def test_a_malformed_campaign_json_is_refused(data: bytes, campaign: Path, tmp_path: Path, meets) -> None:
     meets("campaign.json (calibrate)", "calibrate", changed(campaign, "campaign.json", data), "--out", tmp_path / "out")
 
@@ -113,6 +123,12 @@ def test_a_malformed_campaign_is_refused_before_it_is_simulated(
 
 
 @pytest.mark.parametrize("data", cases(toml_files(MODEL)))
+def test_a_malformed_model_is_refused_by_its_reader(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "model.toml").write_bytes(data)
+    reads_or_refuses("model .toml", lambda: SensorModel.from_toml(tmp_path / "model.toml"))
+
+
+@pytest.mark.parametrize("data", cases(toml_files(MODEL))[::SHARE])
 def test_a_malformed_model_is_refused(data: bytes, tmp_path: Path, meets) -> None:
     (tmp_path / "model.toml").write_bytes(data)
     record = ("record", "--size", 4, 4, "--frames", 2, "--model", tmp_path / "model.toml", "--out")
@@ -290,6 +306,12 @@ DATASET = {
 
 
 @pytest.mark.parametrize("data", cases(json_files(DATASET)))
+def test_a_malformed_manifest_is_refused_by_its_reader(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "dataset.json").write_bytes(data)
+    reads_or_refuses("dataset.json", lambda: verify(tmp_path))
+
+
+@pytest.mark.parametrize("data", cases(json_files(DATASET))[::SHARE])
 def test_a_malformed_manifest_is_refused(data: bytes, tmp_path: Path, meets) -> None:
     (tmp_path / "dataset.json").write_bytes(data)
     meets("dataset.json (dataset verify)", "dataset", "verify", tmp_path, good_codes=(1,))  # its files are missing

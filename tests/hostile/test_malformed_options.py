@@ -122,7 +122,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--time-axis": (10**30,),
             "--rows": ((-1, 3), (3, 1), (0, 10**30), (0, 9)),
             "--columns": ((-1, 3), (3, 3), (0, 100)),
-            "--label": ("a.dat=nan", "a.dat=-1", "a.dat=1e400", "a.dat=", "=1", "a.dat", "../a.dat=1", "/etc/hostname=1",
+            "--label": ("a.dat=nan", "a.dat=-1", "a.dat=1e400", "a.dat=", "=1", "a.dat", "../a.dat=1", "/etc/passwd=1",
                         "a.dat=../x.npz", "\x00=1", "x" * 300 + "=1", "a.dat=relative", ".=1", "..=1"),
             "--table": ("{here}/none.csv", "{here}", "{here}/a.dat"),
         },
@@ -201,7 +201,7 @@ def lines():
                 yield pytest.param(name, line, option, words, id=f"{name} {option} {said}"[:80])
 
 
-@pytest.mark.parametrize("name, line, option, words", lines())
+@pytest.mark.parametrize("name, line, option, words", list(lines()))
 def test_an_option_out_of_range_is_refused_by_name(
     name: str, line: tuple, option: str, words: tuple, tmp_path: Path, meets
 ) -> None:
@@ -228,20 +228,28 @@ def test_every_command_is_in_the_table() -> None:
     assert {name.split()[0] for name in COMMAND_LINES} >= set(COMMANDS)
 
 
-BAD = (np.nan, np.inf, -np.inf, 1e308, -1e308, 10**400, "1", True, None)
+BAD = {
+    "NaN": np.nan,
+    "inf": np.inf,
+    "-inf": -np.inf,
+    "1e308": 1e308,
+    "-1e308": -1e308,
+    "400 digits": 10**400,
+    "text": "1",
+    "true": True,
+    "a list": [1.0],
+}
 
 
-@pytest.mark.parametrize("value", BAD, ids=repr)
+@pytest.mark.parametrize("value", BAD.values(), ids=BAD)
 @pytest.mark.parametrize("name", ["rpm", "angle", "motion_per_key", "frame_rate_hz", "radius"])
 def test_a_number_that_no_disk_has_is_refused(name: str, value: Any) -> None:
     """rpm 1e308 was an index that is NaN in compiled code: a segmentation fault."""
-    if (name, value) == ("radius", None):
-        pytest.skip("the default")
     with pytest.raises(InputError, match=name):
         RotatingDisk((16, 16), **{name: value})
 
 
-@pytest.mark.parametrize("value", BAD, ids=repr)
+@pytest.mark.parametrize("value", BAD.values(), ids=BAD)
 def test_a_place_that_no_scene_has_is_refused(value: Any) -> None:
     disk = RotatingDisk((16, 16))
     for make in (
@@ -253,8 +261,6 @@ def test_a_place_that_no_scene_has_is_refused(value: Any) -> None:
         lambda: make_scene("disk", (16, 16), frame_rate_hz=value),
         lambda: make_scene("disk", (16, 16), mean_interval=value),
     ):
-        if make.__code__.co_consts == disk and value == 1e308:
-            continue
         with pytest.raises(InputError):
             make()
 

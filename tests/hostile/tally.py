@@ -1,0 +1,26 @@
+"""Counts of malformed input by reader and command, and the rule for readers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+
+from spikecam_env.errors import InputError
+
+TALLY: dict[str, Counter[str]] = {}
+
+
+def count(target: str, outcome: str) -> None:
+    """One more case of a reader or command."""
+    TALLY.setdefault(target, Counter())[outcome] += 1
+
+
+def reads_or_refuses(target: str, read: Callable[[], object]) -> None:
+    """What is not read is refused by an InputError of one line; any other exception fails the test."""
+    try:
+        read()
+    except InputError as error:
+        assert len(str(error)) < 1000 and str(error).count("\n") == 0
+        count(target, "refused")
+    else:
+        count(target, "taken")
