@@ -14,8 +14,7 @@ import numpy as np
 import tomli_w
 from pydantic import ConfigDict, Field
 
-from spikecam_env.checked import shown
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.effects.base import build
 from spikecam_env.sensor.ranges import check_parameters, parameter

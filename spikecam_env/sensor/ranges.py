@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.checked import as_number, shown
-from spikecam_env.errors import InputError
+from spikecam_env.checked import as_number
+from spikecam_env.errors import InputError, shown
 
 
 def parameter(

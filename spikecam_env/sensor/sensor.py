@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_count, checked_seed, checked_shape, shown
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_count, checked_seed, checked_shape
+from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.imaging import Imaging
