@@ -26,6 +26,7 @@ from scenes.frames import Stored, stored
 from scenes.pictures import MOST_PIXELS, pictures_in, pictures_timed, read_picture
 from scenes.transfer import Array, grey, light_of
 from spikecam_env.errors import InputError
+from spikecam_env.untrusted import existing_file
 
 UNSTATED_TRANSFER = "gamma2.2"
 """Of a video file of 8 bits that states none: what screens have."""
@@ -131,6 +132,16 @@ def read_film(path: str | PathLike[str], how: Reading) -> Film:
     if ended:
         _warn_if_cut(len(light), float(time_s[-1]) + last_s, source, how, where)
     return Film(np.stack(light), time_s, rate, last_s, str(transfer), bits)
+
+
+def read_array(path: str | PathLike[str]) -> NDArray[Any]:
+    """The array of an .npy file, read from disk as it is used.  Errors: InputError where it is none, or damaged."""
+    try:
+        return np.load(existing_file(Path(path)), mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]
+    except InputError:
+        raise
+    except Exception as error:  # damaged headers fail in many ways
+        raise InputError(f"{path} is not an .npy file of plain numbers ({error})") from error
 
 
 def fitted(picture: Array, shape: tuple[int, int] | None) -> Array:

@@ -126,7 +126,7 @@ def _one_surface(
     return assemble(*(_as_part(_textured(mesh, albedo)) for mesh, albedo in owned))
 
 
-def _together(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+def _together(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     whole: Any = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
     return whole  # type: ignore[no-any-return]
 

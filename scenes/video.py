@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from copy import copy
 from os import PathLike
+from pathlib import Path
 from typing import Literal
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.film import Film, Reading, fitted, given_times, read_film
+from scenes.film import Film, Reading, fitted, given_times, read_array, read_film
 from scenes.keys import LONGEST_INTERVAL, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth
 from scenes.transfer import CHANNELS, curve, grey, light_of
@@ -23,8 +24,9 @@ INTERPOLATIONS = ("linear", "hold")
 class VideoScene:
     """Scene: a film, played forth and back without end.
 
-    film           path of a video file, of a folder of pictures, or of a CSV file of name,time_s; or an array
-                   (T, h, w) or (T, h, w, 3: red, green, blue): whole numbers of full scale (uint8, uint16), or floats
+    film           path of a video file, of a folder of pictures, or of a CSV file of name,time_s; or an array, or its
+                   .npy file, (T, h, w) or (T, h, w, 3: red, green, blue): whole numbers of full scale (uint8, uint16),
+                   or floats
     film_rate_hz   pictures a second when it was taken (a slow-motion film plays slower than that); default: the file's
                    time stamps.  An array or a folder needs it, or times_s.
     shape          (rows, columns) of the sensor, filled by the middle of the film, averaged over area; default: its own
@@ -39,7 +41,8 @@ class VideoScene:
     times_s        (T,) the time of every picture [s]
     slow           the file plays so many times slower than life: its time stamps are divided by it
     seconds        of the film's true time to be read; default: all
-    mean_interval  scale the light so that pixels fire every so many frames on average over the film; default: not
+    mean_interval  scale the light so that pixels fire every so many frames on average over the film, or over the
+                   seconds of it that were asked; default: not
 
     Truth: radiance alone.  Flow is NaN, for a film does not tell it; all is object 0.  A gaze beyond the edge sees the
     film mirrored.
@@ -94,6 +97,8 @@ class VideoScene:
             most_pictures,
             seconds,
         )
+        if isinstance(film, (str, PathLike)) and Path(film).suffix.lower() == ".npy":
+            film = read_array(film)
         taken = read_film(film, how) if isinstance(film, (str, PathLike)) else _from_array(film, how)
         kept = np.float16 if taken.bits <= 8 else np.float32
         self._light = (light[0] + (light[1] - light[0]) * taken.light).astype(kept)
@@ -107,7 +112,8 @@ class VideoScene:
         if self._hold:
             self._knots = np.append(self._knots, self._knots[-1] + taken.last_s * self.frame_rate_hz)
         if mean_interval is not None:
-            self._gain = np.float32(1 / (mean_interval * self._mean()))
+            until = self.frames if seconds is None else min(self.frames, seconds * self.frame_rate_hz)
+            self._gain = np.float32(1 / (mean_interval * self._mean(until)))
 
     def __repr__(self) -> str:
         return f"VideoScene(pictures={self.pictures}, shape={self.shape}, {self.frames_per_picture:g} frames each)"
@@ -123,6 +129,19 @@ class VideoScene:
         if self._rate_hz is not None:
             return self.frame_rate_hz / self._rate_hz
         return float(self._knots[-1]) / (len(self._knots) - 1)
+
+    @property
+    def gain(self) -> float:
+        """By which radiance was multiplied, for the mean interval and by `lit`."""
+        return float(self._gain)
+
+    @property
+    def times_from(self) -> str:
+        """How pictures follow each other, in words."""
+        if self._rate_hz is not None:
+            return f"{self._rate_hz:.6g} pictures a second"
+        steps = np.diff(self._knots) / self.frame_rate_hz
+        return f"{1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms apart"
 
     @property
     def frames(self) -> float:
@@ -201,18 +220,22 @@ class VideoScene:
         frame = np.unique(np.concatenate([np.floor(near), np.ceil(near), *sides])).astype(np.int64)
         return frame[(frame >= low) & (frame <= high)]
 
-    def _mean(self) -> float:
-        """Radiance over the whole film and picture, by the time that each picture has.
+    def _mean(self, until: float) -> float:
+        """Radiance over the picture and the film's frames 0 to `until`, by the time that each picture has.
 
         Errors: InputError for a film without light.
         """
-        spans = np.diff(self._knots)
-        weights = spans if self._hold else (np.append(spans, 0) + np.insert(spans, 0, 0)) / 2
         means = np.array([picture.mean(dtype=np.float64) for picture in self._light])
-        mean = float(np.average(means, weights=weights))
-        if not mean > 0:
+        spans = np.diff(self._knots)
+        seen = np.clip(until - self._knots[:-1], 0, spans)
+        if self._hold:
+            light = seen * means
+        else:
+            share = seen / spans
+            light = seen * (means[:-1] * (1 - share / 2) + means[1:] * share / 2)
+        if not light.sum() > 0:
             raise InputError("the film has no light to expose; all its pictures are black")
-        return mean
+        return float(light.sum() / seen.sum())
 
 
 def _transfer(transfer: str | None, gamma: float | None) -> str | None:

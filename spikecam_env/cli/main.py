@@ -19,6 +19,7 @@ from spikecam_env.cli.denoise import Denoise
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.evaluate import Evaluate
+from spikecam_env.cli.film_to_spikes import Film
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
@@ -37,6 +38,7 @@ examples:
 COMMANDS: dict[str, Any] = {
     "demo": Demo,
     "record": Record,
+    "film": Film,
     "scenes": Scenes,
     "dataset": Dataset,
     "denoise": Denoise,

@@ -120,6 +120,10 @@ def test_mean_interval_is_that_of_the_whole_film_by_the_time_of_each_picture() -
     scene = VideoScene(film, times_s=[0, 0.1, 0.4], gamma=1.0, mean_interval=5.0)
     mean = np.mean([scene.truth(f).radiance[0, 0] for f in range(0, 16_000, 10)])
     assert mean == pytest.approx(1 / 5, rel=1e-3)
+    part = VideoScene(film, times_s=[0, 0.1, 0.4], gamma=1.0, mean_interval=5.0, seconds=0.05)
+    assert np.mean([part.truth(f).radiance[0, 0] for f in range(2001)]) == pytest.approx(1 / 5, rel=1e-3)
+    held = VideoScene(film, 100.0, gamma=1.0, mean_interval=5.0, interpolation="hold", seconds=0.015)
+    assert np.mean([held.truth(f).radiance[0, 0] for f in range(600)]) == pytest.approx(1 / 5, rel=1e-2)
     with pytest.raises(InputError, match="no light"):
         VideoScene(np.zeros((2, 4, 4), np.uint8), 9.0, mean_interval=5.0)
 

@@ -225,7 +225,7 @@ TRIANGLE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 )
 def test_what_has_no_surface_is_refused_by_name(vertices: list, faces: list, message: str, tmp_path: Path) -> None:
     (tmp_path / "m.ply").write_text(ply(vertices, faces))
-    with pytest.raises(InputError, match=f"m.ply.*({message})"):
+    with pytest.raises(InputError, match=rf"m\.ply.*({message})"):
         from_file(tmp_path / "m.ply")
 
 
@@ -252,7 +252,7 @@ def test_a_size_is_positive(size: float) -> None:
 @pytest.mark.parametrize("ending", ["ply", "obj", "stl", "glb", "off", "xyzzy", "zip"])
 def test_what_is_no_mesh_is_refused(content: bytes, ending: str, tmp_path: Path) -> None:
     (tmp_path / f"m.{ending}").write_bytes(content)
-    with pytest.raises(InputError, match="m."):
+    with pytest.raises(InputError, match=r"m\."):
         from_file(tmp_path / f"m.{ending}")
 
 
@@ -286,7 +286,7 @@ def test_surfaces_made_by_hand_are_checked_before_they_are_drawn(change: dict, m
 
 
 def test_float_textures_above_one_and_backgrounds_below_zero_are_refused() -> None:
-    with pytest.raises(InputError, match="texture runs from 0 to 1.5"):
+    with pytest.raises(InputError, match=r"texture runs from 0 to 1\.5"):
         from_mesh(box(), np.float32([[0.0, 1.5]]))
     with pytest.raises(InputError, match="texture runs from nan"):
         from_mesh(box(), np.float32([[0.0, np.nan]]))
