@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from scenes.frames import Stored, stored
+from scenes.frames import ALONE, Stored, stored
 from scenes.pictures import MOST_PIXELS, pictures_in, pictures_timed, read_picture
 from scenes.transfer import Array, grey, light_of
 from spikecam_env.errors import InputError
@@ -187,7 +187,7 @@ def _video(path: Path) -> Iterator[_Source]:
     try:
         with (
             path.open("rb") as file,
-            av.open(file, options={"protocol_whitelist": "none"}) as container,
+            av.open(file, options=ALONE, metadata_errors="replace") as container,
         ):
             streams = [
                 s

@@ -45,9 +45,9 @@ def from_file(
     kind = source.suffix[1:].lower()
     beside = Beside(str(source))
     try:
-        with source.open("rb") as file:
+        with source.open("rb") as file, np.errstate(all="ignore"):
             scene: Any = trimesh.load(file, file_type=kind, resolver=beside, force="scene", process=False)
-        meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
+            meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
     except Exception as error:
         raise InputError(f"{path} cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
     for name, fault in beside.faults.items():

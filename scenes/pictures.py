@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
-from scenes.frames import Stored, stated_primaries, stated_transfer, stored
+from scenes.frames import ALONE, Stored, stated_primaries, stated_transfer, stored
 from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file, read_text
 
@@ -148,7 +148,7 @@ def _values(image: Image.Image, source: Path) -> tuple[NDArray[np.float32], int]
 def _by_ffmpeg(source: Path) -> Stored:
     """A picture as it lies in the file; its orientation is not looked at."""
     try:
-        with source.open("rb") as file, av.open(file, "r", options={"protocol_whitelist": "none"}) as container:
+        with source.open("rb") as file, av.open(file, "r", options=ALONE, metadata_errors="replace") as container:
             context = container.streams.video[0].codec_context
             context.options = {"max_pixels": str(MOST_PIXELS)}
             check_size(context.width, context.height, source)

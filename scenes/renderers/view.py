@@ -77,6 +77,8 @@ def check_mesh(mesh: trimesh.Trimesh) -> None:
     if len(faces) == 0:
         raise InputError("the mesh of a surface has no triangles; give one with faces")
     vertices = np.asarray(mesh.vertices)
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+        raise InputError(f"the mesh has vertices {vertices.shape} and faces {faces.shape}; both must be (N, 3)")
     bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if len(bad):
         raise InputError(f"{len(bad)} vertices are not finite, the first is {bad[0]}: {vertices[bad[0]]}; remove them")

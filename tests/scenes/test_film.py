@@ -61,7 +61,7 @@ def test_light_of_a_variable_rate_is_where_its_time_stamps_say(name: str, codec:
 
 
 def test_time_stamps_rounded_to_milliseconds_are_a_constant_rate_again(tmp_path: Path) -> None:
-    scene = VideoScene(write_film(tmp_path / "f.mkv", greys(range(9)), rate=240))
+    scene = quiet(write_film(tmp_path / "f.mkv", greys(range(9)), rate=240), transfer="srgb")
     assert scene.frames_per_picture == 40_000 / 240
 
 
@@ -137,10 +137,10 @@ def test_mean_interval_is_that_of_the_whole_film_by_the_time_of_each_picture() -
 )
 def test_half_a_film_says_how_much_is_missing(name: str, codec: str, stored_as: str, tmp_path: Path) -> None:
     path = write_film(tmp_path / name, [yuv420(p, 128) for p in greys(range(60, 160))], stored_as, codec)
-    assert VideoScene(path).pictures == 100
+    assert quiet(path, transfer="srgb").pictures == 100
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.warns(UserWarning, match=r"cut off or damaged.*100 pictures"):
-        scene = VideoScene(path)
+        scene = VideoScene(path, transfer="srgb")
     assert 10 < scene.pictures < 60
     quiet(path, most_pictures=3, transfer="srgb")  # what was left out is not missed
 
@@ -227,13 +227,21 @@ def test_ten_bits_of_unstated_transfer_are_refused_and_eight_bits_warn(tmp_path:
         VideoScene(other)
 
 
-def test_wide_colour_has_its_own_luminance(tmp_path: Path) -> None:
+def test_colour_is_luminance_or_one_channel(tmp_path: Path) -> None:
     red = np.zeros((32, 32, 3), np.uint8)
     red[..., 0] = 255
     path = write_film(tmp_path / "f.mov", [red] * 2, "rgb24", "png")
     assert quiet(path, transfer="linear", **FULL).truth(0).radiance.mean() == pytest.approx(0.2126, rel=1e-3)
     assert quiet(path, transfer="linear", channel="red", **FULL).truth(0).radiance.mean() == 1
     assert quiet(path, transfer="linear", channel="blue", **FULL).truth(0).radiance.max() == 0
+
+
+def test_wide_colour_has_its_own_luminance(tmp_path: Path) -> None:
+    """BT.2020's red has 0.2627 of the luminance of its white."""
+    red = np.zeros((32, 32, 3), np.uint16)
+    red[..., 0] = 65535
+    path = write_film(tmp_path / "f.mkv", [red] * 2, "gbrp16le", color_primaries=9, color_trc=8)
+    assert quiet(path, **FULL).truth(0).radiance.mean() == pytest.approx(0.2627, rel=1e-4)
 
 
 @pytest.mark.parametrize(("matrix", "kr", "kb"), [(1, 0.2126, 0.0722), (6, 0.299, 0.114), (9, 0.2627, 0.0593)])
