@@ -19,6 +19,8 @@ from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import Keyframes
 
 INTERPOLATIONS = ("linear", "hold")
+SHORTEST, LONGEST = 0.01, 1e12
+"""Of a film [frames].  Shorter ones would turn round many times a frame; the longest takes nine months at 40 kHz."""
 
 
 class VideoScene:
@@ -69,48 +71,29 @@ class VideoScene:
         seconds: float | None = None,
         mean_interval: float | None = None,
     ) -> None:
-        if not 0 <= light[0] < light[1] < np.inf:
-            raise InputError(f"light is {light}; it must be (dark, bright) with 0 <= dark < bright")
-        numbers = {"gamma": gamma, "frame_rate_hz": frame_rate_hz, "film_rate_hz": film_rate_hz}
-        for name, value in {**numbers, "slow": slow, "seconds": seconds}.items():
-            if value is not None and not 0 < value < np.inf:
-                raise InputError(f"{name} is {value}; it must be positive and finite")
-        if most_pictures is not None and most_pictures < 2:
-            raise InputError(f"most_pictures is {most_pictures}; a film has 2 or more")
-        if mean_interval is not None and not 1 <= mean_interval < np.inf:
-            raise InputError(f"mean_interval is {mean_interval}; it must be 1 frame or more, e.g. 10")
-        if shape is not None and (len(shape) != 2 or min(shape) < 1):
-            raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
-        if interpolation not in INTERPOLATIONS:
-            raise unknown_name("interpolation", interpolation, INTERPOLATIONS)
-        if channel not in CHANNELS:
-            raise unknown_name("channel", channel, CHANNELS)
+        _check_numbers(gamma=gamma, frame_rate_hz=frame_rate_hz, film_rate_hz=film_rate_hz, slow=slow, seconds=seconds)
+        _check_choices(light, shape, most_pictures, mean_interval, interpolation, channel)
         if sum((film_rate_hz is not None, times_s is not None, slow != 1)) > 1:
             raise InputError("give one of film_rate_hz, times_s and slow; each says by itself when pictures were taken")
-        how = Reading(
-            shape,
-            _transfer(transfer, gamma),
-            channel,
-            film_rate_hz,
-            None if times_s is None else np.asarray(times_s, np.float64),
-            slow,
-            most_pictures,
-            seconds,
-        )
-        if isinstance(film, (str, PathLike)) and Path(film).suffix.lower() == ".npy":
-            film = read_array(film)
-        taken = read_film(film, how) if isinstance(film, (str, PathLike)) else _from_array(film, how)
+        times = None if times_s is None else np.asarray(times_s, np.float64)
+        code = _transfer(transfer, gamma)
+        how = Reading(shape, code, channel, film_rate_hz, times, slow, most_pictures, seconds)
+        with np.errstate(over="ignore"):
+            taken = _film(film, how)
+            end_s = [taken.time_s[-1] + taken.last_s] if interpolation == "hold" else []
+            self._knots = np.append(taken.time_s, end_s) * float(frame_rate_hz)
+        if not SHORTEST <= self.frames <= LONGEST:
+            raise InputError(
+                f"the film lasts {self.frames:g} frames of the camera; it must be {SHORTEST:g} to {LONGEST:g}"
+            )
         kept = np.float16 if taken.bits <= 8 else np.float32
         self._light = (light[0] + (light[1] - light[0]) * taken.light).astype(kept)
         self._gain = np.float32(1)
         self._hold = interpolation == "hold"
+        self._rate_hz = taken.rate_hz
         self.shape = (int(taken.light.shape[1]), int(taken.light.shape[2]))
         self.frame_rate_hz = float(frame_rate_hz)
         self.transfer, self.interpolation = taken.transfer, interpolation
-        self._rate_hz = taken.rate_hz
-        self._knots = taken.time_s * self.frame_rate_hz
-        if self._hold:
-            self._knots = np.append(self._knots, self._knots[-1] + taken.last_s * self.frame_rate_hz)
         if mean_interval is not None:
             until = self.frames if seconds is None else min(self.frames, seconds * self.frame_rate_hz)
             self._gain = np.float32(1 / (mean_interval * self._mean(until)))
@@ -236,6 +219,40 @@ class VideoScene:
         if not light.sum() > 0:
             raise InputError("the film has no light to expose; all its pictures are black")
         return float(light.sum() / seen.sum())
+
+
+def _check_numbers(**numbers: float | None) -> None:
+    for name, value in numbers.items():
+        if value is not None and not 0 < value < np.inf:
+            raise InputError(f"{name} is {value}; it must be positive and finite")
+
+
+def _check_choices(
+    light: tuple[float, float],
+    shape: tuple[int, int] | None,
+    most_pictures: int | None,
+    mean_interval: float | None,
+    interpolation: str,
+    channel: str,
+) -> None:
+    if not 0 <= light[0] < light[1] < np.inf:
+        raise InputError(f"light is {light}; it must be (dark, bright) with 0 <= dark < bright")
+    if shape is not None and (len(shape) != 2 or min(shape) < 1):
+        raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
+    if most_pictures is not None and most_pictures < 2:
+        raise InputError(f"most_pictures is {most_pictures}; a film has 2 or more")
+    if mean_interval is not None and not 1 <= mean_interval < np.inf:
+        raise InputError(f"mean_interval is {mean_interval}; it must be 1 frame or more, e.g. 10")
+    if interpolation not in INTERPOLATIONS:
+        raise unknown_name("interpolation", interpolation, INTERPOLATIONS)
+    if channel not in CHANNELS:
+        raise unknown_name("channel", channel, CHANNELS)
+
+
+def _film(film: str | PathLike[str] | NDArray[np.generic], how: Reading) -> Film:
+    if not isinstance(film, (str, PathLike)):
+        return _from_array(film, how)
+    return _from_array(read_array(film), how) if Path(film).suffix.lower() == ".npy" else read_film(film, how)
 
 
 def _transfer(transfer: str | None, gamma: float | None) -> str | None:

@@ -200,6 +200,20 @@ def test_the_transfer_that_the_file_states_is_undone(name: str, trc: int, tmp_pa
     np.testing.assert_allclose(scene.truth(0).radiance, curve(name)(np.float32(codes / 1023)), rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.parametrize(("codec", "name"), [("libx264", "f.mp4"), ("libx265", "f.mov"), ("prores_ks", "f.mov")])
+def test_ten_bits_of_a_film_camera_are_hlg_where_the_file_says_so(codec: str, name: str, tmp_path: Path) -> None:
+    stored_as = "yuv422p10le" if codec == "prores_ks" else "yuv420p10le"
+    luma = np.full((32, 32), 64 + 876 // 2, np.uint16)
+    chroma = np.full((32 if codec == "prores_ks" else 16, 32), 512, np.uint16)
+    picture = np.concatenate([luma, chroma])
+    options = {"x265-params": "log-level=none:crf=1"} if codec == "libx265" else {"crf": "1"}
+    tags = {"color_trc": 18, "color_primaries": 9, "colorspace": 9, "color_range": 1}
+    path = write_film(tmp_path / name, [picture] * 3, stored_as, codec, options=options, **tags)
+    scene = quiet(path, **FULL)
+    assert scene.transfer == "hlg"
+    assert scene.truth(0).radiance.mean() == pytest.approx(1 / 12, rel=0.01)
+
+
 def test_transfers_have_the_values_of_their_standards() -> None:
     """BT.709-6: V = 0.5 is 0.2598 of light; sRGB 0.2140; HLG 0.5 is 1/12; PQ 0.5081 is 100 cd/m2 of 10 000."""
     for name, value, light in (
@@ -434,6 +448,12 @@ def test_a_film_of_one_picture_is_refused(tmp_path: Path) -> None:
 def test_odd_arrays_and_options_are_named(film: np.ndarray, options: dict, message: str) -> None:
     with pytest.raises(InputError, match=re.escape(message) if "(" in message else message):
         VideoScene(film, 30.0, **options)
+
+
+@pytest.mark.parametrize("rate", [1e-308, 1e-9, 1e9, 1e308])
+def test_a_film_has_a_length_that_frames_can_count(rate: float) -> None:
+    with pytest.raises(InputError, match="the film lasts"):
+        VideoScene(np.zeros((3, 4, 4), np.uint8), rate)
 
 
 def test_linear_light_may_lie_above_one() -> None:
