@@ -30,6 +30,8 @@ from spikecam_env.untrusted import existing_file
 
 UNSTATED_TRANSFER = "gamma2.2"
 """Of a video file of 8 bits that states none: what screens have."""
+MOST_BYTES = 1 << 33
+"""Of a film's light in memory: 20 000 pictures of 250 x 400."""
 NOT_VIDEO = ("tty", "hls", "concat", "dash")
 """Formats of FFmpeg that draw text, or lead to other files."""
 
@@ -60,10 +62,17 @@ class Reading:
 
 @dataclass(frozen=True)
 class Film:
-    """light (T, h, w) linear; time_s (T,) of each from the first; rate_hz where it is constant; last_s for how long the
-    last one is seen; transfer by which it was decoded; bits of a value."""
+    """What was read.
 
-    light: Array
+    light     T pictures (h, w), linear
+    time_s    (T,) of each from the first
+    rate_hz   pictures a second where that is constant
+    last_s    for how long the last one is seen
+    transfer  by which it was decoded
+    bits      of a value
+    """
+
+    light: list[Array]
     time_s: NDArray[np.float64]
     rate_hz: float | None
     last_s: float
@@ -119,6 +128,11 @@ def read_film(path: str | PathLike[str], how: Reading) -> Film:
             light.append(fitted(grey(linear, how.channel, picture.primaries), how.shape))
             stamps.append(stamp)
             bar.update()
+            if len(light) * light[0].nbytes > MOST_BYTES:
+                raise InputError(
+                    f"{where} has more than {len(light)} pictures of {light[0].shape}, too many to hold in memory; "
+                    "read a part of it (seconds, most_pictures), or at a smaller shape"
+                )
             if len(light) == how.most or _past(stamps, how):
                 ended = False
                 break
@@ -131,7 +145,7 @@ def read_film(path: str | PathLike[str], how: Reading) -> Film:
     last_s = last_s or float(time_s[-1] - time_s[-2])
     if ended:
         _warn_if_cut(len(light), float(time_s[-1]) + last_s, source, how, where)
-    return Film(np.stack(light), time_s, rate, last_s, str(transfer), bits)
+    return Film(light, time_s, rate, last_s, str(transfer), bits)
 
 
 def read_array(path: str | PathLike[str]) -> NDArray[Any]:

@@ -87,11 +87,12 @@ class VideoScene:
                 f"the film lasts {self.frames:g} frames of the camera; it must be {SHORTEST:g} to {LONGEST:g}"
             )
         kept = np.float16 if taken.bits <= 8 else np.float32
-        self._light = (light[0] + (light[1] - light[0]) * taken.light).astype(kept)
+        span = light[1] - light[0]
+        self._light = np.stack([(light[0] + span * picture).astype(kept) for picture in taken.light])
         self._gain = np.float32(1)
         self._hold = interpolation == "hold"
         self._rate_hz = taken.rate_hz
-        self.shape = (int(taken.light.shape[1]), int(taken.light.shape[2]))
+        self.shape = (int(self._light.shape[1]), int(self._light.shape[2]))
         self.frame_rate_hz = float(frame_rate_hz)
         self.transfer, self.interpolation = taken.transfer, interpolation
         if mean_interval is not None:
@@ -288,11 +289,9 @@ def _from_array(film: NDArray[np.generic], how: Reading) -> Film:
         time_s = time_s[:count]
     transfer = how.transfer or "gamma2.2"
     full = np.float32(256**film.dtype.itemsize - 1) if film.dtype.kind == "u" else np.float32(1)
-    light = np.stack(
-        [
-            fitted(grey(light_of(picture.astype(np.float32) / full, transfer, "the film"), how.channel), how.shape)
-            for picture in film[:count]
-        ]
-    )
+    light = [
+        fitted(grey(light_of(picture.astype(np.float32) / full, transfer, "the film"), how.channel), how.shape)
+        for picture in film[:count]
+    ]
     bits = 32 if film.dtype.kind == "f" else 8 * film.dtype.itemsize
     return Film(light, time_s, rate, float(time_s[-1] - time_s[-2]), transfer, bits)

@@ -456,6 +456,14 @@ def test_a_film_has_a_length_that_frames_can_count(rate: float) -> None:
         VideoScene(np.zeros((3, 4, 4), np.uint8), rate)
 
 
+def test_a_film_that_memory_does_not_hold_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_film(tmp_path / "f.mkv", greys(range(20)), color_trc=13)
+    monkeypatch.setattr("scenes.film.MOST_BYTES", 10 * 32 * 32 * 4)
+    with pytest.raises(InputError, match="more than 11 pictures"):
+        VideoScene(path)
+    assert quiet(path, shape=(16, 16)).pictures == 20
+
+
 def test_linear_light_may_lie_above_one() -> None:
     scene = VideoScene(np.full((2, 4, 4), 2.5), 30.0, transfer="linear", **FULL)
     np.testing.assert_allclose(scene.truth(0).radiance, 2.5)
