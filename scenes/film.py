@@ -112,19 +112,19 @@ def read_film(path: str | PathLike[str], how: Reading) -> Film:
     where = str(path)
     light: list[Array] = []
     stamps: list[Any] = []
-    transfer, bits = how.transfer, 8
-    size: tuple[int, ...] | None = None
+    transfer, bits = "", 8
+    kind: tuple[Any, ...] = ()
     with _opened(Path(path), how) as source, tqdm(desc=f"read {Path(path).name}", unit="picture", leave=False) as bar:
         ended = True
         for picture, stamp in source.pictures:
             if not light:
-                transfer, bits, size = _transfer(picture, how, source, where), picture.bits, picture.values.shape
-            if picture.values.shape != size:
+                transfer, bits, kind = _transfer(picture, how, source, where), picture.bits, _kind(picture)
+            if _kind(picture) != kind:
                 raise InputError(
-                    f"{where}: picture {len(light) + 1} has shape {picture.values.shape}, the first {size}; "
-                    "a film has pictures of one size, all in colour or all grey"
+                    f"{where}: picture {len(light) + 1} has shape, bits, transfer {_kind(picture)}, the first {kind}; "
+                    "a film has pictures of one kind"
                 )
-            linear = light_of(picture.values, str(transfer), f"{where}, picture {len(light) + 1}")
+            linear = light_of(picture.values, transfer, f"{where}, picture {len(light) + 1}")
             light.append(fitted(grey(linear, how.channel, picture.primaries), how.shape))
             stamps.append(stamp)
             bar.update()
@@ -145,7 +145,7 @@ def read_film(path: str | PathLike[str], how: Reading) -> Film:
     last_s = last_s or float(time_s[-1] - time_s[-2])
     if ended:
         _warn_if_cut(len(light), float(time_s[-1]) + last_s, source, how, where)
-    return Film(light, time_s, rate, last_s, str(transfer), bits)
+    return Film(light, time_s, rate, last_s, transfer, bits)
 
 
 def read_array(path: str | PathLike[str]) -> NDArray[Any]:
@@ -278,6 +278,10 @@ def _transfer(picture: Stored, how: Reading, source: _Source, where: str) -> str
             stacklevel=5,
         )
     return source.transfer
+
+
+def _kind(picture: Stored) -> tuple[Any, ...]:
+    return (picture.values.shape, picture.bits, picture.transfer)
 
 
 def _past(stamps: list[Any], how: Reading) -> bool:

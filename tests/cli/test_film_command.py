@@ -145,7 +145,7 @@ def test_record_has_a_frame_rate_of_its_own(tmp_path: Path) -> None:
         (("p", "--film-rate", "100", "--frame-rate", "0"), "frame_rate_hz = 0"),
         (("p", "--film-rate", "100", "--size", "0", "24"), "shape"),
         (("black", "--film-rate", "100"), "no light"),
-        (("mixed", "--film-rate", "100"), "picture 3 has shape"),
+        (("mixed", "--film-rate", "100"), "picture 3 has shape, bits, transfer"),
         (("gap", "--film-rate", "100"), "a picture seems missing"),
         (("p/list.csv",), "line 3: the time is 0 s"),
         (("object.npy", "--film-rate", "100"), "object.npy is not an .npy file"),

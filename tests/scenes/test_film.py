@@ -7,7 +7,9 @@ import subprocess
 import warnings
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+import av
 import cv2
 import imageio_ffmpeg
 import numpy as np
@@ -329,7 +331,10 @@ def test_an_odd_folder_is_named(tmp_path: Path) -> None:
         VideoScene(folder, 30.0)
     (folder / "notes.txt").unlink()
     Image.fromarray(np.zeros((5, 8), np.uint8)).save(folder / "img3.png")
-    with pytest.raises(InputError, match=r"picture 3 has shape \(5, 8\)"):
+    with pytest.raises(InputError, match=r"picture 3 has shape, bits, transfer \(\(5, 8\)"):
+        VideoScene(folder, 30.0)
+    Image.fromarray(np.zeros((6, 8), np.uint16)).save(folder / "img3.png")
+    with pytest.raises(InputError, match=r"picture 3 has shape, bits, transfer .* 16, None"):
         VideoScene(folder, 30.0)
     (folder / "img3.png").write_bytes((folder / "img2.png").read_bytes()[:50])
     with pytest.raises(InputError, match=r"img3\.png is damaged"):
@@ -355,6 +360,24 @@ def test_pictures_of_16_bits_and_floats_keep_their_depth(name: str, tmp_path: Pa
     scene = quiet(folder, 30.0, transfer=None if floats else "linear", **FULL)
     expected = light[..., 0]
     np.testing.assert_allclose(scene.truth(0).radiance, expected, atol=0.02 if name == "f.hdr" else 1e-5)
+
+
+def test_an_exr_is_linear_light_above_one(tmp_path: Path) -> None:
+    folder = tmp_path / "clip"
+    folder.mkdir()
+    light = np.float32(np.repeat(3 * RAMP[..., None], 3, -1))
+    with av.open(str(folder / "p%d.exr"), "w", format="image2") as container:
+        stream: Any = container.add_stream("exr", rate=30)
+        stream.width = stream.height = 32
+        stream.pix_fmt = "gbrpf32le"
+        for i in range(2):
+            frame = av.VideoFrame.from_ndarray(light, format="gbrpf32le")
+            frame.pts = i
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    scene = quiet(folder, 30.0, **FULL)
+    assert scene.transfer == "linear"
+    np.testing.assert_allclose(scene.truth(0).radiance, light[..., 0], rtol=1e-5)
 
 
 # -- what is not a film ----------------------------------------------------------------------------------------
