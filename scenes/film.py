@@ -22,13 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from scenes.frames import Stored, stored
+from scenes.frames import ALONE, Stored, stored
 from scenes.pictures import MOST_PIXELS, pictures_in, pictures_timed, read_picture
 from scenes.transfer import Array, grey, light_of
 from spikecam_env.errors import InputError
+from spikecam_env.untrusted import existing_file
 
 UNSTATED_TRANSFER = "gamma2.2"
 """Of a video file of 8 bits that states none: what screens have."""
+MOST_BYTES = 1 << 33
+"""Of a film's light in memory: 20 000 pictures of 250 x 400."""
 NOT_VIDEO = ("tty", "hls", "concat", "dash")
 """Formats of FFmpeg that draw text, or lead to other files."""
 
@@ -59,10 +62,17 @@ class Reading:
 
 @dataclass(frozen=True)
 class Film:
-    """light (T, h, w) linear; time_s (T,) of each from the first; rate_hz where it is constant; last_s for how long the
-    last one is seen; transfer by which it was decoded; bits of a value."""
+    """What was read.
 
-    light: Array
+    light     T pictures (h, w), linear
+    time_s    (T,) of each from the first
+    rate_hz   pictures a second where that is constant
+    last_s    for how long the last one is seen
+    transfer  by which it was decoded
+    bits      of a value
+    """
+
+    light: list[Array]
     time_s: NDArray[np.float64]
     rate_hz: float | None
     last_s: float
@@ -102,22 +112,27 @@ def read_film(path: str | PathLike[str], how: Reading) -> Film:
     where = str(path)
     light: list[Array] = []
     stamps: list[Any] = []
-    transfer, bits = how.transfer, 8
-    size: tuple[int, ...] | None = None
+    transfer, bits = "", 8
+    kind: tuple[Any, ...] = ()
     with _opened(Path(path), how) as source, tqdm(desc=f"read {Path(path).name}", unit="picture", leave=False) as bar:
         ended = True
         for picture, stamp in source.pictures:
             if not light:
-                transfer, bits, size = _transfer(picture, how, source, where), picture.bits, picture.values.shape
-            if picture.values.shape != size:
+                transfer, bits, kind = _transfer(picture, how, source, where), picture.bits, _kind(picture)
+            if _kind(picture) != kind:
                 raise InputError(
-                    f"{where}: picture {len(light) + 1} has shape {picture.values.shape}, the first {size}; "
-                    "a film has pictures of one size, all in colour or all grey"
+                    f"{where}: picture {len(light) + 1} has shape, bits, transfer {_kind(picture)}, the first {kind}; "
+                    "a film has pictures of one kind"
                 )
-            linear = light_of(picture.values, str(transfer), f"{where}, picture {len(light) + 1}")
+            linear = light_of(picture.values, transfer, f"{where}, picture {len(light) + 1}")
             light.append(fitted(grey(linear, how.channel, picture.primaries), how.shape))
             stamps.append(stamp)
             bar.update()
+            if len(light) * light[0].nbytes > MOST_BYTES:
+                raise InputError(
+                    f"{where} has more than {len(light)} pictures of {light[0].shape}, too many to hold in memory; "
+                    "read a part of it (seconds, most_pictures), or at a smaller shape"
+                )
             if len(light) == how.most or _past(stamps, how):
                 ended = False
                 break
@@ -130,7 +145,17 @@ def read_film(path: str | PathLike[str], how: Reading) -> Film:
     last_s = last_s or float(time_s[-1] - time_s[-2])
     if ended:
         _warn_if_cut(len(light), float(time_s[-1]) + last_s, source, how, where)
-    return Film(np.stack(light), time_s, rate, last_s, str(transfer), bits)
+    return Film(light, time_s, rate, last_s, transfer, bits)
+
+
+def read_array(path: str | PathLike[str]) -> NDArray[Any]:
+    """The array of an .npy file, read from disk as it is used.  Errors: InputError where it is none, or damaged."""
+    try:
+        return np.load(existing_file(Path(path)), mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]
+    except InputError:
+        raise
+    except Exception as error:  # damaged headers fail in many ways
+        raise InputError(f"{path} is not an .npy file of plain numbers ({error})") from error
 
 
 def fitted(picture: Array, shape: tuple[int, int] | None) -> Array:
@@ -176,7 +201,7 @@ def _video(path: Path) -> Iterator[_Source]:
     try:
         with (
             path.open("rb") as file,
-            av.open(file, options={"protocol_whitelist": "none"}) as container,
+            av.open(file, options=ALONE, metadata_errors="replace") as container,
         ):
             streams = [
                 s
@@ -253,6 +278,10 @@ def _transfer(picture: Stored, how: Reading, source: _Source, where: str) -> str
             stacklevel=5,
         )
     return source.transfer
+
+
+def _kind(picture: Stored) -> tuple[Any, ...]:
+    return (picture.values.shape, picture.bits, picture.transfer)
 
 
 def _past(stamps: list[Any], how: Reading) -> bool:

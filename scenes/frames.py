@@ -20,6 +20,8 @@ from av import VideoFrame
 from scenes.transfer import Array
 from spikecam_env.errors import InputError
 
+ALONE = {"protocol_whitelist": "none"}
+"""Option of FFmpeg: nothing is opened but the file given, whatever it names."""
 STATED_TRANSFERS = {
     **dict.fromkeys((1, 6, 14, 15), "bt709"),
     4: "gamma2.2",

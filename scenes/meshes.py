@@ -1,4 +1,5 @@
-"""Meshes: parts with normals and texture coordinates, put together to surfaces; and your own mesh or picture.
+"""Meshes: shapes as parts, to be put together to surfaces (`scenes.assembly`); and your own mesh or picture
+(`scenes.mesh_files`).
 
     assemble(lathe(profile, picture), box((1, 1, 1), 0.2).moved(Still((0, 2, 0))))      one rigid surface
     from_file("teapot.obj", texture="wood.jpg", size=1.0)                               your own
@@ -10,121 +11,36 @@ Faces look outward; light is Lambert's, so a sheet has a front and a back, a lit
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from os import PathLike
-from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
-import trimesh
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from scenes.renderers.protocol import Surface
-from scenes.textures import Texture
-from scenes.trajectories import Trajectory
+from scenes.assembly import Albedo, Part, Points, assemble, unit
+from scenes.mesh_files import from_file, from_mesh, picture
+from scenes.transfer import linear_from_srgb as linear
 from spikecam_env.errors import InputError
 
-Albedo = float | Texture
-Points = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """vertices, normals (V, 3); uv (V, 2), v = 1 at the top of the texture; faces (F, 3); albedo 0..1, linear."""
-
-    vertices: Points
-    normals: Points
-    uv: Points
-    faces: NDArray[np.int64]
-    albedo: Albedo = 0.8
-
-    def moved(self, by: Trajectory) -> Part:
-        """Turned and shifted as a trajectory is at time 0."""
-        pose = by.pose(0.0)
-        return replace(
-            self, vertices=self.vertices @ pose[:3, :3].T + pose[:3, 3], normals=self.normals @ pose[:3, :3].T
-        )
-
-    def scaled(self, factor: ArrayLike) -> Part:
-        """By a positive factor, or one for each axis."""
-        factors = np.broadcast_to(np.asarray(factor, np.float64), 3)
-        normals = self.normals / factors
-        return replace(self, vertices=self.vertices * factors, normals=_unit(normals))
-
-
-def assemble(*parts: Part) -> Surface:
-    """One rigid surface; textures and greys of several parts go into one atlas."""
-    if not parts:
-        raise InputError("a surface needs at least one part")
-    if len(parts) == 1:
-        return _surface(parts[0])
-    atlas, places = _atlas([part.albedo for part in parts])
-    start = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    return _surface(
-        Part(
-            np.concatenate([part.vertices for part in parts]),
-            np.concatenate([part.normals for part in parts]),
-            np.concatenate([place[:2] + part.uv * place[2:] for part, place in zip(parts, places, strict=True)]),
-            np.concatenate([part.faces + first for part, first in zip(parts, start, strict=False)]),
-            atlas,
-        )
-    )
-
-
-# -- your own --------------------------------------------------------------------------------------------------
-
-
-def from_file(
-    path: str | PathLike[str], texture: str | PathLike[str] | Texture | None = None, size: float | None = None
-) -> Surface:
-    """A mesh file that trimesh reads (obj, stl, ply, glb, ...), with its own texture or the one given.
-
-    size   of its longest side, the middle at the origin; default: as it is in the file
-    Errors: InputError where there is no such file or no triangle in it.
-    """
-    if not Path(path).is_file():
-        raise InputError(f"no mesh file {path}; give the path of an obj, stl, ply or glb file")
-    try:
-        mesh: Any = trimesh.load(str(path), force="mesh")
-    except Exception as error:
-        raise InputError(f"{path} cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
-    return from_mesh(mesh, texture, size)
-
-
-def from_mesh(
-    mesh: trimesh.Trimesh, texture: str | PathLike[str] | Texture | None = None, size: float | None = None
-) -> Surface:
-    """A trimesh mesh; without texture coordinates of its own a texture is wrapped around its vertical axis."""
-    if not len(getattr(mesh, "faces", ())):
-        raise InputError("the mesh has no triangles; a cloud of points has no surface to render")
-    mesh = mesh.copy()
-    if size is not None:
-        mesh.apply_translation(-mesh.bounds.mean(0))
-        mesh.apply_scale(size / np.ptp(mesh.bounds, axis=0).max())
-    albedo = _own_albedo(mesh) if texture is None else _texture(texture)
-    uv = getattr(mesh.visual, "uv", None)
-    if np.ndim(albedo) == 2 and (uv is None or len(uv) != len(mesh.vertices)):
-        mesh.visual = trimesh.visual.TextureVisuals(uv=_around(np.asarray(mesh.vertices)))
-    return Surface(mesh, albedo)
-
-
-def picture(path: str | PathLike[str]) -> Texture:
-    """A picture file as linear grey in [0, 1], (h, w) float32; 8 and 16 bit are taken as sRGB."""
-    image: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if Path(path).is_file() else None
-    if image is None:
-        raise InputError(f"no picture can be read from {path}; give the path of a png, jpg or tif file")
-    if np.issubdtype(image.dtype, np.integer):
-        image = linear(image / np.float32(np.iinfo(image.dtype).max))
-    return np.asarray(_grey(image[..., 2::-1] if image.ndim == 3 else image), np.float32)
-
-
-def linear(encoded: ArrayLike) -> NDArray[np.float32]:
-    """sRGB code values in [0, 1] to linear light (IEC 61966-2-1)."""
-    code = np.asarray(encoded, np.float32)
-    return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
+__all__ = [
+    "Albedo",
+    "Part",
+    "assemble",
+    "box",
+    "capsule",
+    "disc",
+    "from_file",
+    "from_mesh",
+    "lathe",
+    "linear",
+    "picture",
+    "prism",
+    "rectangle",
+    "sheet",
+    "sphere",
+    "torus",
+]
 
 # -- parts -----------------------------------------------------------------------------------------------------
 
@@ -154,7 +70,7 @@ def sheet(points: Callable[[Points, Points], Sequence[Points]], shape: tuple[int
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
     faces = faces[area > 1e-9 * area.max()]
     uv = np.stack([u, v], -1).reshape(-1, 2)
-    return Part(vertices, _unit(normals.reshape(-1, 3)), uv, faces, albedo)
+    return Part(vertices, unit(normals.reshape(-1, 3)), uv, faces, albedo)
 
 
 def lathe(
@@ -308,42 +224,6 @@ def _turned(knots: Points, albedo: Albedo, sections: int, pieces: int, straight:
     return sheet(points, (max(pieces, 1), sections), albedo)
 
 
-def _surface(part: Part) -> Surface:
-    mesh = trimesh.Trimesh(part.vertices, part.faces, vertex_normals=part.normals, process=False)
-    mesh.visual = trimesh.visual.TextureVisuals(uv=part.uv)
-    return Surface(mesh, part.albedo)
-
-
-def _atlas(albedos: Sequence[Albedo]) -> tuple[Texture, list[NDArray[np.float64]]]:
-    """All in one texture, shelf by shelf, each with a margin of its edge; and the places (u, v, width, height)."""
-    tiles = {id(a): np.full((4, 4), a, np.float32) if np.ndim(a) == 0 else np.asarray(a, np.float32) for a in albedos}
-    order = sorted(tiles, key=lambda name: -tiles[name].shape[0])
-    width = max(256, *(tile.shape[1] + 2 * _MARGIN for tile in tiles.values()))
-    x = y = shelf = 0
-    corner = {}
-    for name in order:
-        rows, columns = (side + 2 * _MARGIN for side in tiles[name].shape)
-        if x + columns > width:
-            x, y, shelf = 0, y + shelf, 0
-        corner[name] = (x, y)
-        x, shelf = x + columns, max(shelf, rows)
-    height = y + shelf
-    atlas = np.zeros((height, width), np.float32)
-    for name, (x, y) in corner.items():
-        padded = np.pad(tiles[name], _MARGIN, mode="edge")
-        atlas[y : y + padded.shape[0], x : x + padded.shape[1]] = padded
-    places = []
-    for albedo in albedos:
-        (x, y), (rows, columns) = corner[id(albedo)], tiles[id(albedo)].shape
-        left, top = x + _MARGIN, y + _MARGIN
-        places.append(np.array([left / width, 1 - (top + rows) / height, columns / width, rows / height]))
-    return atlas, places
-
-
-_MARGIN = 8
-"""Texels around a tile of an atlas, so that coarse readings do not see the next one."""
-
-
 def _triangulated(corners: Points) -> NDArray[np.int64]:
     """Triangles of a simple polygon, by cutting ears."""
     left, triangles = list(range(len(corners))), []
@@ -372,38 +252,3 @@ def _placed(part: Part, about_x: float, about_y: float) -> Part:
     sy, cy = np.sin(np.radians(about_y)), np.cos(np.radians(about_y))
     turn = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     return replace(part, vertices=part.vertices @ turn.T, normals=part.normals @ turn.T)
-
-
-def _unit(vectors: Points) -> Points:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
-
-
-def _around(vertices: Points) -> Points:
-    """Cylinder coordinates about y, mirrored half-way round so that there is no seam."""
-    centred = vertices - vertices.mean(0)
-    u = np.abs(np.arctan2(centred[:, 0], centred[:, 2])) / np.pi
-    height = np.ptp(vertices[:, 1])
-    return np.stack([u, (vertices[:, 1] - vertices[:, 1].min()) / (height or 1)], -1)
-
-
-def _texture(texture: str | PathLike[str] | Texture) -> Texture:
-    if isinstance(texture, (str, PathLike)):
-        return picture(texture)
-    values = np.asarray(texture, np.float32)
-    if values.ndim != 2:
-        raise InputError(f"texture has shape {values.shape}; give (h, w) linear grey in [0, 1], or a picture's path")
-    return values
-
-
-def _own_albedo(mesh: trimesh.Trimesh) -> Albedo:
-    """From the mesh's own material, grey; 0.7 where it has none."""
-    material = getattr(mesh.visual, "material", None)
-    image = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
-    if image is not None:
-        return np.asarray(_grey(linear(np.asarray(image.convert("RGB"), np.float32) / 255)), np.float32)
-    return 0.7
-
-
-def _grey(rgb: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Luminance of linear light (Rec. 709)."""
-    return rgb @ np.array([0.2126, 0.7152, 0.0722], np.float32) if rgb.ndim == 3 else rgb

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
-from scenes.frames import Stored, stated_primaries, stated_transfer, stored
+from scenes.frames import ALONE, Stored, stated_primaries, stated_transfer, stored
 from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file, read_text
 
@@ -113,7 +113,7 @@ def pictures_timed(listing: Path) -> tuple[list[Path], NDArray[np.float64]]:
 
 
 def _by_pillow(image: Any, source: Path) -> Stored:
-    _check_size(image.width, image.height, source)
+    check_size(image.width, image.height, source)
     if getattr(image, "n_frames", 1) > 1 and image.format != "MPO":
         raise InputError(f"{source} holds {getattr(image, 'n_frames', 0)} pictures; give a file of one")
     deep = _deep(image)
@@ -148,10 +148,10 @@ def _values(image: Image.Image, source: Path) -> tuple[NDArray[np.float32], int]
 def _by_ffmpeg(source: Path) -> Stored:
     """A picture as it lies in the file; its orientation is not looked at."""
     try:
-        with source.open("rb") as file, av.open(file, "r", options={"protocol_whitelist": "none"}) as container:
+        with source.open("rb") as file, av.open(file, "r", options=ALONE, metadata_errors="replace") as container:
             context = container.streams.video[0].codec_context
             context.options = {"max_pixels": str(MOST_PIXELS)}
-            _check_size(context.width, context.height, source)
+            check_size(context.width, context.height, source)
             for frame in container.decode(video=0):
                 return stored(frame, str(source), turned=False)
     except (av.FFmpegError, IndexError, ValueError, MemoryError) as error:
@@ -161,7 +161,8 @@ def _by_ffmpeg(source: Path) -> Stored:
     raise InputError(f"{source} holds no picture")
 
 
-def _check_size(width: int, height: int, source: Path) -> None:
+def check_size(width: int, height: int, source: Path | str) -> None:
+    """Errors: InputError for more than MOST_PIXELS."""
     if width * height > MOST_PIXELS:
         raise InputError(
             f"{source} has {height} x {width} pixels; at most {MOST_PIXELS} are read, make it smaller first"

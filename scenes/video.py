@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from copy import copy
 from os import PathLike
+from pathlib import Path
 from typing import Literal
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.film import Film, Reading, fitted, given_times, read_film
+from scenes.film import Film, Reading, fitted, given_times, read_array, read_film
 from scenes.keys import LONGEST_INTERVAL, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth
 from scenes.transfer import CHANNELS, curve, grey, light_of
@@ -18,13 +19,16 @@ from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import Keyframes
 
 INTERPOLATIONS = ("linear", "hold")
+SHORTEST, LONGEST = 0.01, 1e12
+"""Of a film [frames].  Shorter ones would turn round many times a frame; the longest takes nine months at 40 kHz."""
 
 
 class VideoScene:
     """Scene: a film, played forth and back without end.
 
-    film           path of a video file, of a folder of pictures, or of a CSV file of name,time_s; or an array
-                   (T, h, w) or (T, h, w, 3: red, green, blue): whole numbers of full scale (uint8, uint16), or floats
+    film           path of a video file, of a folder of pictures, or of a CSV file of name,time_s; or an array, or its
+                   .npy file, (T, h, w) or (T, h, w, 3: red, green, blue): whole numbers of full scale (uint8, uint16),
+                   or floats
     film_rate_hz   pictures a second when it was taken (a slow-motion film plays slower than that); default: the file's
                    time stamps.  An array or a folder needs it, or times_s.
     shape          (rows, columns) of the sensor, filled by the middle of the film, averaged over area; default: its own
@@ -39,7 +43,8 @@ class VideoScene:
     times_s        (T,) the time of every picture [s]
     slow           the file plays so many times slower than life: its time stamps are divided by it
     seconds        of the film's true time to be read; default: all
-    mean_interval  scale the light so that pixels fire every so many frames on average over the film; default: not
+    mean_interval  scale the light so that pixels fire every so many frames on average over the film, or over the
+                   seconds of it that were asked; default: not
 
     Truth: radiance alone.  Flow is NaN, for a film does not tell it; all is object 0.  A gaze beyond the edge sees the
     film mirrored.
@@ -66,48 +71,33 @@ class VideoScene:
         seconds: float | None = None,
         mean_interval: float | None = None,
     ) -> None:
-        if not 0 <= light[0] < light[1] < np.inf:
-            raise InputError(f"light is {light}; it must be (dark, bright) with 0 <= dark < bright")
-        numbers = {"gamma": gamma, "frame_rate_hz": frame_rate_hz, "film_rate_hz": film_rate_hz}
-        for name, value in {**numbers, "slow": slow, "seconds": seconds}.items():
-            if value is not None and not 0 < value < np.inf:
-                raise InputError(f"{name} is {value}; it must be positive and finite")
-        if most_pictures is not None and most_pictures < 2:
-            raise InputError(f"most_pictures is {most_pictures}; a film has 2 or more")
-        if mean_interval is not None and not 1 <= mean_interval < np.inf:
-            raise InputError(f"mean_interval is {mean_interval}; it must be 1 frame or more, e.g. 10")
-        if shape is not None and (len(shape) != 2 or min(shape) < 1):
-            raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
-        if interpolation not in INTERPOLATIONS:
-            raise unknown_name("interpolation", interpolation, INTERPOLATIONS)
-        if channel not in CHANNELS:
-            raise unknown_name("channel", channel, CHANNELS)
+        _check_numbers(gamma=gamma, frame_rate_hz=frame_rate_hz, film_rate_hz=film_rate_hz, slow=slow, seconds=seconds)
+        _check_choices(light, shape, most_pictures, mean_interval, interpolation, channel)
         if sum((film_rate_hz is not None, times_s is not None, slow != 1)) > 1:
             raise InputError("give one of film_rate_hz, times_s and slow; each says by itself when pictures were taken")
-        how = Reading(
-            shape,
-            _transfer(transfer, gamma),
-            channel,
-            film_rate_hz,
-            None if times_s is None else np.asarray(times_s, np.float64),
-            slow,
-            most_pictures,
-            seconds,
-        )
-        taken = read_film(film, how) if isinstance(film, (str, PathLike)) else _from_array(film, how)
+        times = None if times_s is None else np.asarray(times_s, np.float64)
+        code = _transfer(transfer, gamma)
+        how = Reading(shape, code, channel, film_rate_hz, times, slow, most_pictures, seconds)
+        with np.errstate(over="ignore"):
+            taken = _film(film, how)
+            end_s = [taken.time_s[-1] + taken.last_s] if interpolation == "hold" else []
+            self._knots = np.append(taken.time_s, end_s) * float(frame_rate_hz)
+        if not SHORTEST <= self.frames <= LONGEST:
+            raise InputError(
+                f"the film lasts {self.frames:g} frames of the camera; it must be {SHORTEST:g} to {LONGEST:g}"
+            )
         kept = np.float16 if taken.bits <= 8 else np.float32
-        self._light = (light[0] + (light[1] - light[0]) * taken.light).astype(kept)
+        span = light[1] - light[0]
+        self._light = np.stack([(light[0] + span * picture).astype(kept) for picture in taken.light])
         self._gain = np.float32(1)
         self._hold = interpolation == "hold"
-        self.shape = (int(taken.light.shape[1]), int(taken.light.shape[2]))
+        self._rate_hz = taken.rate_hz
+        self.shape = (int(self._light.shape[1]), int(self._light.shape[2]))
         self.frame_rate_hz = float(frame_rate_hz)
         self.transfer, self.interpolation = taken.transfer, interpolation
-        self._rate_hz = taken.rate_hz
-        self._knots = taken.time_s * self.frame_rate_hz
-        if self._hold:
-            self._knots = np.append(self._knots, self._knots[-1] + taken.last_s * self.frame_rate_hz)
         if mean_interval is not None:
-            self._gain = np.float32(1 / (mean_interval * self._mean()))
+            until = self.frames if seconds is None else min(self.frames, seconds * self.frame_rate_hz)
+            self._gain = np.float32(1 / (mean_interval * self._mean(until)))
 
     def __repr__(self) -> str:
         return f"VideoScene(pictures={self.pictures}, shape={self.shape}, {self.frames_per_picture:g} frames each)"
@@ -123,6 +113,19 @@ class VideoScene:
         if self._rate_hz is not None:
             return self.frame_rate_hz / self._rate_hz
         return float(self._knots[-1]) / (len(self._knots) - 1)
+
+    @property
+    def gain(self) -> float:
+        """By which radiance was multiplied, for the mean interval and by `lit`."""
+        return float(self._gain)
+
+    @property
+    def times_from(self) -> str:
+        """How pictures follow each other, in words."""
+        if self._rate_hz is not None:
+            return f"{self._rate_hz:.6g} pictures a second"
+        steps = np.diff(self._knots) / self.frame_rate_hz
+        return f"{1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms apart"
 
     @property
     def frames(self) -> float:
@@ -201,18 +204,56 @@ class VideoScene:
         frame = np.unique(np.concatenate([np.floor(near), np.ceil(near), *sides])).astype(np.int64)
         return frame[(frame >= low) & (frame <= high)]
 
-    def _mean(self) -> float:
-        """Radiance over the whole film and picture, by the time that each picture has.
+    def _mean(self, until: float) -> float:
+        """Radiance over the picture and the film's frames 0 to `until`, by the time that each picture has.
 
         Errors: InputError for a film without light.
         """
-        spans = np.diff(self._knots)
-        weights = spans if self._hold else (np.append(spans, 0) + np.insert(spans, 0, 0)) / 2
         means = np.array([picture.mean(dtype=np.float64) for picture in self._light])
-        mean = float(np.average(means, weights=weights))
-        if not mean > 0:
+        spans = np.diff(self._knots)
+        seen = np.clip(until - self._knots[:-1], 0, spans)
+        if self._hold:
+            light = seen * means
+        else:
+            share = seen / spans
+            light = seen * (means[:-1] * (1 - share / 2) + means[1:] * share / 2)
+        if not light.sum() > 0:
             raise InputError("the film has no light to expose; all its pictures are black")
-        return mean
+        return float(light.sum() / seen.sum())
+
+
+def _check_numbers(**numbers: float | None) -> None:
+    for name, value in numbers.items():
+        if value is not None and not 0 < value < np.inf:
+            raise InputError(f"{name} is {value}; it must be positive and finite")
+
+
+def _check_choices(
+    light: tuple[float, float],
+    shape: tuple[int, int] | None,
+    most_pictures: int | None,
+    mean_interval: float | None,
+    interpolation: str,
+    channel: str,
+) -> None:
+    if not 0 <= light[0] < light[1] < np.inf:
+        raise InputError(f"light is {light}; it must be (dark, bright) with 0 <= dark < bright")
+    if shape is not None and (len(shape) != 2 or min(shape) < 1):
+        raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
+    if most_pictures is not None and most_pictures < 2:
+        raise InputError(f"most_pictures is {most_pictures}; a film has 2 or more")
+    if mean_interval is not None and not 1 <= mean_interval < np.inf:
+        raise InputError(f"mean_interval is {mean_interval}; it must be 1 frame or more, e.g. 10")
+    if interpolation not in INTERPOLATIONS:
+        raise unknown_name("interpolation", interpolation, INTERPOLATIONS)
+    if channel not in CHANNELS:
+        raise unknown_name("channel", channel, CHANNELS)
+
+
+def _film(film: str | PathLike[str] | NDArray[np.generic], how: Reading) -> Film:
+    if not isinstance(film, (str, PathLike)):
+        return _from_array(film, how)
+    return _from_array(read_array(film), how) if Path(film).suffix.lower() == ".npy" else read_film(film, how)
 
 
 def _transfer(transfer: str | None, gamma: float | None) -> str | None:
@@ -248,11 +289,9 @@ def _from_array(film: NDArray[np.generic], how: Reading) -> Film:
         time_s = time_s[:count]
     transfer = how.transfer or "gamma2.2"
     full = np.float32(256**film.dtype.itemsize - 1) if film.dtype.kind == "u" else np.float32(1)
-    light = np.stack(
-        [
-            fitted(grey(light_of(picture.astype(np.float32) / full, transfer, "the film"), how.channel), how.shape)
-            for picture in film[:count]
-        ]
-    )
+    light = [
+        fitted(grey(light_of(picture.astype(np.float32) / full, transfer, "the film"), how.channel), how.shape)
+        for picture in film[:count]
+    ]
     bits = 32 if film.dtype.kind == "f" else 8 * film.dtype.itemsize
     return Film(light, time_s, rate, float(time_s[-1] - time_s[-2]), transfer, bits)

@@ -122,7 +122,11 @@ class World:
             "frame_rate_hz": (self.frame_rate_hz, 0 < self.frame_rate_hz < np.inf, "positive"),
             "light": (self.light, 0 < self.light < np.inf, "positive"),
             "motion_per_key": (self.motion_per_key, self.motion_per_key > 0, "positive"),
-            "background": (np.shape(self.background), np.ndim(self.background) in (0, 2), "a radiance or (h, w) of it"),
+            "background": (
+                np.shape(self.background),
+                np.ndim(self.background) in (0, 2) and _is_light(self.background),
+                "a radiance or (h, w) of it, finite and 0 or more",
+            ),
         }
         for name, (value, allowed, rule) in ranges.items():
             if not allowed:
@@ -572,6 +576,11 @@ class _Probe:
     points: Floats
     normals: Floats
     extreme: Floats
+
+
+def _is_light(radiance: float | Array) -> bool:
+    values = np.asarray(radiance)
+    return values.size > 0 and values.dtype.kind in "fiu" and bool(values.min() >= 0 and values.max() < np.inf)
 
 
 def _probe(mesh: trimesh.Trimesh) -> _Probe:

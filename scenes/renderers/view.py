@@ -6,15 +6,18 @@ Nothing here knows of OpenGL or of rays.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
 from scenes.renderers.pyramid import Pyramid, pyramid
 from spikecam_env.errors import InputError
 
+ROUNDING = 1e-5
+"""By which luminance in single precision may exceed 1."""
 NEAREST = 1e-3
 """Share of the farthest vertex's distance at which OpenGL begins to see a surface; it cuts nearer parts away."""
 
@@ -39,21 +42,24 @@ class Geometry:
 
 
 def geometry(surface: Surface) -> Geometry:
-    """Errors: InputError for a mesh without triangles, a texture without uv, or a texture that is not (h, w) finite."""
+    """Errors: InputError for a mesh that `check_mesh` refuses, a texture without uv, or an albedo that is not one value
+    or (h, w), in 0 to 1."""
     mesh = surface.mesh
-    if len(mesh.faces) == 0:
-        raise InputError("the mesh of a surface has no triangles; give one with faces")
+    check_mesh(mesh)
     albedo = np.asarray(surface.albedo, np.float32)
     if albedo.ndim not in (0, 2) or albedo.size == 0 or not np.isfinite(albedo).all():
         raise InputError(
             f"albedo has shape {albedo.shape}; give one value or a finite texture (h, w), a colour picture as grey"
         )
-    uv = getattr(mesh.visual, "uv", None)
+    check_albedo(albedo, "albedo")
+    uv: Any = getattr(mesh.visual, "uv", None)
     if albedo.ndim == 2 and (uv is None or len(uv) != len(mesh.vertices)):
         raise InputError(
             "a surface has a texture but its mesh no texture coordinates; set mesh.visual = "
             "trimesh.visual.TextureVisuals(uv=(V, 2) array), or give albedo as one value"
         )
+    if albedo.ndim == 2 and not np.isfinite(uv).all():
+        raise InputError("texture coordinates of the mesh hold NaN or infinity; they must be finite")
     return Geometry(
         vertices=np.array(mesh.vertices, np.float64),
         normals=np.array(mesh.vertex_normals, np.float64),
@@ -62,6 +68,41 @@ def geometry(surface: Surface) -> Geometry:
         albedo=pyramid(np.atleast_2d(albedo)),
         closed=_closed(mesh),
     )
+
+
+def check_mesh(mesh: trimesh.Trimesh) -> None:
+    """Errors: InputError for a mesh without triangles or area, vertices that are not finite, faces of others than it
+    has."""
+    faces = np.asarray(mesh.faces)
+    if len(faces) == 0:
+        raise InputError("the mesh of a surface has no triangles; give one with faces")
+    vertices = np.asarray(mesh.vertices)
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+        raise InputError(f"the mesh has vertices {vertices.shape} and faces {faces.shape}; both must be (N, 3)")
+    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(bad):
+        raise InputError(f"{len(bad)} vertices are not finite, the first is {bad[0]}: {vertices[bad[0]]}; remove them")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(
+            f"faces name vertices {faces.min()} to {faces.max()}; the mesh has {len(vertices)}, counted from 0"
+        )
+    corners = vertices[faces]
+    with np.errstate(over="ignore", invalid="ignore"):
+        corners = (corners - corners.min(axis=(0, 1))) / (np.ptp(corners, axis=(0, 1)).max() or 1.0)
+        area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    if not np.abs(area).max() > 0:
+        raise InputError("the mesh has no area: every triangle is a line or a point")
+
+
+def check_albedo(albedo: ArrayLike, what: str) -> None:
+    """Errors: InputError, which begins with `what`, for values out of 0 to 1, but for their rounding."""
+    values = np.asarray(albedo)
+    low, high = values.min(), values.max()
+    if not (low >= 0 and high <= 1 + ROUNDING):
+        raise InputError(
+            f"{what} runs from {low:g} to {high:g}; a surface reflects 0 to 1 of the light, finite.  Scale it, or give "
+            "light of its own as emission"
+        )
 
 
 def to_camera(pose: NDArray[np.float64], camera: Pinhole) -> NDArray[np.float64]:

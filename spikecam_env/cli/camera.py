@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -23,6 +23,9 @@ class Camera:
     without: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
     """Take an effect of the model away; may be repeated."""
 
+    frame_rate: float | None = None
+    """Frames a second; default: the model's, 40 000 in the presets.  Light is a frame's, dark current a second's."""
+
     def load(self) -> SensorModel:
         """The model as asked; raises InputError for an unknown model, effect or parameter."""
         from spikecam_env.cli.named import named
@@ -33,4 +36,4 @@ class Camera:
             model = model.without(name)
         for text in self.effect:
             model = model.with_effect(named(text, CATALOGUE, "effect"))
-        return model
+        return model if self.frame_rate is None else replace(model, frame_rate_hz=self.frame_rate)

@@ -17,6 +17,7 @@ from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.entry import say
 from spikecam_env.cli.evaluate import Evaluate
+from spikecam_env.cli.film_to_spikes import Film
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.options import check_options
 from spikecam_env.cli.record import Record
@@ -39,6 +40,7 @@ examples:
 COMMANDS: dict[str, Any] = {
     "demo": Demo,
     "record": Record,
+    "film": Film,
     "scenes": Scenes,
     "dataset": Dataset,
     "denoise": Denoise,

@@ -59,14 +59,15 @@ def yuv420(luma: np.ndarray, neutral: int) -> np.ndarray:
 
 
 def frame_of(picture: np.ndarray, stored_as: str) -> av.VideoFrame:
-    """A picture as PyAV's frame; 4:2:0 as `yuv420` lays it out."""
+    """A picture as PyAV's frame; YUV 4:2:0 and 4:2:2 as `yuv420` lays it out."""
     if not stored_as.startswith("yuv"):
         return av.VideoFrame.from_ndarray(picture, format=stored_as)
-    height, width = picture.shape[0] * 2 // 3, picture.shape[1]
+    rows = 2 if stored_as.startswith("yuv422") else 3 / 2  # of luma and chroma together, for one of luma
+    height, width = int(picture.shape[0] / rows), picture.shape[1]
     frame = av.VideoFrame(width, height, stored_as)
-    chroma = picture[height:].reshape(2, height // 2, width // 2)
+    chroma = picture[height:].reshape(2, -1, width // 2)
     for plane, codes in zip(frame.planes, (picture[:height], *chroma), strict=True):
-        rows = np.zeros((plane.height, plane.line_size // picture.itemsize), picture.dtype)
-        rows[:, : codes.shape[1]] = codes
-        plane.update(rows.tobytes())
+        padded = np.zeros((plane.height, plane.line_size // picture.itemsize), picture.dtype)
+        padded[:, : codes.shape[1]] = codes
+        plane.update(padded.tobytes())
     return frame

@@ -7,7 +7,9 @@ import subprocess
 import warnings
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+import av
 import cv2
 import imageio_ffmpeg
 import numpy as np
@@ -61,7 +63,7 @@ def test_light_of_a_variable_rate_is_where_its_time_stamps_say(name: str, codec:
 
 
 def test_time_stamps_rounded_to_milliseconds_are_a_constant_rate_again(tmp_path: Path) -> None:
-    scene = VideoScene(write_film(tmp_path / "f.mkv", greys(range(9)), rate=240))
+    scene = quiet(write_film(tmp_path / "f.mkv", greys(range(9)), rate=240), transfer="srgb")
     assert scene.frames_per_picture == 40_000 / 240
 
 
@@ -120,6 +122,10 @@ def test_mean_interval_is_that_of_the_whole_film_by_the_time_of_each_picture() -
     scene = VideoScene(film, times_s=[0, 0.1, 0.4], gamma=1.0, mean_interval=5.0)
     mean = np.mean([scene.truth(f).radiance[0, 0] for f in range(0, 16_000, 10)])
     assert mean == pytest.approx(1 / 5, rel=1e-3)
+    part = VideoScene(film, times_s=[0, 0.1, 0.4], gamma=1.0, mean_interval=5.0, seconds=0.05)
+    assert np.mean([part.truth(f).radiance[0, 0] for f in range(2001)]) == pytest.approx(1 / 5, rel=1e-3)
+    held = VideoScene(film, 100.0, gamma=1.0, mean_interval=5.0, interpolation="hold", seconds=0.015)
+    assert np.mean([held.truth(f).radiance[0, 0] for f in range(600)]) == pytest.approx(1 / 5, rel=1e-2)
     with pytest.raises(InputError, match="no light"):
         VideoScene(np.zeros((2, 4, 4), np.uint8), 9.0, mean_interval=5.0)
 
@@ -133,10 +139,10 @@ def test_mean_interval_is_that_of_the_whole_film_by_the_time_of_each_picture() -
 )
 def test_half_a_film_says_how_much_is_missing(name: str, codec: str, stored_as: str, tmp_path: Path) -> None:
     path = write_film(tmp_path / name, [yuv420(p, 128) for p in greys(range(60, 160))], stored_as, codec)
-    assert VideoScene(path).pictures == 100
+    assert quiet(path, transfer="srgb").pictures == 100
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.warns(UserWarning, match=r"cut off or damaged.*100 pictures"):
-        scene = VideoScene(path)
+        scene = VideoScene(path, transfer="srgb")
     assert 10 < scene.pictures < 60
     quiet(path, most_pictures=3, transfer="srgb")  # what was left out is not missed
 
@@ -196,6 +202,20 @@ def test_the_transfer_that_the_file_states_is_undone(name: str, trc: int, tmp_pa
     np.testing.assert_allclose(scene.truth(0).radiance, curve(name)(np.float32(codes / 1023)), rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.parametrize(("codec", "name"), [("libx264", "f.mp4"), ("libx265", "f.mov"), ("prores_ks", "f.mov")])
+def test_ten_bits_of_a_film_camera_are_hlg_where_the_file_says_so(codec: str, name: str, tmp_path: Path) -> None:
+    stored_as = "yuv422p10le" if codec == "prores_ks" else "yuv420p10le"
+    luma = np.full((32, 32), 64 + 876 // 2, np.uint16)
+    chroma = np.full((32 if codec == "prores_ks" else 16, 32), 512, np.uint16)
+    picture = np.concatenate([luma, chroma])
+    options = {"x265-params": "log-level=none:crf=1"} if codec == "libx265" else {"crf": "1"}
+    tags = {"color_trc": 18, "color_primaries": 9, "colorspace": 9, "color_range": 1}
+    path = write_film(tmp_path / name, [picture] * 3, stored_as, codec, options=options, **tags)
+    scene = quiet(path, **FULL)
+    assert scene.transfer == "hlg"
+    assert scene.truth(0).radiance.mean() == pytest.approx(1 / 12, rel=0.01)
+
+
 def test_transfers_have_the_values_of_their_standards() -> None:
     """BT.709-6: V = 0.5 is 0.2598 of light; sRGB 0.2140; HLG 0.5 is 1/12; PQ 0.5081 is 100 cd/m2 of 10 000."""
     for name, value, light in (
@@ -223,13 +243,21 @@ def test_ten_bits_of_unstated_transfer_are_refused_and_eight_bits_warn(tmp_path:
         VideoScene(other)
 
 
-def test_wide_colour_has_its_own_luminance(tmp_path: Path) -> None:
+def test_colour_is_luminance_or_one_channel(tmp_path: Path) -> None:
     red = np.zeros((32, 32, 3), np.uint8)
     red[..., 0] = 255
     path = write_film(tmp_path / "f.mov", [red] * 2, "rgb24", "png")
     assert quiet(path, transfer="linear", **FULL).truth(0).radiance.mean() == pytest.approx(0.2126, rel=1e-3)
     assert quiet(path, transfer="linear", channel="red", **FULL).truth(0).radiance.mean() == 1
     assert quiet(path, transfer="linear", channel="blue", **FULL).truth(0).radiance.max() == 0
+
+
+def test_wide_colour_has_its_own_luminance(tmp_path: Path) -> None:
+    """BT.2020's red has 0.2627 of the luminance of its white."""
+    red = np.zeros((32, 32, 3), np.uint16)
+    red[..., 0] = 65535
+    path = write_film(tmp_path / "f.mkv", [red] * 2, "gbrp16le", color_primaries=9, color_trc=8)
+    assert quiet(path, **FULL).truth(0).radiance.mean() == pytest.approx(0.2627, rel=1e-4)
 
 
 @pytest.mark.parametrize(("matrix", "kr", "kb"), [(1, 0.2126, 0.0722), (6, 0.299, 0.114), (9, 0.2627, 0.0593)])
@@ -303,7 +331,10 @@ def test_an_odd_folder_is_named(tmp_path: Path) -> None:
         VideoScene(folder, 30.0)
     (folder / "notes.txt").unlink()
     Image.fromarray(np.zeros((5, 8), np.uint8)).save(folder / "img3.png")
-    with pytest.raises(InputError, match=r"picture 3 has shape \(5, 8\)"):
+    with pytest.raises(InputError, match=r"picture 3 has shape, bits, transfer \(\(5, 8\)"):
+        VideoScene(folder, 30.0)
+    Image.fromarray(np.zeros((6, 8), np.uint16)).save(folder / "img3.png")
+    with pytest.raises(InputError, match=r"picture 3 has shape, bits, transfer .* 16, None"):
         VideoScene(folder, 30.0)
     (folder / "img3.png").write_bytes((folder / "img2.png").read_bytes()[:50])
     with pytest.raises(InputError, match=r"img3\.png is damaged"):
@@ -329,6 +360,24 @@ def test_pictures_of_16_bits_and_floats_keep_their_depth(name: str, tmp_path: Pa
     scene = quiet(folder, 30.0, transfer=None if floats else "linear", **FULL)
     expected = light[..., 0]
     np.testing.assert_allclose(scene.truth(0).radiance, expected, atol=0.02 if name == "f.hdr" else 1e-5)
+
+
+def test_an_exr_is_linear_light_above_one(tmp_path: Path) -> None:
+    folder = tmp_path / "clip"
+    folder.mkdir()
+    light = np.float32(np.repeat(3 * RAMP[..., None], 3, -1))
+    with av.open(str(folder / "p%d.exr"), "w", format="image2") as container:
+        stream: Any = container.add_stream("exr", rate=30)
+        stream.width = stream.height = 32
+        stream.pix_fmt = "gbrpf32le"
+        for i in range(2):
+            frame = av.VideoFrame.from_ndarray(light, format="gbrpf32le")
+            frame.pts = i
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    scene = quiet(folder, 30.0, **FULL)
+    assert scene.transfer == "linear"
+    np.testing.assert_allclose(scene.truth(0).radiance, light[..., 0], rtol=1e-5)
 
 
 # -- what is not a film ----------------------------------------------------------------------------------------
@@ -422,6 +471,20 @@ def test_a_film_of_one_picture_is_refused(tmp_path: Path) -> None:
 def test_odd_arrays_and_options_are_named(film: np.ndarray, options: dict, message: str) -> None:
     with pytest.raises(InputError, match=re.escape(message) if "(" in message else message):
         VideoScene(film, 30.0, **options)
+
+
+@pytest.mark.parametrize("rate", [1e-308, 1e-9, 1e9, 1e308])
+def test_a_film_has_a_length_that_frames_can_count(rate: float) -> None:
+    with pytest.raises(InputError, match="the film lasts"):
+        VideoScene(np.zeros((3, 4, 4), np.uint8), rate)
+
+
+def test_a_film_that_memory_does_not_hold_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_film(tmp_path / "f.mkv", greys(range(20)), color_trc=13)
+    monkeypatch.setattr("scenes.film.MOST_BYTES", 10 * 32 * 32 * 4)
+    with pytest.raises(InputError, match="more than 11 pictures"):
+        VideoScene(path)
+    assert quiet(path, shape=(16, 16)).pictures == 20
 
 
 def test_linear_light_may_lie_above_one() -> None:

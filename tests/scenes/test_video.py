@@ -83,11 +83,11 @@ def test_a_file_reads_as_its_pictures(tmp_path: Path) -> None:
     for grey in (60, 120, 180):
         writer.write(np.full((24, 32, 3), grey, np.uint8))
     writer.release()
-    scene = VideoScene(path, light=(0.0, 1.0))
+    scene = VideoScene(path, light=(0.0, 1.0), transfer="gamma2.2")
     assert scene.shape == (24, 32) and scene.frames_per_picture == 80
     for i, grey in enumerate((60, 120, 180)):
         np.testing.assert_allclose(scene.truth(80 * i).radiance, (grey / 255) ** 2.2, rtol=0.05)
-    assert VideoScene(path, most_pictures=2, shape=(12, 12)).shape == (12, 12)
+    assert VideoScene(path, most_pictures=2, shape=(12, 12), transfer="srgb").shape == (12, 12)
 
 
 @pytest.mark.parametrize(

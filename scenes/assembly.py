@@ -1,0 +1,102 @@
+"""Parts with normals and texture coordinates, put together to one rigid surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+from scenes.renderers.protocol import Surface
+from scenes.textures import Texture
+from scenes.trajectories import Trajectory
+from spikecam_env.errors import InputError
+
+Albedo = float | Texture
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """vertices, normals (V, 3); uv (V, 2), v = 1 at the top of the texture; faces (F, 3); albedo 0..1, linear."""
+
+    vertices: Points
+    normals: Points
+    uv: Points
+    faces: NDArray[np.int64]
+    albedo: Albedo = 0.8
+
+    def moved(self, by: Trajectory) -> Part:
+        """Turned and shifted as a trajectory is at time 0."""
+        pose = by.pose(0.0)
+        return replace(
+            self, vertices=self.vertices @ pose[:3, :3].T + pose[:3, 3], normals=self.normals @ pose[:3, :3].T
+        )
+
+    def scaled(self, factor: ArrayLike) -> Part:
+        """By a positive factor, or one for each axis."""
+        factors = np.broadcast_to(np.asarray(factor, np.float64), 3)
+        normals = self.normals / factors
+        return replace(self, vertices=self.vertices * factors, normals=unit(normals))
+
+
+def assemble(*parts: Part) -> Surface:
+    """One rigid surface; textures and greys of several parts go into one atlas."""
+    if not parts:
+        raise InputError("a surface needs at least one part")
+    if len(parts) == 1:
+        return _surface(parts[0])
+    atlas, places = _atlas([part.albedo for part in parts])
+    start = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    return _surface(
+        Part(
+            np.concatenate([part.vertices for part in parts]),
+            np.concatenate([part.normals for part in parts]),
+            np.concatenate([place[:2] + part.uv * place[2:] for part, place in zip(parts, places, strict=True)]),
+            np.concatenate([part.faces + first for part, first in zip(parts, start, strict=False)]),
+            atlas,
+        )
+    )
+
+
+def _surface(part: Part) -> Surface:
+    mesh = trimesh.Trimesh(part.vertices, part.faces, vertex_normals=part.normals, process=False)
+    mesh.visual = trimesh.visual.TextureVisuals(uv=part.uv)
+    return Surface(mesh, part.albedo)
+
+
+def _atlas(albedos: Sequence[Albedo]) -> tuple[Texture, list[NDArray[np.float64]]]:
+    """All in one texture, shelf by shelf, each with a margin of its edge; and the places (u, v, width, height)."""
+    tiles = {id(a): np.full((4, 4), a, np.float32) if np.ndim(a) == 0 else np.asarray(a, np.float32) for a in albedos}
+    order = sorted(tiles, key=lambda name: -tiles[name].shape[0])
+    width = max(256, *(tile.shape[1] + 2 * _MARGIN for tile in tiles.values()))
+    x = y = shelf = 0
+    corner = {}
+    for name in order:
+        rows, columns = (side + 2 * _MARGIN for side in tiles[name].shape)
+        if x + columns > width:
+            x, y, shelf = 0, y + shelf, 0
+        corner[name] = (x, y)
+        x, shelf = x + columns, max(shelf, rows)
+    height = y + shelf
+    atlas = np.zeros((height, width), np.float32)
+    for name, (x, y) in corner.items():
+        padded = np.pad(tiles[name], _MARGIN, mode="edge")
+        atlas[y : y + padded.shape[0], x : x + padded.shape[1]] = padded
+    places = []
+    for albedo in albedos:
+        (x, y), (rows, columns) = corner[id(albedo)], tiles[id(albedo)].shape
+        left, top = x + _MARGIN, y + _MARGIN
+        places.append(np.array([left / width, 1 - (top + rows) / height, columns / width, rows / height]))
+    return atlas, places
+
+
+_MARGIN = 8
+"""Texels around a tile of an atlas, so that coarse readings do not see the next one."""
+
+
+def unit(vectors: Points) -> Points:
+    """Vectors (..., 3) of length 1; zero stays zero."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

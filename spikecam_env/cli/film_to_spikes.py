@@ -1,0 +1,125 @@
+"""`spikecam film`: a film of yours through the sensor into a file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import tyro
+
+from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.options import Count, Positive, Seed, Size
+from spikecam_env.errors import InputError
+
+if TYPE_CHECKING:
+    from scenes import VideoScene
+
+
+@dataclass
+class Film:
+    """Record a film of yours: a video, a folder of pictures, or a list of pictures with the time of each.
+
+    Light is linear, averaged over area to the sensor's size, and scaled to the mean interval.  The recording lasts as
+    long as the film.
+
+    example:  spikecam film clip.mp4 --out clip.h5
+              spikecam film pictures --film-rate 1000 --transfer linear --out clip.dat
+    """
+
+    film: tyro.conf.Positional[Path]
+    """A video; a folder of pictures in the order of their numbers; a .csv file whose first line is name,time_s; or a
+    .npy array (T, h, w) or (T, h, w, 3)."""
+    out: Path
+    """Where to; .h5 (bit-packed with attributes), .dat (raw Vidar bits) or .npz (key `spikes`)."""
+    film_rate: Positive | None = None
+    """Pictures a second when the film was taken; default: its time stamps.  A folder and an array need it."""
+    slow: Positive = 1.0
+    """The film plays so many times slower than life: its time stamps are divided by it."""
+    transfer: str | None = None
+    """From its values to linear light: srgb, bt709, gamma2.2 (or another power), linear, pq, hlg; default: what the
+    file states."""
+    channel: Literal["luminance", "red", "green", "blue"] = "luminance"
+    """Light of which colour: all as the eye weighs them, or one."""
+    interpolation: Literal["linear", "hold"] = "linear"
+    """Of light between two pictures: a straight line, or the former until the next."""
+    mean_interval: Positive = 10.0
+    """Exposure: frames between spikes, on average over the film and the picture."""
+    frames: Count | None = None
+    """Spike frames to record; default: the whole film."""
+    seconds: Positive | None = None
+    """The same, in seconds of the film's true time."""
+    size: Size = (250, 400)
+    """Rows and columns; the middle of the film that has these proportions is seen."""
+    camera: Camera = field(default_factory=Camera)
+    seed: Seed = 0
+    """Seed of the camera unit and its noise."""
+
+    def run(self) -> None:
+        from scenes import VideoScene
+        from spikecam_env.cli.recording import check_out, record_scene
+        from spikecam_env.cli.table import table
+        from spikecam_env.sensor import SpikeSensor
+
+        check_out(self.out, self.frames or 1, self.size)
+        model = self.camera.load()
+        sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
+        asked = self._frames_asked(model.frame_rate_hz)
+        scene = VideoScene(
+            self.film,
+            self.film_rate,
+            self.size,
+            frame_rate_hz=model.frame_rate_hz,
+            transfer=self.transfer,
+            channel=self.channel,
+            interpolation=self.interpolation,
+            slow=self.slow,
+            seconds=None if asked is None else asked / model.frame_rate_hz,
+            mean_interval=self.mean_interval,
+        )
+        frames = self._frames(asked, scene)
+        check_out(self.out, frames, self.size)
+        attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
+        attributes |= {"film": self.film.name, "transfer": scene.transfer, "gain": scene.gain}
+        spikes = record_scene(self.out, scene, sensor, frames, f"record {self.film.name}", attributes)
+        done = self._done(scene, frames, sensor.engine, spikes)
+        print(table([{"film to spikes": name, "": value} for name, value in done.items()]))
+
+    def _frames_asked(self, rate_hz: float) -> int | None:
+        """Errors: InputError for less than one, and where both options say it."""
+        if self.frames is not None and self.seconds is not None:
+            raise InputError(f"--frames {self.frames} --seconds {self.seconds:g}; give one of the two")
+        asked = self.frames if self.seconds is None else round(self.seconds * rate_hz)
+        if asked is not None and asked < 1:
+            raise InputError(f"{asked} frames are asked; record at least 1")
+        return asked
+
+    def _frames(self, asked: int | None, scene: VideoScene) -> int:
+        """How many to record.  Errors: InputError where the film is shorter."""
+        whole = math.floor(scene.frames + 1e-6)
+        if whole < 1:
+            raise InputError(f"{self.film} lasts {scene.frames:.3g} frames of the camera; it must last 1 or more")
+        if asked is not None and asked > whole:
+            raise InputError(
+                f"{asked} frames are asked; {self.film} lasts {whole} ({scene.frames / scene.frame_rate_hz:.4g} s)"
+            )
+        return whole if asked is None else asked
+
+    def _done(self, scene: VideoScene, frames: int, engine: str, spikes: int) -> dict[str, Any]:
+        pixels = frames * math.prod(self.size)
+        return {
+            "pictures": scene.pictures,
+            "times": scene.times_from,
+            "duration [s]": frames / scene.frame_rate_hz,
+            "transfer": scene.transfer,
+            "light of": self.channel,
+            "between pictures": self.interpolation,
+            "gain": scene.gain,
+            "mean interval asked [frames]": self.mean_interval,
+            "mean interval got [frames]": pixels / spikes if spikes else None,
+            "frames": frames,
+            "frames a second": f"{scene.frame_rate_hz:g}",
+            "engine": engine,
+            "file": str(self.out),
+        }

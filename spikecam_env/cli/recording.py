@@ -1,0 +1,76 @@
+"""A scene through a sensor into a file, block by block: what `record` and `film` share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spikecam_env.checked import checked_disk, checked_memory
+from spikecam_env.errors import InputError
+from spikecam_env.whole import check_file
+
+if TYPE_CHECKING:
+    from scenes import Scene
+    from spikecam_env.sensor import SpikeSensor
+
+BLOCK = 64
+"""Frames simulated and written at a time; a multiple of the chunks of the .h5 file."""
+HDF5 = (".h5", ".hdf5")
+
+
+def check_out(out: Path, frames: int, shape: tuple[int, int]) -> None:
+    """Errors: InputError for a file type that no recording has, a place that cannot be written to, and more frames than
+    the disk has room for, or for a .npz the memory."""
+    from spikecam_env.streams.packing import packed_bytes
+
+    suffix = out.suffix.lower()
+    if suffix not in (*HDF5, ".dat", ".npz"):
+        raise InputError(f"--out {out}: unknown file type {suffix!r}; use .h5, .dat or .npz")
+    check_file(out)
+    if suffix == ".npz":
+        checked_memory(2 * frames * math.prod(shape), f"{frames} frames in a .npz")
+    else:
+        checked_disk(frames * packed_bytes(shape), out, f"{frames} frames")
+
+
+def record_scene(
+    out: Path, scene: Scene, sensor: SpikeSensor, frames: int, what: str, attributes: dict[str, object]
+) -> int:
+    """Write `frames` frames of spikes to a .h5, .dat or .npz file, which appears whole; returns how many spikes.
+
+    what: for the progress bar.  attributes: of a .h5 file.
+    """
+    from tqdm import trange
+
+    spikes = 0
+    with _appending(out, sensor, attributes) as append:
+        for start in trange(0, frames, BLOCK, desc=what, unit="block", leave=False):
+            count = min(BLOCK, frames - start)
+            block = sensor.step(scene.radiance(start, start + count), count)
+            append(block)
+            spikes += int(block.sum())
+    return spikes
+
+
+@contextmanager
+def _appending(out: Path, sensor: SpikeSensor, attributes: dict[str, object]) -> Iterator[Callable[[Any], object]]:
+    """A function that takes (T, H, W) spikes, block after block."""
+    import numpy as np
+
+    from spikecam_env.streams import SpikeWriter, pack_frames, save_npz
+    from spikecam_env.whole import whole_file
+
+    suffix = out.suffix.lower()
+    if suffix in HDF5:
+        with SpikeWriter(out, sensor.shape, sensor.model.frame_rate_hz, **attributes) as writer:
+            yield writer.append
+    elif suffix == ".dat":
+        with whole_file(out) as beside, beside.open("wb") as file:
+            yield lambda block: file.write(pack_frames(block).tobytes())
+    else:
+        blocks: list[Any] = []
+        yield blocks.append
+        save_npz(out, np.concatenate(blocks))

@@ -1,0 +1,172 @@
+"""`spikecam film`: what people film, as spikes; printed as it was done, and named where it cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from made_films import greys, write_film
+from PIL import Image
+
+from spikecam_env.cli.main import run
+from spikecam_env.streams import middleTFP, read_recording
+
+SMALL = ("--size", "16", "24")
+
+
+def spikecam(*args: object) -> int:
+    return run([str(a) for a in args])
+
+
+def printed(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+    """The table's lines by their names."""
+    lines = capsys.readouterr().out.splitlines()[2:]
+    return {line.rsplit("  ", 1)[0].strip(): line.rsplit("  ", 1)[1].strip() for line in lines}
+
+
+def folder_of(folder: Path, codes: list[int]) -> Path:
+    """Pictures dark at the left, `codes` at the right."""
+    folder.mkdir()
+    for i, code in enumerate(codes):
+        values = np.full((32, 48), 40, np.uint8)
+        values[:, 24:] = code
+        Image.fromarray(values).save(folder / f"p{i}.png")
+    return folder
+
+
+@pytest.mark.parametrize("suffix", ["h5", "dat", "npz"])
+def test_a_video_becomes_spikes_of_the_asked_interval(suffix: str, tmp_path: Path, capsys) -> None:
+    film = write_film(tmp_path / "f.mkv", greys([60, 120, 180, 120]), rate=100, color_trc=13)
+    out = tmp_path / f"f.{suffix}"
+    assert spikecam("film", film, "--out", out, "--mean-interval", 8, "--model", "ideal", *SMALL) == 0
+    shape = {"height": 16, "width": 24} if suffix == "dat" else {}
+    spikes = read_recording(out, **shape).spikes
+    assert spikes.shape == (1200, 16, 24)
+    assert spikes.mean() == pytest.approx(1 / 8, rel=0.01)
+    said = printed(capsys)
+    assert said["pictures"] == "4" and said["transfer"] == "srgb" and said["frames"] == "1200"
+    assert said["times"] == "100 pictures a second" and said["between pictures"] == "linear"
+    assert float(said["mean interval got [frames]"]) == pytest.approx(8, rel=0.01)
+
+
+def test_all_kinds_of_file_hold_the_same_spikes(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "p", [60, 200, 60])
+    for name in ("a.h5", "a.dat", "a.npz"):
+        assert spikecam("film", folder, "--film-rate", 800, "--out", tmp_path / name, "--seed", 3, *SMALL) == 0
+    same = read_recording(tmp_path / "a.h5").spikes
+    assert np.array_equal(same, read_recording(tmp_path / "a.npz").spikes)
+    assert np.array_equal(same, read_recording(tmp_path / "a.dat", height=16, width=24).spikes)
+    attributes = h5py.File(tmp_path / "a.h5").attrs
+    assert attributes["film"] == "p" and attributes["transfer"] == "srgb" and attributes["gain"] > 0
+
+
+def test_a_list_sets_the_time_of_every_picture(tmp_path: Path, capsys) -> None:
+    """Bright for a tenth of the time: light is held, and the mean interval is by time."""
+    folder = folder_of(tmp_path / "p", [40, 250, 40])
+    (folder / "list.csv").write_text("name,time_s\np0.png,0\np1.png,0.009\np2.png,0.010\n")
+    options = ("--interpolation", "hold", "--model", "ideal", "--mean-interval", "20", *SMALL)
+    assert spikecam("film", folder / "list.csv", "--out", tmp_path / "a.h5", *options) == 0
+    assert printed(capsys)["times"] == "1 to 9 ms apart"
+    spikes = read_recording(tmp_path / "a.h5").spikes
+    assert len(spikes) == 440
+    right = spikes[:, :, 14:].mean(axis=(1, 2))
+    assert right[362:398].mean() > 5 * right[:358].mean()
+
+
+def test_the_film_is_seen_where_it_is_bright(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "p", [200, 200])
+    assert spikecam("film", folder, "--film-rate", 200, "--out", tmp_path / "a.h5", "--model", "ideal", *SMALL) == 0
+    picture = middleTFP(read_recording(tmp_path / "a.h5").spikes, 100, 101)
+    ratio = picture[:, 14:].mean() / picture[:, :10].mean()
+    expected = ((200 / 255 + 0.055) / (40 / 255 + 0.055)) ** 2.4
+    assert ratio == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "frames"),
+    [
+        ((), 1200),
+        (("--slow", "2"), 600),
+        (("--film-rate", "400"), 300),
+        (("--frames", "70"), 70),
+        (("--seconds", "0.005"), 200),
+        (("--frame-rate", "20000"), 600),
+        (("--interpolation", "hold"), 1600),
+    ],
+)
+def test_a_recording_lasts_as_long_as_the_film_did_in_life(options: tuple, frames: int, tmp_path: Path, capsys) -> None:
+    film = write_film(tmp_path / "f.mkv", greys([60, 120, 180, 120]), rate=100, color_trc=13)
+    assert spikecam("film", film, "--out", tmp_path / "f.dat", *options, *SMALL) == 0
+    assert printed(capsys)["frames"] == str(frames)
+    assert (tmp_path / "f.dat").stat().st_size == frames * 16 * 24 // 8
+
+
+def test_an_array_of_linear_light_is_a_film(tmp_path: Path, capsys) -> None:
+    np.save(tmp_path / "f.npy", np.random.default_rng(0).random((5, 16, 24, 3)) * 3)
+    options = ("--film-rate", 1000, "--transfer", "linear", "--channel", "green", *SMALL)
+    assert spikecam("film", tmp_path / "f.npy", "--out", tmp_path / "f.h5", *options) == 0
+    said = printed(capsys)
+    assert said["transfer"] == "linear" and said["light of"] == "green" and said["frames"] == "160"
+
+
+def test_record_has_a_frame_rate_of_its_own(tmp_path: Path) -> None:
+    """At half the rate the disk turns twice as far in a frame."""
+    for rate, name in ((40_000, "a"), (20_000, "b")):
+        options = ("--frames", 64, "--model", "ideal", "--frame-rate", rate, *SMALL)
+        assert spikecam("record", "--out", tmp_path / f"{name}.h5", *options) == 0
+    a, b = (read_recording(tmp_path / f"{name}.h5") for name in "ab")
+    assert (a.frame_rate_hz, b.frame_rate_hz) == (40_000, 20_000)
+    assert not np.array_equal(a.spikes, b.spikes)
+    same = ("record", "--out", tmp_path / "c.h5", "--frames", 64, "--model", "ideal", *SMALL)
+    assert spikecam(*same) == 0
+    assert np.array_equal(read_recording(tmp_path / "c.h5").spikes, a.spikes)
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("none.mp4",), "there is no film none.mp4"),
+        (("text.mp4",), "text.mp4 is not a film"),
+        (("p",), "have no times; say film_rate_hz"),
+        (("p", "--film-rate", "0"), "film_rate_hz is 0"),
+        (("p", "--film-rate", "100", "--slow", "2"), "one of film_rate_hz, times_s and slow"),
+        (("p", "--film-rate", "100", "--transfer", "log"), "unknown transfer 'log'"),
+        (("p", "--film-rate", "100", "--channel", "red"), "the pictures are grey"),
+        (("p", "--film-rate", "100", "--mean-interval", "0.5"), "mean_interval is 0.5"),
+        (("p", "--film-rate", "100", "--mean-interval", "nan"), "mean_interval is nan"),
+        (("p", "--film-rate", "100", "--frames", "0"), "0 frames are asked"),
+        (("p", "--film-rate", "100", "--frames", "9999"), "p lasts 800 (0.02 s)"),
+        (("p", "--film-rate", "100", "--seconds", "nan"), "--seconds nan"),
+        (("p", "--film-rate", "100", "--seconds", "1", "--frames", "1"), "give one of the two"),
+        (("p", "--film-rate", "1e5"), "it must last 1 or more"),
+        (("p", "--film-rate", "1e9"), "the film lasts 8e-05 frames"),
+        (("p", "--film-rate", "100", "--frame-rate", "0"), "frame_rate_hz = 0"),
+        (("p", "--film-rate", "100", "--size", "0", "24"), "shape"),
+        (("black", "--film-rate", "100"), "no light"),
+        (("mixed", "--film-rate", "100"), "picture 3 has shape, bits, transfer"),
+        (("gap", "--film-rate", "100"), "a picture seems missing"),
+        (("p/list.csv",), "line 3: the time is 0 s"),
+        (("object.npy", "--film-rate", "100"), "object.npy is not an .npy file"),
+    ],
+)
+def test_what_is_wrong_ends_in_one_line_and_nothing_is_left(args, message, tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("text.mp4").write_text("a text " * 99)
+    folder_of(Path("p"), [60, 200, 60])
+    folder_of(Path("mixed"), [60, 200])
+    Image.fromarray(np.zeros((8, 8), np.uint8)).save("mixed/p2.png")
+    folder_of(Path("gap"), [60, 200, 60, 70])
+    Path("gap/p2.png").unlink()
+    Path("black").mkdir()
+    for name in ("1.png", "2.png"):
+        Image.fromarray(np.zeros((8, 8), np.uint8)).save(Path("black") / name)
+    if args[0] == "p/list.csv":
+        Path("p/list.csv").write_text("name,time_s\np0.png,0\np1.png,0\n")
+    np.save("object.npy", np.array([{}], object), allow_pickle=True)
+    before = sorted(tmp_path.rglob("*"))
+    assert spikecam("film", *args, "--out", "x.h5", *(() if "--size" in args else SMALL)) == 2
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert error.startswith("spikecam: ") and message in error
+    assert sorted(tmp_path.rglob("*")) == before
