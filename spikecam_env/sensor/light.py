@@ -249,7 +249,8 @@ def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32])
 def _grains_per_frame(
     radiance: NDArray[np.float32], gain: NDArray[np.float32], dark: NDArray[np.float32]
 ) -> NDArray[np.int32]:
-    capped = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
+    with np.errstate(over="ignore"):  # infinity is capped too
+        capped = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
     return (capped + np.float32(0.5)).astype(np.int32)
 
 

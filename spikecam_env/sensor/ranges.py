@@ -75,13 +75,13 @@ def _checked(value: Any, field: dataclasses.Field[Any], place: str) -> bool | in
 
 
 def _number(value: Any) -> float:
-    """As float; NaN, which is in no range, for what is no number: text, True, arrays, None."""
+    """As float; NaN, which is in no range, for what is no number (text, True, arrays, None) or too large for one."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return math.nan
     try:
         return float(value)
     except (OverflowError, ValueError):
-        return math.inf if value > 0 else -math.inf
+        return math.nan
 
 
 def shown(value: Any) -> str:

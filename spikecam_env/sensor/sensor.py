@@ -259,6 +259,9 @@ def checked_unit(unit: Any, shape: tuple[int, int]) -> Unit:
     """The unit, read-only; raises InputError unless it is a firing law of rows * columns pixels."""
     if not isinstance(unit, Unit):
         raise InputError(f"unit = {type(unit).__name__}; it must be a Unit (spikecam_env.sensor.Unit)")
+    for name in ("shot", "dark_is_noisy"):
+        if not isinstance(getattr(unit, name), (bool, np.bool_)):
+            raise InputError(f"unit.{name} = {shown(getattr(unit, name))}; it must be True or False")
     for name, (low, high) in UNIT_RANGES.items():
         values = real_numbers(getattr(unit, name), f"unit.{name}", "f")
         if values.shape != (shape[0] * shape[1],):
