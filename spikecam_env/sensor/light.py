@@ -112,8 +112,7 @@ def real_numbers(values: ArrayLike, name: str, kinds: str) -> NDArray[Any]:
 
     Raises InputError for others, such as True, text, objects, complex or ragged ones, and where some are masked.
     """
-    parts = values if isinstance(values, (list, tuple)) else [values]
-    if any(np.ma.is_masked(part) for part in parts):
+    if _masks_some(values):
         raise InputError(f"{name} is masked in part; fill it first, e.g. with .filled(0.0)")
     try:
         array = np.asarray(values)
@@ -127,6 +126,13 @@ def real_numbers(values: ArrayLike, name: str, kinds: str) -> NDArray[Any]:
             "white (255), undo its gamma, and scale it"
         )
     raise InputError(f"{name} is {array.dtype}; it must be real numbers in floating point")
+
+
+def _masks_some(values: Any) -> bool:
+    """Whether an array, or one in a list of them, hides some of its values, which numpy would then show."""
+    if isinstance(values, (list, tuple)):
+        return any(_masks_some(part) for part in values)
+    return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
 
 
 def warn_beside(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> None:
