@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -125,6 +125,8 @@ class SpikeSensor:
         """Go on from a saved state; raises InputError for that of another engine, shape, model or unit."""
         if not isinstance(state, SensorState):
             raise InputError(f"state is a {type(state).__name__}; it must be what SpikeSensor.state() returns")
+        if not all(hasattr(state, f.name) for f in fields(SensorState)):
+            raise InputError("this state was saved by another version of spikecam-env; record it again")
         if (state.engine, state.shape) != (self.engine, self.shape):
             raise InputError(
                 f"this state is of a {state.engine} sensor of {state.shape}; this one is {self.engine}, {self.shape}"

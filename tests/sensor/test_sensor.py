@@ -239,6 +239,18 @@ def test_keys_changed_in_place_between_steps_are_seen(engine: str, blurred: bool
             np.testing.assert_array_equal(one.step(changed, cut), two.step(Keyframes(frame, light), cut))
 
 
+@pytest.mark.parametrize("name", ["optical_blur", "dead_time"])
+def test_ramps_that_stand_still_are_light_that_stays(name: str) -> None:
+    """Through optics and without, whole and a frame at a time, on both engines where nothing is drawn."""
+    model = SensorModel.preset("ideal").with_effect(CATALOGUE["optical_blur"](sigma_pixels=1.0))
+    model = model.with_effect(CATALOGUE[name]())
+    one, two = moving_light().radiance[:2]
+    light = Keyframes([0, 16, 40, 70, 90], np.stack([one, one, two, two, one]))
+    whole = SpikeSensor(model, SHAPE, 1, "reference").step(light, 120)
+    for cuts in ([120], [1] * 90 + [30], [7] * 15 + [15]):
+        np.testing.assert_array_equal(stream(SpikeSensor(model, SHAPE, 1), light, cuts), whole)
+
+
 def test_optics_act_once_a_key_and_not_once_a_step(monkeypatch) -> None:
     blur, calls = CATALOGUE["optical_blur"], []
     image = blur.image
