@@ -23,7 +23,7 @@ from spikecam_env.sensor.light import (
     check_radiance,
     light_values,
     segments,
-    warn_beside,
+    warn_uncovered,
 )
 from spikecam_env.sensor.model import SensorModel, generator
 
@@ -156,7 +156,7 @@ class SpikeSensorBatch:
 
     def _moving(self, lights: Sequence[Keyframes | NDArray[np.float32]], frames: int) -> Iterator[cuda.BatchSegment]:
         for light, at in zip(lights, self.frame, strict=False):
-            warn_beside(light, int(at), frames)
+            warn_uncovered(light, int(at), frames)
         films = [segments(light, int(self.frame[b]), frames) for b, light in enumerate(lights)]
         for cut in cut_alike(films):
             seen = [self._imaging[b].seen(segment) for b, segment in enumerate(cut)]

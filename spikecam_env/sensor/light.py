@@ -112,8 +112,7 @@ def real_numbers(values: ArrayLike, name: str, kinds: str) -> NDArray[Any]:
 
     Raises InputError for others, such as True, text, objects, complex or ragged ones, and where some are masked.
     """
-    parts = values if isinstance(values, (list, tuple)) else [values]
-    if any(np.ma.is_masked(part) for part in parts):
+    if _masks_some(values):
         raise InputError(f"{name} is masked in part; fill it first, e.g. with .filled(0.0)")
     try:
         array = np.asarray(values)
@@ -129,19 +128,26 @@ def real_numbers(values: ArrayLike, name: str, kinds: str) -> NDArray[Any]:
     raise InputError(f"{name} is {array.dtype}; it must be real numbers in floating point")
 
 
-def warn_beside(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> None:
-    """Warn where frames start .. start + frames lie outside all keys of a film, so that its light stands still.
+def _masks_some(values: Any) -> bool:
+    """Whether an array, or one in a list of them, hides some of its values, which numpy would then show."""
+    if isinstance(values, (list, tuple)):
+        return any(_masks_some(part) for part in values)
+    return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
 
-    Keys are on absolute frames: to give every call keys that begin at 0 is a likely mistake.
+
+def warn_uncovered(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> None:
+    """Warn where the keys of a film leave out frames of start .. start + frames, so that its light stands still there.
+
+    Keys are on absolute frames: to give every call keys that begin at 0 is a likely mistake.  A last key at the start
+    of the last frame covers it, as a film's last picture does.
     """
     if not isinstance(light, Keyframes) or light.frame.size < 2:
         return
     first, last = float(light.frame[0]), float(light.frame[-1])
-    if last <= start or first >= start + frames:
-        beside = "before" if last <= start else "after"
+    if first > start or last < start + frames - 1:
         warnings.warn(
-            f"keys of frames {first:g} .. {last:g} lie {beside} the frames to expose, whose light is held: keys are on "
-            "the stream's absolute frames, not on those of a call",
+            f"keys of frames {first:g} .. {last:g} do not cover all frames to expose; light is held before and after "
+            "them (keys are on the stream's absolute frames, not on those of a call)",
             stacklevel=3,
         )
 
@@ -249,7 +255,8 @@ def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32])
 def _grains_per_frame(
     radiance: NDArray[np.float32], gain: NDArray[np.float32], dark: NDArray[np.float32]
 ) -> NDArray[np.int32]:
-    capped = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
+    with np.errstate(over="ignore"):  # infinity is capped too
+        capped = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
     return (capped + np.float32(0.5)).astype(np.int32)
 
 

@@ -66,7 +66,7 @@ class SensorModel:
         if not isinstance(self.name, str):
             raise InputError(f"name = {shown(self.name)}; it must be text")
         if not isinstance(self.circuit, Circuit):
-            raise InputError(f"circuit is a {type(self.circuit).__name__}; it must be a Circuit")
+            raise InputError(f"circuit = {shown(self.circuit)}; it must be a Circuit")
         object.__setattr__(self, "effects", _in_physical_order(self.effects))
         alike = np.random.default_rng(0)
         self._pixels((1, 1), lambda _: alike).check()
@@ -175,7 +175,7 @@ def _in_physical_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     order = list(CATALOGUE)
     for effect in listed:
         if not isinstance(effect, Effect):
-            raise InputError(f"effects hold a {type(effect).__name__}; give instances of CATALOGUE's classes")
+            raise InputError(f"effects hold {shown(effect)}; give instances of CATALOGUE's classes")
         if effect.name not in order:
             raise unknown_name("effect", effect.name, CATALOGUE)
         if sum(other.name == effect.name for other in listed) > 1:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -17,7 +17,7 @@ from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import ahead, block, fast
-from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_beside
+from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_uncovered
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import UNIT_RANGES, Unit
 
@@ -102,7 +102,7 @@ class SpikeSensor:
         frames = checked_count(frames)
         light = as_light(radiance, self.shape)
         spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)
-        warn_beside(light, self.frame, frames)
+        warn_uncovered(light, self.frame, frames)
         seen = map(self._imaging.seen, segments(light, self.frame, frames))
         if self.engine == "fast" and self._frame_effects:
             block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
@@ -124,6 +124,8 @@ class SpikeSensor:
         """Go on from a saved state; raises InputError for that of another engine, shape, model or unit."""
         if not isinstance(state, SensorState):
             raise InputError(f"state is a {type(state).__name__}; it must be what SpikeSensor.state() returns")
+        if not all(hasattr(state, f.name) for f in fields(SensorState)):
+            raise InputError("this state was saved by another version of spikecam-env; record it again")
         if (state.engine, state.shape) != (self.engine, self.shape):
             raise InputError(
                 f"this state is of a {state.engine} sensor of {state.shape}; this one is {self.engine}, {self.shape}"
@@ -219,6 +221,9 @@ def checked_unit(unit: Any, shape: tuple[int, int]) -> Unit:
     """The unit, read-only; raises InputError unless it is a firing law of rows * columns pixels."""
     if not isinstance(unit, Unit):
         raise InputError(f"unit = {type(unit).__name__}; it must be a Unit (spikecam_env.sensor.Unit)")
+    for name in ("shot", "dark_is_noisy"):
+        if not isinstance(getattr(unit, name), (bool, np.bool_)):
+            raise InputError(f"unit.{name} = {shown(getattr(unit, name))}; it must be True or False")
     for name, (low, high) in UNIT_RANGES.items():
         values = real_numbers(getattr(unit, name), f"unit.{name}", "f")
         if values.shape != (shape[0] * shape[1],):

@@ -10,6 +10,7 @@ import hashlib
 import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,16 +187,19 @@ class Unit:
 
     def owned(self) -> Unit:
         """This unit, its arrays read-only; of arrays that somebody may change in place, copies."""
-        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name in UNIT_RANGES}
-        shared = {name: array for name, array in arrays.items() if array.flags.writeable or array.base is not None}
-        copies = {name: np.array(array, dtype=np.float64) for name, array in shared.items()}
+        arrays = {name: getattr(self, name) for name in UNIT_RANGES}
+        copies: dict[str, Any] = {
+            name: np.array(array, dtype=np.float64) for name, array in arrays.items() if not _is_own(array)
+        }
         for copy in copies.values():
             copy.flags.writeable = False
         return replace(self, **copies) if copies else self
 
     def limited(self) -> Unit:
         """This unit, its electrons and kappa within UNIT_RANGES, as those of single pixels of a spread may not be."""
-        within = {name: np.clip(getattr(self, name), *UNIT_RANGES[name]) for name in ("electrons", "kappa")}
+        within: dict[str, Any] = {
+            name: np.clip(getattr(self, name), *UNIT_RANGES[name]) for name in ("electrons", "kappa")
+        }
         return replace(self, **within)
 
     @cached_property
@@ -210,6 +214,11 @@ class Unit:
     def grains_per_frame(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Gain and dark in the light law's unit, (P,) float32 each."""
         return (self.gain * GRAINS).astype(np.float32), (self.dark * GRAINS).astype(np.float32)
+
+
+def _is_own(array: NDArray[np.float64]) -> bool:
+    """Whether nobody can change an array: read-only, and no view of another."""
+    return isinstance(array, np.ndarray) and not array.flags.writeable and array.base is None
 
 
 def firing_law(pixels: PixelArray) -> Unit:

@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels import fast
 from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
 from spikecam_env.sensor.light import MAX_SEGMENT, Segment
@@ -135,7 +135,7 @@ def same_light(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
     """Whether two pictures have the same values, every pixel."""
     if a.flags.c_contiguous and a.flags.writeable:
         return bool(_same_words(a.view(np.uint32), b.view(np.uint32)))
-    return np.arraysame_light(a, b)
+    return np.array_equal(a, b)
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
