@@ -50,6 +50,12 @@ class BlindTrial:
     """module:function that is tried: (campaign, model, out, seed, exclude, threads) -> what diagnosis.json holds."""
 
     def run(self) -> None:
+        from spikecam_env.cli.files import out_folder
+
+        with out_folder(self.out):
+            self._go_on()
+
+    def _go_on(self) -> None:
         from tqdm import tqdm
 
         for name in ("jobs", "threads", "limit"):
@@ -77,7 +83,7 @@ class BlindTrial:
                     scored = trial.score_trial(self.out, picked)
                     if self.record:
                         record.pack(self.out, self.record)
-        except (ValueError, ImportError, OSError) as error:
+        except (ValueError, ImportError) as error:
             raise InputError(str(error)) from error
         print(trial.as_text(scored))
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")

@@ -54,7 +54,7 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; it must be 1 or more")
-    target = Path(folder).resolve()
+    target = Path(os.path.realpath(folder))
     with made_folder(target, "a dataset"), _alone_in(target), when_stopped(partial(_clear_unfinished, target)):
         plan = _with_renderer(plan, target)
         manifest = _begun(plan, target)
