@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import spikecam_env
 from spikecam_env.errors import InputError
+from spikecam_env.whole import reason
 
 WORLD = Path(spikecam_env.__file__).resolve().parents[1] / "tests" / "hidden_world"
 
@@ -85,6 +86,8 @@ class BlindTrial:
                         record.pack(self.out, self.record)
         except (ValueError, ImportError) as error:
             raise InputError(str(error)) from error
+        except OSError as error:
+            raise InputError(f"cannot use {error.filename or self.out}: {reason(error)}") from error
         print(trial.as_text(scored))
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
 
