@@ -13,7 +13,7 @@ import pytest
 from tests.faults.writing import WRITINGS, said, tree
 
 PAGE = 4096
-SHARES = (0.0, 0.5, 0.9)
+SHARES = (0.0, 0.6)
 """Of what a command writes, how much there is room for."""
 LONG_WORK = ("blind-trial",)
 """Commands that write over minutes: tried with no room."""

@@ -32,6 +32,7 @@ def test_output_that_nobody_takes_ends_without_a_traceback(line: str, codes: set
     assert done.stderr in (error, "spikecam: cannot write: the disk is full\n" if error else "")
 
 
+@pytest.mark.filterwarnings("ignore:not ours")
 def test_warnings_of_this_project_are_lines_and_each_is_said_once(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     def warn(self) -> None:
         for _ in range(2):
