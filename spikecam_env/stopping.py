@@ -66,7 +66,8 @@ def watch() -> None:
     _State.watching = True
     _occupy_standard_streams()
     reading, writing = os.pipe()
-    os.set_blocking(writing, False)
+    if hasattr(os, "set_blocking"):  # Windows needs none
+        os.set_blocking(writing, False)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
     for name in NAMES:
         number = getattr(signal, name, None)

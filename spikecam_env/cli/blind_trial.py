@@ -13,6 +13,7 @@ from typing import Any, Literal
 import spikecam_env
 from spikecam_env.cli.options import Count, Workers
 from spikecam_env.errors import InputError
+from spikecam_env.whole import reason
 
 WORLD = Path(spikecam_env.__file__).resolve().parents[1] / "tests" / "hidden_world"
 
@@ -51,6 +52,12 @@ class BlindTrial:
     """module:function that is tried: (campaign, model, out, seed, exclude, threads) -> what diagnosis.json holds."""
 
     def run(self) -> None:
+        from spikecam_env.cli.files import out_folder
+
+        with out_folder(self.out):
+            self._go_on()
+
+    def _go_on(self) -> None:
         from tqdm import tqdm
 
         trial = hidden_world(self.world)
@@ -75,8 +82,10 @@ class BlindTrial:
                     scored = trial.score_trial(self.out, picked)
                     if self.record:
                         record.pack(self.out, self.record)
-        except (ValueError, ImportError, OSError) as error:
+        except (ValueError, ImportError) as error:
             raise InputError(str(error)) from error
+        except OSError as error:
+            raise InputError(f"cannot use {error.filename or self.out}: {reason(error)}") from error
         print(trial.as_text(scored))
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
 

@@ -57,7 +57,7 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     checked_count(jobs, "jobs")
     frames = plan.frames * len(plan.entries)
     checked_disk(frames * packed_bytes(plan.shape), folder, f"a dataset of {frames} frames")
-    target = Path(folder).resolve()
+    target = Path(os.path.realpath(folder))
     with made_folder(target, "a dataset"), _alone_in(target), when_stopped(partial(_clear_unfinished, target)):
         plan = _with_renderer(plan, target)
         manifest = _begun(plan, target)

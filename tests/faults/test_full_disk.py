@@ -1,0 +1,92 @@
+"""A disk that fills up while a command writes: one line, exit code 2, and nothing half written."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.faults.writing import WRITINGS, said, tree
+
+PAGE = 4096
+SHARES = (0.0, 0.6)
+"""Of what a command writes, how much there is room for."""
+LONG_WORK = ("blind-trial",)
+"""Commands that write over minutes: tried with no room."""
+
+
+@pytest.mark.parametrize("command", WRITINGS)
+def test_a_disk_that_fills_up_ends_every_command_in_a_line(
+    command: str,
+    tmp_path: Path,
+    disk: Callable[[int], Path],
+    inputs: dict[str, Path],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys,
+) -> None:
+    writing = WRITINGS[command]
+    sizes = [PAGE]
+    if command not in LONG_WORK:
+        assert writing.run(tmp_path / writing.out, inputs, monkeypatch) == 0
+        pages = sum(
+            -(-path.stat().st_size // PAGE)
+            for path in (tmp_path / writing.out, *(tmp_path / writing.out).rglob("*"))
+            if path.is_file()
+        )
+        sizes = sorted({PAGE * max(1, int(share * pages)) for share in SHARES})
+    for size in sizes:
+        folder = disk(size)
+        capsys.readouterr()
+        code = writing.run(folder / writing.out, inputs, monkeypatch)
+        printed = capsys.readouterr()
+        lines = said(printed.err)
+        print(f"{command}: {size} bytes, {lines[-1:]}")
+        assert code == 2, lines
+        assert len(lines) == 1 and lines[0].startswith("spikecam: ") and "full" in lines[0], lines
+        left = tree(folder)
+        assert not any("partial" in name for name in left), left
+        assert not (writing.is_file and left), left
+
+
+@pytest.mark.parametrize("command", [name for name in WRITINGS if name not in LONG_WORK])
+def test_a_limit_on_the_size_of_files_ends_every_command_in_a_line(
+    command: str, tmp_path: Path, inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    writing = WRITINGS[command]
+    capsys.readouterr()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        code = writing.run(tmp_path / writing.out, inputs, monkeypatch)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    lines = said(capsys.readouterr().err)
+    assert code == 2, lines
+    assert len(lines) == 1 and lines[0].startswith("spikecam: ") and "ulimit" in lines[0], lines
+    left = tree(tmp_path)
+    assert not any("partial" in name for name in left) and not (writing.is_file and left), left
+
+
+@pytest.mark.parametrize("size", [700, 3000, 30_000])
+def test_hdf5_survives_a_full_disk_up_to_the_end_of_the_process(size: int, tmp_path: Path) -> None:
+    """HDF5 itself crashes at exit after a write that failed."""
+    code = (
+        "import resource, numpy, spikecam_env.streams as s\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
+        "frames = (numpy.random.default_rng(0).random((64, 50, 80)) < 0.1).astype('uint8')\n"
+        "try:\n"
+        "    with s.SpikeWriter('x.h5', (50, 80), 4e4) as writer:\n"
+        "        for i in range(20):\n"
+        "            writer.append(frames, frames)\n"
+        "            writer.append_truth(i, radiance=numpy.random.default_rng(i).random((50, 80)))\n"
+        "except OSError as error:\n"
+        "    print(type(error).__name__, error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0 and not done.stderr, (done.returncode, done.stderr[-500:])
+    assert "WriteError cannot write x.h5" in done.stdout
+    assert not tree(tmp_path)

@@ -1,0 +1,183 @@
+"""Every way in which a command writes, as a table; where the work before is long, something short stands in for it."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, reduce
+from pathlib import Path
+from types import SimpleNamespace
+
+import made_up
+import numpy as np
+from pytest import MonkeyPatch
+
+from scenes.catalogue import make_scene
+from spikecam_env.calibration import calibrate
+from spikecam_env.cli.main import run
+from spikecam_env.gap.ladder import Ladder, Rung
+from spikecam_env.sensor import SensorModel
+
+SMALL = ("--size", "24", "40")
+Work = dict[str, Callable[..., object]]
+"""What stands in for work: `module:name` -> function."""
+
+
+@dataclass(frozen=True)
+class Writing:
+    """A command line, in which {out}, {recording} and {campaign} are filled in.  out: name of what it writes.
+
+    work: stand-ins; `refused` lets none of it begin.
+    """
+
+    args: str
+    out: str
+    work: Work
+
+    @property
+    def is_file(self) -> bool:
+        """Whether it writes one file, not a folder."""
+        return "." in self.out
+
+    def run(self, out: Path, inputs: dict[str, Path], patch: MonkeyPatch, work: Work | None = None) -> int:
+        """Its exit code."""
+        for place, function in (self.work if work is None else work).items():
+            module, _, name = place.partition(":")
+            *classes, name = name.split(".")
+            patch.setattr(reduce(getattr, classes, importlib.import_module(module)), name, function)
+        return run([word.format(out=out, **inputs) for word in self.args.split()])
+
+    def refused(self, out: Path, inputs: dict[str, Path], patch: MonkeyPatch) -> int:
+        """Its exit code, where the work must not begin."""
+
+        def begun(*_: object, **__: object) -> object:
+            raise AssertionError("the work was begun")
+
+        return self.run(out, inputs, patch, dict.fromkeys(self.work, begun))
+
+
+class InlineFeed:
+    """The same training clip again and again, without a process of its own."""
+
+    def __init__(self, recipe, seed, first=0, weights=None, *, workers=1) -> None:
+        self.recipe = recipe
+
+    def __next__(self):
+        return _clip(self.recipe)
+
+    def close(self) -> None:
+        pass
+
+
+@cache
+def _clip(recipe):
+    from denoiser.pairs import draw_clip
+
+    return draw_clip(recipe, 0, 0, shape=(64, 64))
+
+
+def _evaluation(**options) -> dict[str, object]:
+    from denoiser import evaluate
+
+    evaluate._write(Path(options["out"]), {"figures": list(range(3000))})
+    return {}
+
+
+def _film(*_: object) -> list[np.ndarray]:
+    return [np.random.default_rng(i).integers(0, 255, (48, 80, 3), dtype=np.uint8) for i in range(12)]
+
+
+def _streamed(**_: object) -> SimpleNamespace:
+    return SimpleNamespace(
+        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, denoiser_s=1.0, times_real=1.0, latency=27
+    )
+
+
+SCENE: Work = {"scenes.catalogue:make_scene": make_scene}
+MODEL = SensorModel.preset("scsim")
+DEMO: Work = {
+    "spikecam_env.cli.showcase:stream": _streamed,
+    "spikecam_env.cli.showcase:film_frames": _film,
+    "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
+}
+TRAINING: Work = {
+    "denoiser.train:ClipFeed": InlineFeed,
+    "denoiser.train:FIRST_CLIPS": 2,
+    "denoiser.train:POOL_CLIPS": 2,
+}  # type: ignore[dict-item]
+EVALUATION: Work = {
+    "denoiser.evaluate:evaluate_quick": _evaluation,
+    "denoiser.evaluate:report": lambda _: "figures\n" * 200,
+}
+CALIBRATION: Work = {"spikecam_env.calibration:calibrate": cache(calibrate)}
+DIAGNOSIS: Work = {"spikecam_env.gap.diagnose:diagnose": lambda *_, **__: made_up._plain("none", "No gap.")}
+LADDER: Work = {
+    "spikecam_env.gap.ladder:ladder": lambda *_, **__: Ladder(
+        "camera", 0, 3, (Rung(MODEL, None, 0.0, (), 3.0, {"rates": 2.0}, 1), Rung(MODEL, None, 0.0, (), 1.0, {}, 0))
+    )
+}
+BENCH: Work = {"spikecam_env.sensor.bench:bench_sensor": lambda: [{"engine": "fast", "note": "x" * 9000}]}
+
+WRITINGS: dict[str, Writing] = {
+    "record h5": Writing(f"record --out {{out}} --frames 320 {' '.join(SMALL)}", "disk.h5", {}),
+    "record dat": Writing(f"record --out {{out}} --frames 320 {' '.join(SMALL)}", "disk.dat", {}),
+    "record npz": Writing(f"record --out {{out}} --frames 320 {' '.join(SMALL)}", "disk.npz", {}),
+    "denoise": Writing("denoise {recording} --out {out}", "denoised", {}),
+    "demo": Writing("demo --out {out}", "demo", DEMO),
+    "scenes mp4": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.mp4", SCENE),
+    "scenes gif": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.gif", SCENE),
+    "scenes png": Writing(f"scenes disk --out {{out}} {' '.join(SMALL)}", "disk.png", SCENE),
+    "dataset": Writing(f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}),
+    "train": Writing("train --out {out} --steps 2 --batch 2", "run", TRAINING),
+    "evaluate": Writing("evaluate quick --out {out}", "evaluation", EVALUATION),
+    "calibrate": Writing("calibrate {campaign} --out {out}", "calibrated", CALIBRATION),
+    "campaign simulate": Writing(
+        "campaign simulate {out} --shape 16 16 --frames 400 --recording flat:radiance=0.3", "campaign", {}
+    ),
+    "campaign import": Writing(
+        "campaign import {recordings} {out} --label disk.h5=unknown --frame-rate-hz 40000", "imported", {}
+    ),
+    "diagnose": Writing("diagnose {campaign} --out {out}", "diagnosed", DIAGNOSIS),
+    "ladder": Writing("ladder {campaign} --out {out}", "ladder", LADDER),
+    "blind-trial": Writing(
+        "blind-trial --out {out} --limit 1 --only none --diagnose tests.faults.writing:nothing_found", "trial", {}
+    ),
+    "bench": Writing("bench sensor --out {out}", "speed.json", BENCH),
+}
+
+
+def nothing_found(campaign, model, out, seed, exclude, threads) -> dict[str, object]:
+    """A diagnosis for a blind trial that takes no time."""
+    return {"verdict": "none", "effects": [], "gap": None}
+
+
+def inputs_in(folder: Path) -> dict[str, Path]:
+    """A recording, the folder that it is in, and a campaign of flats."""
+    recordings = folder / "recordings"
+    recordings.mkdir()
+    made = {"recording": recordings / "disk.h5", "recordings": recordings, "campaign": folder / "campaign"}
+    assert run(["record", "--out", str(made["recording"]), "--frames", "64", *SMALL]) == 0
+    levels = [word for level in ("0.1", "0.2", "0.4") for word in ("--recording", f"flat:radiance={level}")]
+    simulate = ["campaign", "simulate", str(made["campaign"]), "--shape", "16", "16", "--frames", "800"]
+    assert run([*simulate, "--recording", "dark", *levels]) == 0
+    assert json.loads((made["campaign"] / "campaign.json").read_text())["recordings"]
+    return made
+
+
+def said(error: str) -> list[str]:
+    """The lines on standard error that are no progress bars."""
+    lines = [part for line in error.splitlines() for part in line.split("\r")]
+    return [line for line in lines if line.strip() and "%|" not in line and "it/s" not in line]
+
+
+def tree(folder: Path) -> set[str]:
+    """Everything that is in a folder, hidden files too."""
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def python(code: str) -> list[str]:
+    """The command line of a script."""
+    return [sys.executable, "-c", code]
