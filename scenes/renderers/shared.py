@@ -44,4 +44,3 @@ def done_with(user: object) -> None:
     if not _users and _here.renderer is not None and _here.process == os.getpid():
         _here.renderer.close()
         _here.renderer = None
-
