@@ -1,7 +1,7 @@
 """A renderer in a process of its own: what draws where OpenGL cannot begin, after a fork of a process that has used it.
 
-Same library, same driver, same bits.  The process is started afresh, not forked.  It is sent each surface once, ends when
-its pipe closes, and so never outlives the process that asked for it.
+Same library, same driver, same bits.  The process is started afresh, not forked.  It is sent each surface once.  It
+ends when its pipe closes, and so does not outlive the process that asked for it.
 """
 
 from __future__ import annotations

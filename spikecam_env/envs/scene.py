@@ -101,10 +101,11 @@ class SceneEnv(SpikeCameraEnv):
     def _exposed(self, seed: int) -> Placed:
         """The scene of an episode.  Its first picture is rendered here, not at construction: a vector environment makes
         one in the parent, only to ask for its spaces, and OpenGL does not survive the fork that follows."""
-        if self._unexposed is None:
-            return exposed(self._build(seed), self.mean_interval)
-        self._named = exposed(self._unexposed, self.mean_interval)
-        return self._named
+        scene = exposed(self._unexposed or self._build(seed), self.mean_interval)
+        assert isinstance(scene, Placed)
+        if self._unexposed is not None:
+            self._named = scene
+        return scene
 
     def _place(self, scene: Placed, frame: float, gaze: Gaze | None) -> tuple[float, float]:
         places = scene.places(frame, gaze)

@@ -52,7 +52,8 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
 
     `sensor` and `scene` are open to look at: `env.unwrapped.sensor.clean_twin()`, `env.unwrapped.scene.truth(...)`.
 
-    Errors: InputError for a value out of range or unknown, by name; NotReadyError before the first reset and after `close`.
+    Errors: InputError for a value out of range or unknown, by name; NotReadyError before the first reset and
+    after `close`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012

@@ -1,0 +1,33 @@
+"""Where torch computes in a process that was forked.
+
+OpenMP keeps its threads for the thread that first shared work among them.  A fork copies that thread and not the
+others, so its next shared work waits for ever.  A new thread starts threads of its own: in a forked process torch's
+work is done on one, by as many threads as ever, which gives the same bits.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from typing import TypeVar
+
+T = TypeVar("T")
+
+_IMPORTED_IN = os.getpid()
+_NAME = "denoiser-after-fork"
+
+
+def where_torch_can(work: Callable[[], T]) -> T:
+    """What `work` returns or raises; it is done here unless this process was forked."""
+    if os.getpid() == _IMPORTED_IN or threading.current_thread().name.startswith(_NAME):
+        return work()
+    return _thread(os.getpid()).submit(work).result()
+
+
+@lru_cache(maxsize=1)
+def _thread(process: int) -> ThreadPoolExecutor:
+    """Threads do not survive a fork, hence one a process."""
+    return ThreadPoolExecutor(1, thread_name_prefix=_NAME)
