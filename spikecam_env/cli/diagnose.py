@@ -97,7 +97,7 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
-    from spikecam_env.gap.words import at_most, bare, quantity, shape_of_bound, unit_of
+    from spikecam_env.gap.words import at_most, bare, bounded_parameter, quantity, unit_of
 
     rows = [
         {
@@ -115,12 +115,7 @@ def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         return [{"parameter": name, **values} for name, values in diagnosis.parameters.items()]
     if diagnosis.verdict == "none":
         return [
-            {
-                "effect": b.name,
-                "parameter": bare(b.name, b.parameter),
-                "at most (95 %)": at_most(b),
-                "where it shows least": shape_of_bound(b),
-            }
+            {"effect": b.name, "parameter": bounded_parameter(b), "at most (95 %)": at_most(b)}
             for b in diagnosis.bounds
         ]
     return []

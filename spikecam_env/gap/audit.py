@@ -6,7 +6,7 @@ Each check looks for one mistake that would explain a recording and leave the ot
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -17,7 +17,7 @@ from spikecam_env.gap.compare import GATE, adjusted, deviates, values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe import BIN, Observation
 from spikecam_env.gap.statistics.moving import light_film
-from spikecam_env.gap.world import Shown, relabelled
+from spikecam_env.gap.world import Shown
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
 
@@ -222,6 +222,13 @@ def is_right_but_for(case: Case, model: SensorModel, label: Contradiction) -> bo
     null = model_null(again, model, RELABELLED)
     of = np.array([k.recording == name and k.group != "rates" for k in null.keys])
     return not adjusted(deviates(null, values_of(again.bank, null.keys))[of]).min() < GATE
+
+
+def relabelled(condition: Shown, factor: float) -> Shown:
+    """The same with its light multiplied."""
+    assert condition.light is not None
+    light = replace(condition.light, radiance=condition.light.radiance * np.float32(factor))
+    return replace(condition, level=condition.level * factor, light=light)
 
 
 def odd(case: Case, name: str) -> float:

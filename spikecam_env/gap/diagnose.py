@@ -30,7 +30,7 @@ from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves
-from spikecam_env.gap.label_unit import nominal_per_label, said_of
+from spikecam_env.gap.label_unit import counted_anew, nominal_per_label, said_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import missing, with_all
 from spikecam_env.gap.null import model_null, unit_under
@@ -43,7 +43,7 @@ from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.verdict import concluded, grounded, harmless
 from spikecam_env.gap.words import sentence, unfinished
 from spikecam_env.gap.workers import sums_in_one_order
-from spikecam_env.gap.world import KNOWN, Shown, observed, relabelled, shown
+from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ def diagnose(
         return replace(found, sentence=sentence(found))
     with timed("read"):
         case = read_case(measured, seed, jobs)
-        notes = said_of(case.nominal_per_label)
+        notes = said_of(case.nominal_per_label, case.base)
     with timed("audit"):
         contradictions = upheld(case, assumed, audit(case))
         case = trimmed(case, contradictions)
@@ -167,8 +167,8 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
     factor = nominal_per_label(case.base)
     if factor == 1.0:
         return case
-    counted_anew = case.of([relabelled(c, factor) for c in conditions], seen)
-    return replace(counted_anew, nominal_per_label=factor)
+    case = case.of([counted_anew(c, factor) for c in conditions], seen)
+    return replace(case, nominal_per_label=factor)
 
 
 def refittable(conditions: Sequence[Shown]) -> bool:

@@ -24,12 +24,12 @@ from spikecam_env.gap.words import (
     VERDICTS,
     at_most,
     bare,
+    bounded_parameter,
     gap_line,
     human,
     law,
     meaning_of,
     quantity,
-    shape_of_bound,
     sheet,
     sizes,
     unit_of,
@@ -266,9 +266,9 @@ def _number(value: Any) -> str:
 
 def _bounds_tables(d: Diagnosis) -> Iterator[str]:
     """Bounds of what shows too little to be found, and below them what these recordings put no bound to."""
-    rows = [(human(b.name), bare(b.name, b.parameter), f"< {at_most(b)}", shape_of_bound(b)) for b in d.bounds]
+    rows = [(human(b.name), bounded_parameter(b), f"< {at_most(b)}") for b in d.bounds]
     if rows:
-        yield table(("effect", "parameter", "at most (95 %)", "where it shows least"), rows, numbers=(2,))
+        yield table(("effect", "parameter", "at most (95 %)"), rows, numbers=(2,), stack=True)
     if d.not_bounded:
         yield element("p", "Not bounded by these data; the right column would bound it:")
         yield table(("effect", "needs"), [(human(name), needs) for name, needs in d.not_bounded])

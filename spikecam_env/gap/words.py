@@ -131,9 +131,10 @@ def at_most(bound: Bound) -> str:
     return f"{math.ceil(value / digit - 1e-9) * digit:.2g} {unit}".rstrip()
 
 
-def shape_of_bound(bound: Bound) -> str:
-    """The other parameters of an effect for which its bound is stated."""
-    return ", ".join(f"{bare(bound.name, k)} {quantity(v, unit_of(bound.name, k))}" for k, v in bound.at.items())
+def bounded_parameter(bound: Bound) -> str:
+    """The parameter that a bound is of, with the effect's others where it shows least."""
+    others = [f"{bare(bound.name, k)} {quantity(v, unit_of(bound.name, k))}" for k, v in bound.at.items()]
+    return bare(bound.name, bound.parameter) + (f" ({', '.join(others)})" if others else "")
 
 
 def bare(effect: str, parameter: str) -> str:

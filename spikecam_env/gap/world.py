@@ -7,7 +7,7 @@ Kinds of light: `dark`, `flat` (uniform and steady), `picture` (steady), `step` 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,14 +67,6 @@ def planned(design: Sequence[Planned], shape: tuple[int, int], frames: int) -> l
         whole = Keyframes(light.frame, np.broadcast_to(light.radiance, (len(light.frame), *shape)))
         found.append(_classed(p.file_name, whole, frames, p.use, p.v_d))
     return found
-
-
-def relabelled(condition: Shown, factor: float) -> Shown:
-    """The same with its light multiplied; unknown light stays."""
-    if condition.light is None:
-        return condition
-    light = replace(condition.light, radiance=condition.light.radiance * np.float32(factor))
-    return replace(condition, level=condition.level * factor, light=light)
 
 
 def _classed(name: str, light: Keyframes, frames: int, use: str, v_d: float | None) -> Shown:
