@@ -40,7 +40,7 @@ def from_file(
     Errors: InputError where there is no such file, no triangle in it, it is damaged, or out of range (`from_mesh`).
     """
     source = Path(path)
-    if not source.is_file():
+    if not _is_file(source):
         raise InputError(f"no mesh file {path}; give the path of an obj, stl, ply or glb file")
     kind = source.suffix[1:].lower()
     beside = Beside(str(source))
@@ -78,7 +78,7 @@ def picture(path: str | PathLike[str]) -> Texture:
     Whole numbers are in [0, 1], taken as sRGB unless the file states another transfer; floats are linear light as they
     are.  Errors: InputError where no picture can be read, and for transparent pixels (`scenes.pictures`).
     """
-    if not Path(path).is_file():
+    if not _is_file(Path(path)):
         raise InputError(f"no picture can be read from {path}; give the path of a png, jpg or tif file")
     stored = read_picture(path)
     return grey(light_of(stored.values, stored.transfer or "srgb", str(path)), primaries=stored.primaries)
@@ -193,6 +193,13 @@ def _as_part(surface: Surface) -> Part:
             albedo = np.tile(np.asarray(albedo), times[::-1])
         uv = (uv - low) / times
     return Part(np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals), uv, np.asarray(mesh.faces), albedo)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name too long, or with a zero in it
+        return False
 
 
 def _around(vertices: Points) -> Points:

@@ -479,6 +479,8 @@ def animated(folder: Path) -> Path:
     [
         (lambda folder: folder / "none.png", "no picture can be read"),
         (lambda folder: folder, "no picture can be read"),
+        (lambda folder: folder / ("x" * 5000), "no picture can be read"),
+        (lambda folder: folder / "a\x00.png", "no picture can be read"),
         (animated, "holds 2 pictures"),
         (lambda folder: saved(folder, "p.png", Image.new("RGBA", (8, 8), (9, 9, 9, 128))), "transparent"),
         (lambda folder: saved(folder, "p.png", Image.new("L", (8, 8), 9), transparency=9), "transparent"),
