@@ -10,6 +10,7 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.renderers.protocol import Surface
+from scenes.renderers.ramp import places, ramp
 from scenes.textures import Texture
 from scenes.trajectories import Trajectory
 from spikecam_env.errors import InputError
@@ -20,7 +21,10 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """vertices, normals (V, 3); uv (V, 2), v = 1 at the top of the texture; faces (F, 3); albedo 0..1, linear."""
+    """vertices, normals (V, 3); uv (V, 2), v = 1 at the top of the texture; faces (F, 3).
+
+    albedo: 0..1, linear: one value, one for each vertex (V,), or a texture (h, w).
+    """
 
     vertices: Points
     normals: Points
@@ -43,22 +47,41 @@ class Part:
 
 
 def assemble(*parts: Part) -> Surface:
-    """One rigid surface; textures and greys of several parts go into one atlas."""
+    """One rigid surface; textures and greys of several parts go into one atlas, greys and albedos of vertices into one
+    for each vertex."""
     if not parts:
         raise InputError("a surface needs at least one part")
     if len(parts) == 1:
         return _surface(parts[0])
-    atlas, places = _atlas([part.albedo for part in parts])
+    kinds = {np.ndim(part.albedo) for part in parts}
+    if 1 in kinds and 2 not in kinds:
+        of_vertices = [np.broadcast_to(np.float32(part.albedo), len(part.vertices)) for part in parts]
+        return _surface(joined(parts, [part.uv for part in parts], np.concatenate(of_vertices)))
+    parts = tuple(_on_a_tile(part) if np.ndim(part.albedo) == 1 else part for part in parts)
+    atlas, corners = _atlas([part.albedo for part in parts])
+    uv = [corner[:2] + part.uv * corner[2:] for part, corner in zip(parts, corners, strict=True)]
+    return _surface(joined(parts, uv, atlas))
+
+
+def joined(parts: Sequence[Part], uv: Sequence[Points], albedo: Albedo) -> Part:
+    """Parts as one, with these texture coordinates (V, 2) of each and one albedo."""
     start = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    return _surface(
-        Part(
-            np.concatenate([part.vertices for part in parts]),
-            np.concatenate([part.normals for part in parts]),
-            np.concatenate([place[:2] + part.uv * place[2:] for part, place in zip(parts, places, strict=True)]),
-            np.concatenate([part.faces + first for part, first in zip(parts, start, strict=False)]),
-            atlas,
-        )
+    return Part(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.normals for part in parts]),
+        np.concatenate(uv),
+        np.concatenate([part.faces + first for part, first in zip(parts, start, strict=False)]),
+        albedo,
     )
+
+
+_TILE = np.repeat(ramp(16), 16, axis=0)
+"""Albedos of vertices among textures, known to 3e-4 (1/256 of the way between texels).  It is as small as its margin,
+so that what is read coarsely stays in it."""
+
+
+def _on_a_tile(part: Part) -> Part:
+    return replace(part, uv=places(part.albedo, _TILE.shape[1]), albedo=_TILE)
 
 
 def _surface(part: Part) -> Surface:

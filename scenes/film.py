@@ -176,7 +176,11 @@ def fitted(picture: Array, shape: tuple[int, int] | None) -> Array:
 
 @contextmanager
 def _opened(path: Path, how: Reading) -> Iterator[_Source]:
-    if path.is_dir():
+    try:
+        is_folder = path.is_dir()
+    except (OSError, ValueError) as error:  # a name too long, or with a zero in it
+        raise InputError(f"there is no film {str(path)[:200]!r} ({error})") from error
+    if is_folder:
         files = pictures_in(path)
         if how.film_rate_hz is None and how.times_s is None:
             raise InputError(

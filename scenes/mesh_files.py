@@ -14,7 +14,7 @@ import trimesh
 from PIL import Image
 
 from scenes.assembly import Albedo, Part, Points, assemble
-from scenes.materials import own_albedo
+from scenes.materials import GLTF_COLOURS, gltf_colours_kept, own_albedo
 from scenes.pictures import SUFFIXES, check_size, read_picture
 from scenes.renderers.protocol import Surface
 from scenes.renderers.view import check_albedo, check_mesh
@@ -40,13 +40,15 @@ def from_file(
     Errors: InputError where there is no such file, no triangle in it, it is damaged, or out of range (`from_mesh`).
     """
     source = Path(path)
-    if not source.is_file():
+    if not _is_file(source):
         raise InputError(f"no mesh file {path}; give the path of an obj, stl, ply or glb file")
     kind = source.suffix[1:].lower()
     beside = Beside(str(source))
     try:
-        with source.open("rb") as file, np.errstate(all="ignore"):
-            scene: Any = trimesh.load(file, file_type=kind, resolver=beside, force="scene", process=False)
+        data = source.read_bytes()
+        data = gltf_colours_kept(data, kind) if kind in ("glb", "gltf") else data
+        with np.errstate(all="ignore"):
+            scene: Any = trimesh.load(BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False)
             meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
     except Exception as error:
         raise InputError(f"{path} cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
@@ -54,7 +56,7 @@ def from_file(
         warnings.warn(f"{path} names {name}, which {fault}; its surface is without it", stacklevel=2)
     try:
         meshes = [_merged(mesh) for mesh in _sized(meshes, size)]
-        return _one_surface(meshes, texture, linear_colours=kind in ("glb", "gltf"))
+        return _one_surface(meshes, texture)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -76,7 +78,7 @@ def picture(path: str | PathLike[str]) -> Texture:
     Whole numbers are in [0, 1], taken as sRGB unless the file states another transfer; floats are linear light as they
     are.  Errors: InputError where no picture can be read, and for transparent pixels (`scenes.pictures`).
     """
-    if not Path(path).is_file():
+    if not _is_file(Path(path)):
         raise InputError(f"no picture can be read from {path}; give the path of a png, jpg or tif file")
     stored = read_picture(path)
     return grey(light_of(stored.values, stored.transfer or "srgb", str(path)), primaries=stored.primaries)
@@ -112,12 +114,11 @@ class Beside(trimesh.resolvers.FilePathResolver):
 def _one_surface(
     meshes: Sequence[trimesh.Trimesh],
     texture: str | PathLike[str] | Texture | None,
-    linear_colours: bool = False,
 ) -> Surface:
     """Meshes in one space as one rigid surface."""
     if texture is not None:
         return _textured(_together(meshes), _texture(texture))
-    owned = [own_albedo(mesh, linear_colours) for mesh in meshes]
+    owned = [own_albedo(mesh) for mesh in meshes]
     if len(owned) == 1:
         return _textured(*owned[0])
     albedos = [albedo for _, albedo in owned]
@@ -166,7 +167,7 @@ def _sized(meshes: Sequence[trimesh.Trimesh], size: float | None) -> list[trimes
 
 def _merged(mesh: Any) -> trimesh.Trimesh:
     """With one vertex where several lie; those with colours of their own share the normal alone."""
-    if getattr(mesh.visual, "kind", None) != "vertex":
+    if getattr(mesh.visual, "kind", None) != "vertex" and GLTF_COLOURS not in mesh.vertex_attributes:
         mesh.process()
         return mesh  # type: ignore[no-any-return]
     if "vertex_normals" in mesh._cache:
@@ -192,6 +193,13 @@ def _as_part(surface: Surface) -> Part:
             albedo = np.tile(np.asarray(albedo), times[::-1])
         uv = (uv - low) / times
     return Part(np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals), uv, np.asarray(mesh.faces), albedo)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name too long, or with a zero in it
+        return False
 
 
 def _around(vertices: Points) -> Points:

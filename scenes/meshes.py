@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.assembly import Albedo, Part, Points, assemble, unit
+from scenes.assembly import Albedo, Part, Points, assemble, joined, unit
 from scenes.mesh_files import from_file, from_mesh, picture
 from scenes.transfer import linear_from_srgb as linear
 from spikecam_env.errors import InputError
@@ -86,25 +86,12 @@ def lathe(
         pieces = [_turned(knots[i : i + 2], albedo, sections, 1) for i in range(len(knots) - 1)]
         length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=-1))])
         length /= length[-1]
-        return joined(
-            *(
-                replace(piece, uv=np.stack([piece.uv[:, 0], low + piece.uv[:, 1] * (high - low)], -1))
-                for piece, low, high in zip(pieces, length, length[1:], strict=False)
-            )
-        )
+        uv = [
+            np.stack([piece.uv[:, 0], low + piece.uv[:, 1] * (high - low)], -1)
+            for piece, low, high in zip(pieces, length, length[1:], strict=False)
+        ]
+        return joined(pieces, uv, albedo)
     return _turned(knots, albedo, sections, 4 * (len(knots) - 1))
-
-
-def joined(*parts: Part) -> Part:
-    """Parts of one texture as one part, with the first one's albedo."""
-    start = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    return Part(
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.normals for part in parts]),
-        np.concatenate([part.uv for part in parts]),
-        np.concatenate([part.faces + first for part, first in zip(parts, start, strict=False)]),
-        parts[0].albedo,
-    )
 
 
 def sphere(radius: float = 1.0, albedo: Albedo = 0.8, sections: int = 64) -> Part:

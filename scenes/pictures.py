@@ -30,6 +30,8 @@ SUFFIXES = (
     *(".tif", ".tiff", ".webp"),
 )
 """Of the files in a folder of pictures."""
+NO_PICTURES = ("Thumbs.db", "desktop.ini")
+"""That Windows leaves in folders."""
 BY_FFMPEG = (".dpx", ".exr", ".hdr", ".pfm", ".tif", ".tiff")
 """Files that Pillow may not know."""
 SRGB_GAMMA = 2.2
@@ -65,7 +67,10 @@ def pictures_in(folder: Path) -> list[Path]:
 
     Errors: InputError for a file that is no picture, fewer than two pictures, and a gap in their numbers.
     """
-    files = [p for p in folder.iterdir() if not p.name.startswith(".") and p.name not in ("Thumbs.db", "desktop.ini")]
+    try:
+        files = [p for p in folder.iterdir() if not p.name.startswith(".") and p.name not in NO_PICTURES]
+    except OSError as error:
+        raise InputError(f"cannot read the folder {folder}: {error.strerror}") from error
     odd = sorted(p.name for p in files if not p.is_file() or p.suffix.lower() not in SUFFIXES)
     if odd:
         raise InputError(
@@ -85,7 +90,10 @@ def pictures_timed(listing: Path) -> tuple[list[Path], NDArray[np.float64]]:
     Errors: InputError, with the line, where it has other columns, a time is no number or not after the one before, or
     a name leads out of the folder or to no file.
     """
-    lines = list(csv.reader(read_text(listing).splitlines()))
+    try:
+        lines = list(csv.reader(read_text(listing).splitlines()))
+    except csv.Error as error:
+        raise InputError(f"{listing} is not a CSV file: {error}") from error
     if not lines or [word.strip() for word in lines[0]] != ["name", "time_s"]:
         raise InputError(
             f"{listing} begins with {lines[0] if lines else 'nothing'}; its first line must be name,time_s"

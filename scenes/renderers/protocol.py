@@ -26,7 +26,8 @@ class Surface:
     """A mesh and its reflection.  Compared by identity, so that a back-end may keep what it has uploaded.
 
     mesh      in its own coordinates, with `visual.uv` where albedo is a texture
-    albedo    0..1, linear: one value or a texture (h, w) float32; row 0 is the top, v = 1
+    albedo    0..1, linear: one value, one for each vertex (V,), linear between them, or a texture (h, w) float32; row 0
+              is the top, v = 1
     emission  radiance that the surface gives by itself
     """
 

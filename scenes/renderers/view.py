@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
 from scenes.renderers.pyramid import Pyramid, pyramid
+from scenes.renderers.ramp import places, ramp_level
 from spikecam_env.errors import InputError
 
 ROUNDING = 1e-5
@@ -27,7 +28,8 @@ class Geometry:
     """A surface as arrays.
 
     vertices, normals  (V, 3) float64
-    uv                 (V, 2) float64; zeros where the albedo is one value
+    uv                 (V, 2) float64; zeros where the albedo is one value, places on the ramp where it is one for each
+                       vertex
     faces              (F, 3) int32
     albedo             the texture and its reductions; one texel where the albedo is one value
     closed             whether the mesh bounds a volume, faces outwards: from outside only front faces are seen
@@ -42,14 +44,15 @@ class Geometry:
 
 
 def geometry(surface: Surface) -> Geometry:
-    """Errors: InputError for a mesh that `check_mesh` refuses, a texture without uv, or an albedo that is not one value
-    or (h, w), in 0 to 1."""
+    """Errors: InputError for a mesh that `check_mesh` refuses, a texture without uv, or an albedo that is not one
+    value, (V,) or (h, w), in 0 to 1."""
     mesh = surface.mesh
     check_mesh(mesh)
     albedo = np.asarray(surface.albedo, np.float32)
-    if albedo.ndim not in (0, 2) or albedo.size == 0 or not np.isfinite(albedo).all():
+    if albedo.ndim > 2 or albedo.size == 0 or (albedo.ndim == 1 and len(albedo) != len(mesh.vertices)):
         raise InputError(
-            f"albedo has shape {albedo.shape}; give one value or a finite texture (h, w), a colour picture as grey"
+            f"albedo has shape {albedo.shape}; give one value, one for each of the {len(mesh.vertices)} vertices, or a "
+            "finite texture (h, w), a colour picture as grey"
         )
     check_albedo(albedo, "albedo")
     uv: Any = getattr(mesh.visual, "uv", None)
@@ -60,12 +63,16 @@ def geometry(surface: Surface) -> Geometry:
         )
     if albedo.ndim == 2 and not np.isfinite(uv).all():
         raise InputError("texture coordinates of the mesh hold NaN or infinity; they must be finite")
+    if albedo.ndim == 2:
+        uv = np.array(uv, np.float64)[:, :2]
+    else:
+        uv = places(albedo) if albedo.ndim == 1 else np.zeros((len(mesh.vertices), 2))
     return Geometry(
         vertices=np.array(mesh.vertices, np.float64),
         normals=np.array(mesh.vertex_normals, np.float64),
-        uv=np.array(uv, np.float64)[:, :2] if albedo.ndim == 2 else np.zeros((len(mesh.vertices), 2)),
+        uv=uv,
         faces=np.array(mesh.faces, np.int32),
-        albedo=pyramid(np.atleast_2d(albedo)),
+        albedo=ramp_level() if albedo.ndim == 1 else pyramid(np.atleast_2d(albedo)),
         closed=_closed(mesh),
     )
 

@@ -310,6 +310,8 @@ def test_a_list_gives_every_picture_its_time(tmp_path: Path) -> None:
         ("name,time_s\na.png,0\nmissing.png,1\n", "there is no file"),
         ("name,time_s\na.png,0\n", "lists 1 pictures"),
         ('name,time_s\n"a.png,0\n', "entries"),
+        ("name,time_s\na.png,0\n" + "b" * 200_000 + ".png,1\n", "not a CSV file: field larger"),
+        ("name,time_s\na.png,0\n" + "b" * 5000 + ".png,1\n", "cannot read"),
         ("name,time_s\na.png,0\nb\x00.png,1\n", "line 3: the name is"),
     ],
 )
@@ -438,6 +440,13 @@ def test_what_is_no_film_is_refused(content: bytes, message: str, name: str, tmp
     path.write_bytes(content)
     with pytest.raises(InputError, match=message):
         VideoScene(path)
+
+
+@pytest.mark.parametrize("name", ["x" * 5000, "a\x00b.mp4", "", "http://localhost/f.mp4"])
+def test_a_name_of_no_file_is_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"there is no film|\. is a folder|\. holds 0 pictures"):
+        VideoScene(name, transfer="srgb")
 
 
 def test_a_film_of_one_picture_is_refused(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 import warnings
 import zlib
@@ -15,7 +16,6 @@ from PIL import Image
 from trimesh.visual import ColorVisuals, TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from scenes.materials import RAMP, STEPS
 from scenes.mesh_files import from_file, from_mesh, picture
 from scenes.renderers.protocol import Surface
 from scenes.renderers.view import geometry
@@ -40,10 +40,9 @@ def luminance(rgb: np.ndarray, of_srgb: bool = True) -> np.ndarray:
 
 
 def corners(surface: Surface) -> np.ndarray:
-    """Albedo at every vertex, read from the ramp."""
-    assert surface.albedo is RAMP
-    place = surface.mesh.visual.uv[:, 0] * RAMP.shape[1] - 0.5
-    return np.interp(place, np.arange(RAMP.shape[1]), RAMP[0])
+    """Albedo at every vertex."""
+    assert np.shape(surface.albedo) == (len(surface.mesh.vertices),)
+    return np.asarray(surface.albedo)
 
 
 # -- reflection ------------------------------------------------------------------------------------------------
@@ -96,6 +95,94 @@ def test_a_factor_multiplies_a_texture(tmp_path: Path) -> None:
     np.testing.assert_allclose(albedo, 0.5 * float(linear_from_srgb(128 / 255)), rtol=0.01)
 
 
+def test_a_texture_is_multiplied_by_one_colour_of_all_vertices_and_hides_several(tmp_path: Path) -> None:
+    mesh = box()
+    image = Image.fromarray(np.full((4, 4, 3), 255, np.uint8))
+    mesh.visual = TextureVisuals(RNG.random((8, 2)), PBRMaterial(baseColorTexture=image))
+    for colours, albedo in ((np.full((8, 4), 102, np.uint8), 0.4), (RNG.integers(0, 256, (8, 4)), 1.0)):
+        colours[:, 3] = 255
+        mesh.visual.vertex_attributes["color"] = colours.astype(np.uint8)
+        mesh.export(tmp_path / "m.glb")
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            np.testing.assert_allclose(from_file(tmp_path / "m.glb").albedo, albedo, rtol=1e-3)
+        assert len(said) == (albedo == 1.0)
+
+
+def glb(colours: np.ndarray, factor: list[float] | None = None) -> bytes:
+    """A triangle with COLOR_0 of any type that glTF allows, and a material's factor."""
+    corners = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    tables = [corners.tobytes(), np.uint32([0, 1, 2]).tobytes(), colours.tobytes()]
+    kinds = {"float32": 5126, "uint8": 5121, "uint16": 5123}
+    accessors = [(5126, "VEC3"), (5125, "SCALAR"), (kinds[colours.dtype.name], f"VEC{colours.shape[1]}")]
+    primitive = {"attributes": {"POSITION": 0, "COLOR_0": 2}, "indices": 1}
+    tree: dict = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [primitive | ({"material": 0} if factor else {})]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": factor or [1, 1, 1, 1]}}],
+        "accessors": [
+            {"bufferView": i, "componentType": component, "count": 3, "type": kind, "normalized": i == 2}
+            for i, (component, kind) in enumerate(accessors)
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": sum(map(len, tables[:i])), "byteLength": len(table)}
+            for i, table in enumerate(tables)
+        ],
+        "buffers": [{"byteLength": sum(map(len, tables))}],
+    }
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<I4s", len(text), b"JSON") + text
+    body += struct.pack("<I4s", sum(map(len, tables)), b"BIN\0") + b"".join(tables)
+    return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
+
+
+@pytest.mark.parametrize("factor", [None, [0.5, 0.5, 0.5, 1.0]])
+@pytest.mark.parametrize("kind", ["float32", "uint8", "uint16"])
+def test_colours_of_gltf_are_linear_at_their_depth_and_times_the_factor(
+    kind: str, factor: list[float] | None, tmp_path: Path
+) -> None:
+    """Half of 16 bits is 0x8000, whose lower 8 bits are 0."""
+    light = np.repeat(np.float32([0.2, 0.50001, 1.0])[:, None], 4, 1)
+    light[:, 3] = 1
+    full = 1 if kind == "float32" else np.iinfo(kind).max
+    (tmp_path / "m.glb").write_bytes(glb((light * full).round(0 if full > 1 else 8).astype(kind), factor))
+    expected = light[:, 0] * (1 if factor is None else 0.5)
+    np.testing.assert_allclose(corners(from_file(tmp_path / "m.glb")), expected, atol=3e-3)
+
+
+@pytest.mark.parametrize(("kind", "value"), [("float32", np.nan), ("float32", 2.0), ("float32", -1.0)])
+def test_colours_of_gltf_out_of_range_are_refused(kind: str, value: float, tmp_path: Path) -> None:
+    (tmp_path / "m.glb").write_bytes(glb(np.full((3, 3), value, kind)))
+    with pytest.raises(InputError, match=r"m\.glb: colours run from"):
+        from_file(tmp_path / "m.glb")
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "albedo"),
+    [
+        ("uchar", (51, 128, 255), None),
+        ("float", (0.2, 0.502, 1.0), None),
+        ("ushort", (13107, 32768, 65535), "uint16"),
+        ("float", (51, 128, 255), "float"),
+    ],
+)
+def test_colours_of_a_ply_are_of_8_bits_or_floats(kind: str, values: tuple, albedo: str | None, tmp_path: Path) -> None:
+    head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    lines = [f"{place} {v} {v} {v}\n" for place, v in zip(("0 0 0", "1 0 0", "0 1 0"), values, strict=True)]
+    (tmp_path / "m.ply").write_text(head + "".join(lines) + "3 0 1 2\n")
+    if albedo is not None:
+        with pytest.raises(InputError, match=rf"m\.ply: colours \({albedo}.*uchar, or floats"):
+            from_file(tmp_path / "m.ply")
+    else:
+        expected = linear_from_srgb(np.float32([51, 128, 255]) / 255)
+        np.testing.assert_allclose(corners(from_file(tmp_path / "m.ply")), expected, atol=2e-3)
+
+
 MTL = "newmtl a\nKd 0.2 0.4 0.6\nnewmtl b\nmap_Kd wood.png\nnewmtl c\nKd 0.5 0.5 0.5\n"
 OBJ = (
     "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 2 0\nvt 0 1\n"
@@ -104,16 +191,16 @@ OBJ = (
 
 
 def read_back(surface: Surface, at: tuple[float, float, float]) -> float:
-    """Albedo at a place on the surface, from the atlas."""
-    texture = np.asarray(surface.albedo)
-    rows, columns = texture.shape
-    mesh = surface.mesh
-    places = np.repeat([at], len(mesh.faces), axis=0)
-    near = trimesh.triangles.closest_point(mesh.triangles, places)
-    face = int(np.argmin(np.linalg.norm(near - places, axis=1)))
-    share = trimesh.triangles.points_to_barycentric(mesh.triangles[[face]], [at])[0]
-    u, v = share @ mesh.visual.uv[mesh.faces[face]]
-    return float(texture[int((1 - v) * rows), int(u * columns)])
+    """Albedo at a place on the surface, as a renderer has it at full fineness."""
+    shape = geometry(surface)
+    triangles = shape.vertices[shape.faces]
+    near = trimesh.triangles.closest_point(triangles, np.repeat([at], len(triangles), axis=0))
+    face = int(np.argmin(np.linalg.norm(near - at, axis=1)))
+    share = trimesh.triangles.points_to_barycentric(triangles[[face]], [at])[0]
+    u, v = share @ shape.uv[shape.faces[face]]
+    texture = shape.albedo.level(0)
+    row, column = (int(np.clip(x * n, 0, n - 1)) for x, n in zip((1 - v, u), texture.shape, strict=True))
+    return float(texture[row, column])
 
 
 def test_materials_of_an_obj_are_told_apart(tmp_path: Path) -> None:
@@ -167,6 +254,19 @@ def test_several_coloured_meshes_become_one_surface(tmp_path: Path) -> None:
         assert read_back(surface, (x, 0.1, 0.5)) == pytest.approx(albedo, abs=0.01)
 
 
+def test_colours_of_vertices_and_pictures_go_together(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    scene.add_geometry(box(vertex_colors=[[0, 255, 0]] * 8))
+    wood = box()
+    image = Image.fromarray(np.full((8, 8), 128, np.uint8))
+    wood.visual = TextureVisuals(RNG.random((8, 2)), PBRMaterial(baseColorTexture=image))
+    scene.add_geometry(wood, transform=trimesh.transformations.translation_matrix([3, 0, 0]))
+    scene.export(tmp_path / "m.glb")
+    surface = from_file(tmp_path / "m.glb")
+    assert read_back(surface, (0.1, 0.2, 0.5)) == pytest.approx(0.7152, abs=0.04)
+    assert read_back(surface, (3.1, 0.2, 0.5)) == pytest.approx(float(linear_from_srgb(128 / 255)), abs=1e-3)
+
+
 def test_transparency_is_said(tmp_path: Path) -> None:
     box(vertex_colors=[[9, 9, 9, 100]] * 8).export(tmp_path / "m.ply")
     with pytest.warns(UserWarning, match="opaque"):
@@ -178,18 +278,6 @@ def test_a_mesh_that_says_nothing_is_light_grey(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert from_file(tmp_path / "m.stl").albedo == 0.7
-
-
-def test_the_ramp_reads_as_albedo_at_any_fineness() -> None:
-    """Halvings of the ramp are the same line, as far as a footprint of all albedos reaches."""
-    from scenes.renderers.pyramid import pyramid
-
-    levels = pyramid(RAMP)
-    for level in range(int(np.log2(STEPS))):
-        row = levels.level(level)[0]
-        centre = ((np.arange(len(row)) + 0.5) / len(row) * 2 * STEPS - STEPS // 2 - 0.5) / (STEPS - 1)
-        inside = (centre > 2**level / STEPS) & (centre < 1 - 2**level / STEPS)
-        np.testing.assert_allclose(row[inside], centre[inside], atol=1e-6)
 
 
 # -- shapes ----------------------------------------------------------------------------------------------------
@@ -275,6 +363,9 @@ def made_by_hand(**change: object) -> Surface:
     [
         ({"albedo": 1.2}, "albedo runs from 1.2 to 1.2; a surface reflects 0 to 1"),
         ({"albedo": -0.1}, "albedo runs"),
+        ({"albedo": np.full(8, 1.5)}, "albedo runs from 1.5"),
+        ({"albedo": np.full(7, 0.5)}, "one for each of the 8 vertices"),
+        ({"albedo": np.full((2, 2, 3), 0.5)}, "albedo has shape"),
         ({"albedo": np.full((4, 4), 1.5, np.float32)}, "albedo runs"),
         ({"vertices": np.full((8, 3), np.nan)}, "8 vertices are not finite"),
         ({"faces": np.array([[0, 1, 99]])}, "faces name vertices 0 to 99"),
@@ -388,6 +479,8 @@ def animated(folder: Path) -> Path:
     [
         (lambda folder: folder / "none.png", "no picture can be read"),
         (lambda folder: folder, "no picture can be read"),
+        (lambda folder: folder / ("x" * 5000), "no picture can be read"),
+        (lambda folder: folder / "a\x00.png", "no picture can be read"),
         (animated, "holds 2 pictures"),
         (lambda folder: saved(folder, "p.png", Image.new("RGBA", (8, 8), (9, 9, 9, 128))), "transparent"),
         (lambda folder: saved(folder, "p.png", Image.new("L", (8, 8), 9), transparency=9), "transparent"),

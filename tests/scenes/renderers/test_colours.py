@@ -53,12 +53,13 @@ def test_coloured_faces_keep_their_edges(renderer: Renderer) -> None:
 
 
 def test_fine_colours_are_averaged_over_the_pixel(renderer: Renderer) -> None:
-    """Colours that change four times a pixel: the picture's mean is that of the colours, at any number of rays."""
+    """A dark mesh with a white vertex in twenty, eight triangles a pixel: the picture's mean is that of the colours."""
     mesh = sheet(160)
-    rgb = np.random.default_rng(0).integers(0, 256, (len(mesh.vertices), 3)).astype(np.uint8)
+    white = np.random.default_rng(0).random(len(mesh.vertices)) < 0.05
+    rgb = np.repeat(np.where(white, 255, 20)[:, None], 3, 1).astype(np.uint8)
     mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=rgb)
     albedo = grey(linear_from_srgb(rgb[None] / 255))[0]
     light, inside = seen(renderer, from_mesh(mesh))
     print(f"{renderer.name}: mean {light[inside].mean():.4f}, of the colours {albedo.mean():.4f}")
-    # 2 x 2 rays in each of some 800 pixels, colours of sd 0.2
-    assert abs(light[inside].mean() - albedo.mean()) < 4 * albedo.std() / np.sqrt(4 * inside.sum())
+    # 2 x 2 rays in each of some 800 pixels
+    assert abs(light[inside].mean() - albedo.mean()) < 3 * albedo.std() / np.sqrt(4 * inside.sum())
