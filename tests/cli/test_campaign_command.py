@@ -97,8 +97,8 @@ def test_effects_explains_one(capsys) -> None:
         (("--recording", "flat"), "needs radiance; write flat:radiance=..."),
         (("--recording", "flat:radiance=-1"), "negative"),
         (("--recording", "bars:speed=9"), "at most 1.2 pixels a frame"),
-        (("--frames", "0"), "frames = 0"),
-        (("--second-v-d", "0.001"), "leaves no threshold"),
+        (("--frames", "0"), "--frames 0; it must be"),
+        (("--second-v-d", "0.001"), "is outside 0.05 .. 20 V"),
     ],
 )
 def test_bad_options_end_in_one_line(options, message: str, tmp_path: Path, capsys) -> None:

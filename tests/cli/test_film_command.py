@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from made_films import greys, write_film
@@ -58,7 +57,7 @@ def test_all_kinds_of_file_hold_the_same_spikes(tmp_path: Path) -> None:
     same = read_recording(tmp_path / "a.h5").spikes
     assert np.array_equal(same, read_recording(tmp_path / "a.npz").spikes)
     assert np.array_equal(same, read_recording(tmp_path / "a.dat", height=16, width=24).spikes)
-    attributes = h5py.File(tmp_path / "a.h5").attrs
+    attributes = read_recording(tmp_path / "a.h5").attributes
     assert attributes["film"] == "p" and attributes["transfer"] == "srgb" and attributes["gain"] > 0
 
 
@@ -130,20 +129,20 @@ def test_record_has_a_frame_rate_of_its_own(tmp_path: Path) -> None:
         (("none.mp4",), "there is no film none.mp4"),
         (("text.mp4",), "text.mp4 is not a film"),
         (("p",), "have no times; say film_rate_hz"),
-        (("p", "--film-rate", "0"), "film_rate_hz is 0"),
+        (("p", "--film-rate", "0"), "--film-rate 0.0; it must be"),
         (("p", "--film-rate", "100", "--slow", "2"), "one of film_rate_hz, times_s and slow"),
         (("p", "--film-rate", "100", "--transfer", "log"), "unknown transfer 'log'"),
         (("p", "--film-rate", "100", "--channel", "red"), "the pictures are grey"),
         (("p", "--film-rate", "100", "--mean-interval", "0.5"), "mean_interval is 0.5"),
-        (("p", "--film-rate", "100", "--mean-interval", "nan"), "mean_interval is nan"),
-        (("p", "--film-rate", "100", "--frames", "0"), "0 frames are asked"),
+        (("p", "--film-rate", "100", "--mean-interval", "nan"), "--mean-interval nan; it must be"),
+        (("p", "--film-rate", "100", "--frames", "0"), "--frames 0; it must be"),
         (("p", "--film-rate", "100", "--frames", "9999"), "p lasts 800 (0.02 s)"),
         (("p", "--film-rate", "100", "--seconds", "nan"), "--seconds nan"),
         (("p", "--film-rate", "100", "--seconds", "1", "--frames", "1"), "give one of the two"),
         (("p", "--film-rate", "1e5"), "it must last 1 or more"),
         (("p", "--film-rate", "1e9"), "the film lasts 8e-05 frames"),
         (("p", "--film-rate", "100", "--frame-rate", "0"), "frame_rate_hz = 0"),
-        (("p", "--film-rate", "100", "--size", "0", "24"), "shape"),
+        (("p", "--film-rate", "100", "--size", "0", "24"), "--size 0 24; it must be"),
         (("black", "--film-rate", "100"), "no light"),
         (("mixed", "--film-rate", "100"), "picture 3 has shape, bits, transfer"),
         (("gap", "--film-rate", "100"), "a picture seems missing"),
