@@ -105,11 +105,9 @@ class SensorModel:
             if "name" not in entry:
                 raise InputError(f"{where}: an [[effect]] has no name; it needs one of {', '.join(CATALOGUE)}")
             effects.append(build(CATALOGUE, entry["name"], {k: v for k, v in entry.items() if k != "name"}))
-        try:
-            frame_rate_hz = float(data["frame_rate_hz"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"{where}: frame_rate_hz must be a number (40000.0 for a Vidar)") from error
-        return cls(str(data.get("name", "unnamed")), Circuit(**circuit), frame_rate_hz, tuple(effects))
+        if "frame_rate_hz" not in data:
+            raise InputError(f"{where}: frame_rate_hz is missing (40000.0 for a Vidar)")
+        return cls(str(data.get("name", "unnamed")), Circuit(**circuit), data["frame_rate_hz"], tuple(effects))
 
     def to_toml(self, path: str | os.PathLike[str]) -> None:
         """Write the model; the file appears whole and loads back equal."""
