@@ -95,9 +95,11 @@ def record_takes(
 
 def at_v_d(model: SensorModel, v_d: float) -> SensorModel:
     """The same camera with its reset voltage set so that V_D - V_ref = v_d [V]: fewer or more electrons a spike."""
-    circuit = replace(model.circuit, reset_V=model.circuit.reference_V + v_d)
-    if circuit.swing_V <= 0:
-        raise InputError(f"v_d = {v_d:g} V with a bias of {circuit.bias_V:g} V leaves no threshold")
+    try:
+        circuit = replace(model.circuit, reset_V=model.circuit.reference_V + v_d)
+    except InputError as error:
+        bias_V = model.circuit.bias_V
+        raise InputError(f"v_d = {v_d:g} V with a bias of {bias_V:g} V leaves no threshold ({error})") from error
     changed = replace(model, circuit=circuit)
     for effect in model.effects:
         if effect.name == "shot_noise":

@@ -23,7 +23,7 @@ from spikecam_env.sensor.light import (
     check_radiance,
     light_values,
     segments,
-    warn_uncovered,
+    warn_beside,
 )
 from spikecam_env.sensor.model import SensorModel, generator
 
@@ -71,6 +71,9 @@ class SpikeSensorBatch:
         self.frame = np.zeros(len(self.seeds), dtype=np.int64)
         self.phase = np.stack([generator(seed, "phase").random(self.shape) for seed in self.seeds])
         self._pixels = self._started(range(len(self.seeds)))
+
+    _films: Sequence[Keyframes | NDArray[np.float32]] = ()
+    """Those of the last step: see `SpikeSensor`."""
 
     def __len__(self) -> int:
         return len(self.seeds)
@@ -156,7 +159,9 @@ class SpikeSensorBatch:
 
     def _moving(self, lights: Sequence[Keyframes | NDArray[np.float32]], frames: int) -> Iterator[cuda.BatchSegment]:
         for light, at in zip(lights, self.frame, strict=False):
-            warn_uncovered(light, int(at), frames)
+            if not any(light is film for film in self._films):
+                warn_beside(light, int(at), frames)
+        self._films = lights
         films = [segments(light, int(self.frame[b]), frames) for b, light in enumerate(lights)]
         for cut in cut_alike(films):
             seen = [self._imaging[b].seen(segment) for b, segment in enumerate(cut)]

@@ -135,19 +135,18 @@ def _masks_some(values: Any) -> bool:
     return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
 
 
-def warn_uncovered(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> None:
-    """Warn where the keys of a film leave out frames of start .. start + frames, so that its light stands still there.
+def warn_beside(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> None:
+    """Warn of a film new to the stream whose keys all lie before or after frames start .. start + frames.
 
-    Keys are on absolute frames: to give every call keys that begin at 0 is a likely mistake.  A last key at the start
-    of the last frame covers it, as a film's last picture does.
+    Keys are on absolute frames: to give every call keys that begin at 0 is a likely mistake.
     """
-    if not isinstance(light, Keyframes) or light.frame.size < 2:
+    if not isinstance(light, Keyframes) or light.frame.size < 2 or start == 0:
         return
     first, last = float(light.frame[0]), float(light.frame[-1])
-    if first > start or last < start + frames - 1:
+    if last <= start or first >= start + frames:
         warnings.warn(
-            f"keys of frames {first:g} .. {last:g} do not cover all frames to expose; light is held before and after "
-            "them (keys are on the stream's absolute frames, not on those of a call)",
+            f"keys of frames {first:g} .. {last:g} lie beside the frames to expose, whose light is held; keys are on "
+            "the stream's absolute frames, not on those of a call",
             stacklevel=3,
         )
 

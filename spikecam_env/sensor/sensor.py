@@ -17,7 +17,7 @@ from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import ahead, block, fast
-from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_uncovered
+from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_beside
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import UNIT_RANGES, Unit
 
@@ -102,7 +102,9 @@ class SpikeSensor:
         frames = checked_count(frames)
         light = as_light(radiance, self.shape)
         spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)
-        warn_uncovered(light, self.frame, frames)
+        if light is not self._film:
+            warn_beside(light, self.frame, frames)
+        self._film = light if isinstance(light, Keyframes) else None
         seen = map(self._imaging.seen, segments(light, self.frame, frames))
         if self.engine == "fast" and self._frame_effects:
             block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
@@ -151,6 +153,8 @@ class SpikeSensor:
         return twin
 
     _pixels: Any
+    _film: Keyframes | None = None
+    """That of the last step: one that is over may be meant to stand still, one that is new and over is doubted."""
 
     def _start(self, seed: int, phase: NDArray[np.float64] | None) -> None:
         self.seed = seed

@@ -77,6 +77,11 @@ class Circuit:
         return 1e3 * float(np.sqrt(BOLTZMANN_J_PER_K * self.temperature_K / (self.capacitance_fF * 1e-15)))
 
 
+_OF_SWINGS = "the spread of swings over pixels (bias_voltage_spread, row_fixed_pattern, column_fixed_pattern)"
+_OF_CAPACITANCES = "the spread of capacitances over pixels (capacitor_spread)"
+_OF_RESETS = "the noise of a reset (reset_noise, excess_threshold_noise)"
+
+
 @dataclass(frozen=True)
 class PixelArray:
     """The array in circuit units, as the effects leave their fixed pattern on it; arrays are (H, W) float64.
@@ -112,31 +117,17 @@ class PixelArray:
     def check(self) -> None:
         """Raise InputError where what the effects do together leaves no sensor, whatever the pixels draw."""
         swing_V, capacitance_fF = self.circuit.swing_V, self.circuit.capacitance_fF
-        for what, value, most, unit, remedy in (
-            (
-                "the spread of swings over pixels (bias_voltage_spread, row_fixed_pattern, column_fixed_pattern)",
-                self.swing_spread_V,
-                MOST_SPREAD * swing_V,
-                "V",
-                f"{MOST_SPREAD:g} of the swing; lower it or raise circuit.reset_V",
-            ),
-            (
-                "the spread of capacitances over pixels (capacitor_spread)",
-                self.capacitance_spread_fF,
-                MOST_SPREAD * capacitance_fF,
-                "fF",
-                f"{MOST_SPREAD:g} of circuit.capacitance_fF; lower it or raise that",
-            ),
-            (
-                "the noise of a reset (reset_noise, excess_threshold_noise)",
-                self.reset_noise_mV,
-                1e3 * MOST_KAPPA * swing_V,
-                "mV",
-                f"{MOST_KAPPA:g} of the swing; lower it or raise circuit.reset_V",
-            ),
+        for what, value, share, whole, unit, of in (
+            (_OF_SWINGS, self.swing_spread_V, MOST_SPREAD, swing_V, "V", "the swing"),
+            (_OF_CAPACITANCES, self.capacitance_spread_fF, MOST_SPREAD, capacitance_fF, "fF", "circuit.capacitance_fF"),
+            (_OF_RESETS, self.reset_noise_mV, MOST_KAPPA, 1e3 * swing_V, "mV", "the swing"),
         ):
+            most = share * whole
             if value > most * (1.0 + 1e-9):
-                raise InputError(f"{what} is {value:g} {unit}; at most {most:g} {unit}, {remedy}")
+                raise InputError(
+                    f"{what} is {value:g} {unit}; at most {most:g} {unit}, {share:g} of {of}; "
+                    "lower the one or raise the other"
+                )
 
     def with_swings_off(self, sigma_V: float, normal: NDArray[np.float64]) -> PixelArray:
         """Swings off by sigma_V times normal numbers, (H, W) or broadcast to it; each keeps LEAST_SHARE of nominal."""

@@ -245,10 +245,10 @@ def test_a_batch_takes_no_pictures_for_light(kind: type) -> None:
 
 
 def test_a_batch_doubts_keys_relative_to_a_call_and_refuses_other_states() -> None:
-    cameras, film = batch(), Keyframes([0, 8], np.full((2, *SHAPE), 0.3, np.float32))
-    cameras.step(film, 8)
+    cameras, pictures = batch(), np.full((2, *SHAPE), 0.3, np.float32)
+    cameras.step(Keyframes([0, 8], pictures), 8)
     with pytest.warns(UserWarning, match="the stream's absolute frames"):
-        cameras.step(film, 8)
+        cameras.step(Keyframes([0, 8], pictures), 8)
     with pytest.raises(InputError, match="state is a dict"):
         cameras.restore({"frame": 0})  # type: ignore[arg-type]
     with pytest.raises(InputError, match="other models"):

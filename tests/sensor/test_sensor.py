@@ -348,21 +348,27 @@ def test_frames_of_keys_that_are_no_times_are_refused(frame) -> None:
         Keyframes(frame, np.stack([PLAIN, PLAIN]))
 
 
-def test_keys_relative_to_a_call_are_doubted_aloud() -> None:
-    """Keys that begin at 0 in every call hold their last picture from the second call on."""
-    keys = Keyframes([0, 64], np.stack([PLAIN, 0.5 * PLAIN]))
-    sensor = SpikeSensor("scsim", SHAPE, 1)
+@pytest.mark.parametrize("last", [64, 100])
+def test_keys_relative_to_a_call_are_doubted_aloud(last: int) -> None:
+    """Keys that begin at 0 in every call hold their last picture from the call on that begins after them."""
+    sensor, pictures = SpikeSensor("scsim", SHAPE, 1), np.stack([PLAIN, 0.5 * PLAIN])
+    with pytest.warns(UserWarning, match=rf"keys of frames 0 \.\. {last} lie beside .* the stream's absolute frames"):
+        for _ in range(3):
+            sensor.step(Keyframes([0, last], pictures), 64)
+    with pytest.warns(UserWarning, match="lie beside"):
+        sensor.step(Keyframes([1000, 1064], pictures), 8)
+
+
+def test_a_film_that_ends_and_light_that_is_held_are_not_doubted() -> None:
+    sensor, pictures = SpikeSensor("scsim", SHAPE, 1), np.stack([PLAIN, 0.5 * PLAIN])
+    film = Keyframes([0, 64], pictures)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        sensor.step(keys, 64)
+        for _ in range(3):
+            sensor.step(film, 64)
         sensor.step(Keyframes([0], PLAIN[None]), 8)
-        sensor.step(Keyframes([72, 79], np.stack([PLAIN, PLAIN])), 8)
-    with pytest.warns(UserWarning, match="do not cover"):
-        sensor.step(Keyframes([0, 100], np.stack([PLAIN, PLAIN])), 64)
-    with pytest.warns(UserWarning, match=r"keys of frames 0 \.\. 64 do not cover .* the stream's absolute frames"):
-        sensor.step(keys, 64)
-    with pytest.warns(UserWarning, match="do not cover"):
-        sensor.step(Keyframes([1000, 1064], np.stack([PLAIN, PLAIN])), 8)
+        sensor.step(Keyframes([200, 208], pictures), 16)
+        sensor.step(PLAIN, 8)
 
 
 @pytest.mark.parametrize("name", ["gain", "dark", "electrons", "kappa", "swing_V", "threshold_fC"])
