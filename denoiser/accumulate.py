@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.phase import starting_phase
+from spikecam_env.compiled import njit
 
 
 class AccumulateState(NamedTuple):
@@ -36,7 +36,7 @@ def step(rates: NDArray[np.float32], state: AccumulateState) -> tuple[NDArray[np
     return spikes, AccumulateState(charge)
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _accumulate(rates, charge, spikes):  # pragma: no cover - compiled
     count, height, width = rates.shape
     for t in range(count):

@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.phase import starting_phase
+from spikecam_env.compiled import njit
 
 SLOWEST = 1e-4
 """Least rate that is believed [spikes/frame]; the fastest is 1, one spike a frame."""
@@ -51,7 +51,7 @@ def step(inverse_intervals: NDArray[np.float32], state: MusState) -> tuple[NDArr
     return spikes, MusState(wait, state.started or len(inverse_intervals) > 0)
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _update(inverse_intervals, wait, spikes):  # pragma: no cover - compiled
     count, height, width = spikes.shape
     for t in range(count):

@@ -33,9 +33,10 @@ from collections.abc import Container, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from spikecam_env.compiled import njit
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,7 @@ def _mirror(frames: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return np.minimum(folded, 2 * count - 1 - folded)
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _interval_planes(frames, last_before, first, start, count, half_widths, planes):  # pragma: no cover
     """1/ISI at start .. start + count, then n / (t_n - t_0) about the middle; frames[0] is frame `first`."""
     stop = first + frames.shape[0]
@@ -263,7 +264,7 @@ def _interval_planes(frames, last_before, first, start, count, half_widths, plan
                             planes[count + i, y, x] = n / np.float32(following[x] - begins[i, x])
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _last_spikes(frames, first, last):  # pragma: no cover
     count, height, width = frames.shape
     for t in range(count):
@@ -273,7 +274,7 @@ def _last_spikes(frames, first, last):  # pragma: no cover
                     last[y, x] = first + t
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _running_means(frames, share, means):  # pragma: no cover
     count, height, width = frames.shape
     for i in range(len(share)):

@@ -19,7 +19,6 @@ import dataclasses
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
@@ -28,6 +27,7 @@ from scenes.keys import interval_for, painted
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
 from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_memory, checked_number, checked_seed, checked_shape
+from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -316,7 +316,7 @@ def _background_tile(
     return np.ascontiguousarray(tile)
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _paint_tile(tile, pan, tilt, picture):  # pragma: no cover - compiled
     """The repeated tile seen from offset (pan, tilt), bilinear."""
     height, width = tile.shape
@@ -356,7 +356,7 @@ class _Texels:
         return cls(pairs.reshape(-1), len(picture), low, step)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True)
 def _paint_disk(
     behind, pairs, side, low, step, x, y, radius, u0, v0, cosine, sine, picture
 ):  # pragma: no cover - compiled
@@ -405,7 +405,7 @@ def _paint_disk(
         picture[r, :first], picture[r, stop:] = behind[r, :first], behind[r, stop:]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True)
 def _blend_rim(behind, start, stop, x, dy, reach, row):  # pragma: no cover - compiled
     """Pixels of a row that the disk covers in part."""
     for c in range(start, stop):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.disk import RotatingDisk
 from scenes.protocol import Gaze
 from scenes.textures import Texture
+from spikecam_env.compiled import njit
 
 
 def supersampled(
@@ -29,7 +29,7 @@ def supersampled(
     return picture
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _supersample(texture, background, x0, y0, radius, angle, samples, picture):  # pragma: no cover - compiled
     n = texture.shape[0]
     cosine, sine = np.cos(angle), np.sin(angle)

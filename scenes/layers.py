@@ -23,11 +23,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
+from spikecam_env.compiled import njit
 
 DENSITY = 3
 """Texels a pixel, one ray each.  On the scene `tumble` 0.9 % rms off 16 x 16 rays a pixel where things move."""
@@ -270,7 +270,7 @@ def lay(
     )
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
 def _add(
     layer, box, weight, tints, brightest, depth, reference, coefficients, rigid, solid, deep
 ):  # pragma: no cover - compiled
@@ -370,13 +370,13 @@ def _add(
                 away_row[i] += weight * (seen * (of_s * ss[i] + of_t * ts[i] + rest) + nearer)
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+@njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def _empty(cells, at, under):  # pragma: no cover - compiled
     one = np.uint32(1)
     return cells[at] | cells[at + one] | cells[at + under] | cells[at + under + one] == 0
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy")
 def _lay(
     pictures,
     depths,
@@ -454,7 +454,7 @@ def _lay(
                     nearest[x] = away[x]
 
 
-@numba.njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True)
 def _resting(boxes, reference, coefficients, share):  # pragma: no cover - compiled
     """Whether a body is seen just as at the instant before: its rows need not be read again."""
     resting = np.zeros(len(boxes), np.bool_)

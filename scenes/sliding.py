@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import copy
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,6 +17,7 @@ from scenes.keys import interval_for, painted
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import dead_leaves
 from spikecam_env.checked import checked_memory, checked_number, checked_shape
+from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -137,7 +137,7 @@ def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]
     return np.ascontiguousarray(samples[:, place])
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _paint(samples, x, y, picture):  # pragma: no cover - compiled
     """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
     height, (rows, columns) = samples.shape[0], picture.shape

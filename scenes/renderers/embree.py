@@ -14,7 +14,6 @@ from __future__ import annotations
 from math import ceil, floor, log2, sqrt
 from weakref import WeakKeyDictionary
 
-import numba
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
 from scenes.renderers.pyramid import SHARPER
 from scenes.renderers.view import Geometry, blank, checked, geometry, moved, pasted, reached, to_camera, towards
+from spikecam_env.compiled import njit
 
 RAYS_AT_ONCE = 1 << 18
 """Bounds the memory: about 10 MB, whatever the supersampling."""
@@ -108,7 +108,7 @@ class _Traceable:
         return self._scene.run(origins, directions).reshape(*size, supersample**2)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _inverses(corners, faces):
     """(F, 9) M^-1, row by row, of every triangle; zeros for one that is seen from its edge."""
     inverses = np.zeros((len(faces), 3, 3))
@@ -127,7 +127,7 @@ def _inverses(corners, faces):
     return inverses.reshape(len(faces), 9)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _rays(eye, turn, left, top, pixel, rows, columns, supersample):
     """Origins and directions (N, 3) float32 through the middles of every pixel's cells, pixel after pixel."""
     origins = np.empty((rows * columns * supersample * supersample, 3), np.float32)
@@ -146,7 +146,7 @@ def _rays(eye, turn, left, top, pixel, rows, columns, supersample):
     return origins, directions
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _shade(hit, place, m, faces, normals, uv, texels, start, shape, sharper, lamp, light, radiance, coverage, depth):
     """Mean radiance and coverage of each pixel's rays, mean depth of those that hit."""
     left, top, pixel = place
@@ -203,7 +203,7 @@ def _shade(hit, place, m, faces, normals, uv, texels, start, shape, sharper, lam
                 depth[r, c] = depth_sum / count
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _read(texels, start, shape, u, v, fineness):
     """Texture at (u, v), blended between the two levels next to `fineness`."""
     fineness = min(max(fineness, 0.0), len(start) - 1.0)
@@ -216,7 +216,7 @@ def _read(texels, start, shape, u, v, fineness):
     return value
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _bilinear(texels, start, height, width, u, v):
     """One level, repeated without end; row 0 is at v = 1."""
     x = (u - floor(u)) * width - 0.5

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numba import config, njit
+from numba import config
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.compiled import njit
 from spikecam_env.streams.bits import as_words, by_pixel, times_of
 
 STEPS = (1, 2, 4, 8, 16, 32, 64, 128)

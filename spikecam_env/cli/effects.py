@@ -51,13 +51,14 @@ def _option(effect: type[Effect]) -> str:
 
 
 def _parameter(f: Field[Any], effect: type[Effect]) -> dict[str, str]:
-    bounds = f.metadata["bounds"]
+    from spikecam_env.sensor.ranges import range_text
+
     neutral = f" (the strength; {effect.neutral:g} changes nothing)" if f.name == effect.strength else ""
     return {
         "parameter": f.name,
         "default": _plain(f.default),
         "unit": f.metadata["unit"],
-        "bounds": "-" if bounds is None else f"{bounds[0]:g} .. {bounds[1]:g}",
+        "bounds": range_text(f) or "-",
         "meaning": f.metadata["doc"] + neutral,
     }
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spikecam_env.calibration.spike_times import second_differences
+from spikecam_env.compiled import njit
 from spikecam_env.streams.bits import by_pixel, ones, times_of
 
 SPARSE = 0.05

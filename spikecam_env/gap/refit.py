@@ -165,7 +165,7 @@ def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
     kappa = np.sqrt(reset / more) / swing
     dark = less_traps(model, law, base.dark)
     return replace(law, gain=base.gain, dark=dark, electrons=electrons, kappa=kappa,
-                   swing_V=law.swing_V * swing, shot=inverse > 0)  # fmt: skip
+                   swing_V=law.swing_V * swing, shot=inverse > 0).limited()  # fmt: skip
 
 
 def unit_as_base(unit: Unit) -> BaseFit:

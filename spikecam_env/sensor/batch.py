@@ -13,10 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError
+from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import cuda
-from spikecam_env.sensor.light import MAX_SEGMENT, Keyframes, Segment, as_light, check_radiance, segments
+from spikecam_env.sensor.light import (
+    MAX_SEGMENT,
+    Keyframes,
+    Segment,
+    as_light,
+    check_radiance,
+    light_values,
+    segments,
+    warn_uncovered,
+)
 from spikecam_env.sensor.model import SensorModel, generator
-from spikecam_env.sensor.sensor import imaged
 
 
 @dataclass(frozen=True)
@@ -58,7 +67,7 @@ class SpikeSensorBatch:
         self.seeds = _checked_seeds(seeds)
         self.models = _checked_models(models, len(self.seeds))
         self._alike = all(model == self.models[0] for model in self.models)
-        self._optics = [tuple(e for e in model.effects if e.overrides("image")) for model in self.models]
+        self._imaging = [Imaging(model.effects, self.shape) for model in self.models]
         self.frame = np.zeros(len(self.seeds), dtype=np.int64)
         self.phase = np.stack([generator(seed, "phase").random(self.shape) for seed in self.seeds])
         self._pixels = self._started(range(len(self.seeds)))
@@ -108,6 +117,8 @@ class SpikeSensorBatch:
 
     def restore(self, state: SensorBatchState) -> None:
         """Go on from a saved state, of any device; raises InputError for other models, another number or shape."""
+        if not isinstance(state, SensorBatchState):
+            raise InputError(f"state is a {type(state).__name__}; it must be what SpikeSensorBatch.state() returns")
         if state.phase.shape != (len(self), *self.shape):
             raise InputError(
                 f"this state is of (cameras, rows, columns) = {state.phase.shape}; this batch is "
@@ -144,15 +155,17 @@ class SpikeSensorBatch:
         return self._still(self._checked_pictures(radiance), frames)
 
     def _moving(self, lights: Sequence[Keyframes | NDArray[np.float32]], frames: int) -> Iterator[cuda.BatchSegment]:
+        for light, at in zip(lights, self.frame, strict=False):
+            warn_uncovered(light, int(at), frames)
         films = [segments(light, int(self.frame[b]), frames) for b, light in enumerate(lights)]
         for cut in cut_alike(films):
-            seen = [imaged(segment, self._optics[b], self.shape) for b, segment in enumerate(cut)]
+            seen = [self._imaging[b].seen(segment) for b, segment in enumerate(cut)]
             yield cuda.BatchSegment.of(seen, self.device)
 
     def _still(self, pictures: torch.Tensor, frames: int) -> Iterator[cuda.BatchSegment]:
         """pictures: (B, H, W) or (1, H, W) float32."""
         light = pictures.reshape(len(pictures), -1)
-        if any(self._optics):
+        if any(self._imaging):
             light = torch.from_numpy(self._seen(light.cpu().numpy()))
         light = light.to(self.device)
         for done in range(0, frames, MAX_SEGMENT):
@@ -162,14 +175,15 @@ class SpikeSensorBatch:
         """Held light (B, P) or (1, P) through each camera's optics."""
         if not self._alike:
             light = np.broadcast_to(light, (len(self), light.shape[1]))
-        held = [Segment(picture, picture, MAX_SEGMENT, 0, MAX_SEGMENT) for picture in light]
-        return np.stack([imaged(segment, self._optics[b], self.shape).radiance0 for b, segment in enumerate(held)])
+        return np.stack([self._imaging[b].image(picture) for b, picture in enumerate(light)])
 
     def _checked_pictures(self, radiance: Any) -> torch.Tensor:
         if isinstance(radiance, torch.Tensor):
+            if not radiance.dtype.is_floating_point:
+                raise InputError(f"radiance is {radiance.dtype}; it must be floating point, 1.0 = one spike a frame")
             pictures = radiance.detach().to(torch.float32)
         else:
-            pictures = torch.from_numpy(np.array(radiance, dtype=np.float32))
+            pictures = torch.from_numpy(light_values(radiance).copy())
         if pictures.shape == self.shape:
             pictures = pictures[None]
         if pictures.shape not in ((1, *self.shape), (len(self), *self.shape)):

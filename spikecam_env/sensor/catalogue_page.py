@@ -8,11 +8,14 @@ from __future__ import annotations
 import inspect
 import re
 import sys
-from dataclasses import Field, dataclass, fields
+from dataclasses import MISSING, Field, dataclass, fields
 from typing import Any
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
+from spikecam_env.sensor.model import SensorModel
+from spikecam_env.sensor.ranges import range_text
+from spikecam_env.sensor.unit import LEAST_SHARE, MOST_KAPPA, MOST_SPREAD, SWING_V, Circuit
 from spikecam_env.whole import write_text_whole
 
 SECTIONS = ("Stage", "Seen in", "Twins", "Source")
@@ -48,7 +51,8 @@ class Sheet:
 def page() -> str:
     """The whole page, Markdown."""
     stages = {stage: [e for e in CATALOGUE.values() if e.stage is stage] for stage in Stage}
-    return "\n".join([_HEAD, _contents(stages), *(_chapter(stage, of) for stage, of in stages.items()), _TAIL])
+    chapters = (_chapter(stage, of) for stage, of in stages.items())
+    return "\n".join([_HEAD, _contents(stages), _camera(), *chapters, _TAIL])
 
 
 def main() -> None:
@@ -61,6 +65,11 @@ def main() -> None:
 def _contents(stages: dict[Stage, list[type[Effect]]]) -> str:
     rows = [f"| {_title(stage)} | {', '.join(f'[{e.name}](#{e.name})' for e in of)} |" for stage, of in stages.items()]
     return "\n".join(["| stage | effects |", "|---|---|", *rows, ""])
+
+
+def _camera() -> str:
+    declared = [*fields(Circuit), *(f for f in fields(SensorModel) if "bounds" in f.metadata)]
+    return "\n".join([_CAMERA, *_PARAMETERS, *map(_row, declared), ""])
 
 
 def _chapter(stage: Stage, effects: list[type[Effect]]) -> str:
@@ -80,8 +89,7 @@ def _entry(effect: type[Effect]) -> str:
             inspect.cleandoc(sheet.law),
             "```",
             "",
-            "| parameter | default | unit | bounds | meaning |",
-            "|---|---|---|---|---|",
+            *_PARAMETERS,
             *(_row(f, effect) for f in fields(effect)),
             "",
             *said,
@@ -98,17 +106,29 @@ def engines(effect: type[Effect]) -> str:
     return "reference, fast" if effect.is_compiled() else "reference"
 
 
-def _row(f: Field[Any], effect: type[Effect]) -> str:
-    low_high = f.metadata["bounds"]
-    bounds = "" if low_high is None else f"{low_high[0]:g} .. {low_high[1]:g}"
-    strength = f"; **strength**, {effect.neutral:g} changes nothing" if f.name == effect.strength else ""
+def _row(f: Field[Any], effect: type[Effect] | None = None) -> str:
+    is_strength = effect is not None and f.name == effect.strength
+    strength = f"; **strength**, {effect.neutral:g} changes nothing" if effect is not None and is_strength else ""
     default = f"{f.default:.5g}" if isinstance(f.default, float) else str(f.default).lower()
-    return f"| `{f.name}` | {default} | {f.metadata['unit']} | {bounds} | {f.metadata['doc']}{strength} |"
+    if f.default is MISSING:
+        default = ""
+    return f"| `{f.name}` | {default} | {f.metadata['unit']} | {range_text(f)} | {f.metadata['doc']}{strength} |"
 
 
 def _title(stage: Stage) -> str:
     return {Stage.READOUT: "read-out"}.get(stage, stage.name.lower())
 
+
+_PARAMETERS = ("| parameter | default | unit | bounds | meaning |", "|---|---|---|---|---|")
+
+_CAMERA = f"""## Circuit and frame rate
+
+Every value is checked against its bounds when a circuit, an effect or a model is made, and so is what they do together.
+The swing reset_V - reference_V + bias_V is {SWING_V[0]:g} to {SWING_V[1]:g} V. The spread of swings over pixels is at
+most {MOST_SPREAD:g} of the swing, that of capacitances {MOST_SPREAD:g} of the capacitance, the noise of a reset
+{MOST_KAPPA:g} of the swing. A single pixel of a spread keeps {LEAST_SHARE:g} of the nominal swing and capacitance.
+Why: [decisions.md](decisions.md).
+"""
 
 _HEAD = """# Effects
 

@@ -15,9 +15,11 @@ bits.  F never falls, down to single grains: 1/2n is taken in 2^-18, rounded up.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +32,16 @@ GRAINS = 1 << 23
 MAX_GRAINS_PER_FRAME = 2 * GRAINS
 """Light is capped at two thresholds a frame: from one on, a pixel fires in every frame anyway."""
 
+MOST_GRAINS = 128 * GRAINS
+"""Charge of a frame at most, whatever effects add to light and dark: below twice that, sums on the fast engine's grid
+are exact, and a frame's crossings are few."""
+
+LEAST_LIMIT = GRAINS // 64
+"""Charge at which a comparator trips at least, however far noise moves its reference down: each crossing takes some."""
+
+LAST_FRAME = float(1 << 53)
+"""Whole frame numbers beyond it are not exact in double precision."""
+
 MAX_SEGMENT = 64
 """Longest key interval [frames] integrated as one ramp; longer ones are divided."""
 
@@ -40,21 +52,25 @@ class Keyframes:
 
     frame: (K,) float64, strictly increasing [frames].  radiance: (K, H, W) float32, >= 0.
     Keys at whole frames not more than 64 apart are integrated in one go; other keys cost one pass a frame.
-    Raises InputError for other shapes, unordered frames, and radiance that is negative or not finite.
+    An array that is float32 and C-contiguous already is kept, not copied: what is written to it later is what later
+    steps see.  Raises InputError for other shapes, unordered frames, numbers that are no light (see `light_values`),
+    and radiance that is negative or not finite.
     """
 
     frame: NDArray[np.float64]
     radiance: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        frame = np.asarray(self.frame, dtype=np.float64)
-        radiance = np.ascontiguousarray(self.radiance, dtype=np.float32)
-        if frame.ndim != 1 or frame.size == 0 or radiance.ndim != 3 or len(radiance) != len(frame):
+        frame = real_numbers(self.frame, "Keyframes.frame", "iuf").astype(np.float64)
+        radiance = light_values(self.radiance)
+        if frame.ndim != 1 or radiance.ndim != 3 or len(radiance) != len(frame) or not (frame.size and radiance.size):
             raise InputError(
                 f"Keyframes need frame (K,) and radiance (K, H, W) with K >= 1; got {frame.shape} and {radiance.shape}"
             )
         if not np.all(np.isfinite(frame)) or np.any(np.diff(frame) <= 0):
             raise InputError("Keyframes.frame must be finite and strictly increasing; sort it and drop repeats")
+        if np.abs(frame).max() > LAST_FRAME:
+            raise InputError(f"Keyframes.frame reaches {np.abs(frame).max():g}; whole frames are exact to 2^53")
         check_radiance(radiance)
         object.__setattr__(self, "frame", frame)
         object.__setattr__(self, "radiance", radiance)
@@ -79,6 +95,61 @@ class Keyframes:
         if w == 0.0:
             return self.radiance[i]
         return self.radiance[i] * (np.float32(1.0) - w) + self.radiance[i + 1] * w
+
+
+def light_values(values: ArrayLike) -> NDArray[np.float32]:
+    """Light as C-contiguous float32.
+
+    Raises InputError for whole numbers, which are pictures and no light, and as `real_numbers` does.
+    """
+    array = real_numbers(values, "radiance", "f")
+    with np.errstate(over="ignore"):  # beyond float32 is infinity, which is refused as such
+        return np.ascontiguousarray(array, dtype=np.float32)
+
+
+def real_numbers(values: ArrayLike, name: str, kinds: str) -> NDArray[Any]:
+    """An array of real numbers of these kinds (numpy's letters).
+
+    Raises InputError for others, such as True, text, objects, complex or ragged ones, and where some are masked.
+    """
+    if _masks_some(values):
+        raise InputError(f"{name} is masked in part; fill it first, e.g. with .filled(0.0)")
+    try:
+        array = np.asarray(values)
+    except (ValueError, TypeError, RuntimeError) as error:
+        raise InputError(f"{name} is no array of numbers: {error}") from error
+    if array.dtype.kind in kinds:
+        return array
+    if array.dtype.kind in "iu":
+        raise InputError(
+            f"{name} is {array.dtype}; it must be floating point, 1.0 = one spike a frame: divide a picture by its "
+            "white (255), undo its gamma, and scale it"
+        )
+    raise InputError(f"{name} is {array.dtype}; it must be real numbers in floating point")
+
+
+def _masks_some(values: Any) -> bool:
+    """Whether an array, or one in a list of them, hides some of its values, which numpy would then show."""
+    if isinstance(values, (list, tuple)):
+        return any(_masks_some(part) for part in values)
+    return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
+
+
+def warn_uncovered(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> None:
+    """Warn where the keys of a film leave out frames of start .. start + frames, so that its light stands still there.
+
+    Keys are on absolute frames: to give every call keys that begin at 0 is a likely mistake.  A last key at the start
+    of the last frame covers it, as a film's last picture does.
+    """
+    if not isinstance(light, Keyframes) or light.frame.size < 2:
+        return
+    first, last = float(light.frame[0]), float(light.frame[-1])
+    if first > start or last < start + frames - 1:
+        warnings.warn(
+            f"keys of frames {first:g} .. {last:g} do not cover all frames to expose; light is held before and after "
+            "them (keys are on the stream's absolute frames, not on those of a call)",
+            stacklevel=3,
+        )
 
 
 def check_radiance(radiance: NDArray[np.float32]) -> None:
@@ -184,7 +255,8 @@ def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32])
 def _grains_per_frame(
     radiance: NDArray[np.float32], gain: NDArray[np.float32], dark: NDArray[np.float32]
 ) -> NDArray[np.int32]:
-    capped = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
+    with np.errstate(over="ignore"):  # infinity is capped too
+        capped = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
     return (capped + np.float32(0.5)).astype(np.int32)
 
 
@@ -194,7 +266,7 @@ def as_light(radiance: Keyframes | ArrayLike, shape: tuple[int, int]) -> Keyfram
         if radiance.radiance.shape[1:] != shape:
             raise InputError(f"radiance is {radiance.radiance.shape[1:]} pixels, the sensor is {shape}")
         return radiance
-    picture = np.ascontiguousarray(radiance, dtype=np.float32)
+    picture = light_values(radiance)
     if picture.shape != shape:
         raise InputError(
             f"radiance has shape {picture.shape}, the sensor is {shape}; give one (H, W) picture to hold, or Keyframes"

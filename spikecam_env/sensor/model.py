@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import zlib
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from importlib import resources
 from pathlib import Path
@@ -13,9 +14,10 @@ import numpy as np
 import tomli_w
 from pydantic import ConfigDict, Field
 
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.effects.base import build
+from spikecam_env.sensor.ranges import check_parameters, parameter
 from spikecam_env.sensor.unit import Circuit, PixelArray, Unit, firing_law
 from spikecam_env.untrusted import Declared, Name, Positive, checked_format, declared, parse_toml, read_toml
 from spikecam_env.whole import write_text_whole
@@ -47,26 +49,27 @@ class _ModelFile(Declared):
 class SensorModel:
     """What kind of camera: circuit, frame rate and effects, in physical order whatever order they are given in.
 
+    Raises InputError for a frame rate outside its range, an effect listed twice, and where what effects do together
+    leaves no sensor: spreads or noise as large as what they spread.
+
     >>> SensorModel.preset("scsim").without("shot_noise").effects[0].name
     'conversion_gain_spread'
     """
 
     name: str
     circuit: Circuit
-    frame_rate_hz: float
+    frame_rate_hz: float = parameter(unit="Hz (40000 for a Vidar)", bounds=(1.0, 1e6), doc="frames a second")
     effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
-        if not 0 < self.frame_rate_hz < np.inf:
-            raise InputError(
-                f"frame_rate_hz = {self.frame_rate_hz!r}; it must be positive and finite (40000 for a Vidar)"
-            )
-        names = [e.name for e in self.effects]
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f"effect {name!r} is listed {names.count(name)} times; list it once")
-        order = list(CATALOGUE)
-        object.__setattr__(self, "effects", tuple(sorted(self.effects, key=lambda e: order.index(e.name))))
+        check_parameters(self, "")
+        if not isinstance(self.name, str):
+            raise InputError(f"name = {shown(self.name)}; it must be text")
+        if not isinstance(self.circuit, Circuit):
+            raise InputError(f"circuit = {shown(self.circuit)}; it must be a Circuit")
+        object.__setattr__(self, "effects", _in_physical_order(self.effects))
+        alike = np.random.default_rng(0)
+        self._pixels((1, 1), lambda _: alike).check()
 
     @classmethod
     def preset(cls, name: str = "scsim", *, script: bool = False) -> SensorModel:
@@ -133,6 +136,14 @@ class SensorModel:
             raise unknown_name(f"effect of {self.name}", name, [e.name for e in self.effects])
         return replace(self, effects=tuple(e for e in self.effects if e.name != name))
 
+    def difference(self, other: SensorModel) -> str:
+        """The first thing in which another model differs, as `what: this, that`; empty where only names do."""
+        ours, theirs = _flat(self), _flat(other)
+        for what in ours | theirs:
+            if ours.get(what) != theirs.get(what):
+                return f"{what}: {ours.get(what, 'none')}, {theirs.get(what, 'none')}"
+        return ""
+
     def noise_free(self) -> SensorModel:
         """The ideal pixel with this circuit and frame rate."""
         return replace(self, name="ideal", effects=())
@@ -142,10 +153,34 @@ class SensorModel:
 
         Adding or removing one effect leaves the draws of the others as they were.
         """
+        return firing_law(self._pixels(shape, lambda effect: generator(seed, effect.name))).owned()
+
+    def _pixels(self, shape: tuple[int, int], generator_of: Callable[[Effect], np.random.Generator]) -> PixelArray:
         pixels = PixelArray.nominal(self.circuit, self.frame_rate_hz, shape)
         for effect in self.effects:
-            pixels = effect.imprint(pixels, generator(seed, effect.name))
-        return firing_law(pixels)
+            pixels = effect.imprint(pixels, generator_of(effect))
+        return pixels
+
+
+def _flat(model: SensorModel) -> dict[str, Any]:
+    """All values of a model by their places."""
+    circuit = {f"circuit.{name}": value for name, value in asdict(model.circuit).items()}
+    effects = {f"{e.name}.{name}": value for e in model.effects for name, value in e.parameters().items()}
+    return {"frame_rate_hz": model.frame_rate_hz, **circuit, **effects}
+
+
+def _in_physical_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Raises InputError for what is no effect of the catalogue, and for one that is listed twice."""
+    listed = list(effects) if isinstance(effects, Iterable) else [effects]
+    order = list(CATALOGUE)
+    for effect in listed:
+        if not isinstance(effect, Effect):
+            raise InputError(f"effects hold {shown(effect)}; give instances of CATALOGUE's classes")
+        if effect.name not in order:
+            raise unknown_name("effect", effect.name, CATALOGUE)
+        if sum(other.name == effect.name for other in listed) > 1:
+            raise InputError(f"effect {effect.name!r} is listed more than once; list it once")
+    return tuple(sorted(listed, key=lambda effect: order.index(effect.name)))
 
 
 def generator(seed: int, purpose: str) -> np.random.Generator:

@@ -4,6 +4,7 @@
     while charge >= threshold:  spike;  charge -= threshold;  threshold = 1 + kappa n      (drawn at each reset)
 
 Reset is asynchronous: charge after the crossing is kept.  A frame reports one bit; further crossings in it are lost.
+However far noise and effects go, a frame brings MOST_GRAINS at most and a comparator trips at LEAST_LIMIT at least.
 Charge is in grains of the pixel's own threshold (`light`), so without noise all sums are exact integers.  Effects see
 it in thresholds, a power of two away, so that to go there and back changes no bit.
 """
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Effect, Exposure, having
-from spikecam_env.sensor.light import GRAINS, Segment, ramp
+from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Segment, ramp
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 
@@ -72,8 +73,8 @@ def step(
     """One frame: `mean` (P,) is its expected charge [grains], which rises by `rise` (P,) from its start to its end;
     returns which pixels report a spike (P,)."""
     light, dark = drive.expected_charge(now, effects, state.memory, mean / GRAINS, rise / GRAINS)
-    dark_grains = np.maximum(dark.values[0], 0.0).reshape(-1) * GRAINS
-    mean = np.maximum(light.values[0], 0.0).reshape(-1) * GRAINS + dark_grains
+    dark_grains = np.clip(dark.values[0].reshape(-1) * GRAINS, 0.0, MOST_GRAINS)
+    mean = np.minimum(np.maximum(light.values[0], 0.0).reshape(-1) * GRAINS + dark_grains, MOST_GRAINS)
     state.charge += collect(now.unit, mean, dark_grains, state.rng)
     fired = fire(now, effects, state, mean, references(now, effects, state)).reshape(now.shape)
     for effect in having("spiked", effects):
@@ -101,7 +102,7 @@ def references(now: Exposure, effects: Sequence[Effect], state: ReferenceState) 
     """What the comparators compare with in this frame, as a function of the thresholds (P,) [grains]."""
     moving, reacting = having("compare", effects), having("react", effects)
     if not moving and not reacting:
-        return lambda threshold: threshold
+        return lambda threshold: np.maximum(threshold, LEAST_LIMIT)
     law = drive.comparators(now, moving, state.memory)
     factor, common = (np.broadcast_to(rows.T, now.shape).reshape(-1) for rows in (law.factor, law.common))
     offset = law.grains_per_mV * (common + law.field[0])
@@ -110,7 +111,7 @@ def references(now: Exposure, effects: Sequence[Effect], state: ReferenceState) 
         limit = thresholds(threshold * factor + offset, now)
         for effect in reacting:
             limit = effect.react(limit, now, state.memory[effect.name])
-        return limit.reshape(-1) * GRAINS
+        return np.maximum(limit.reshape(-1) * GRAINS, LEAST_LIMIT)
 
     return compared_with
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -13,13 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_count, checked_seed, checked_shape
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor import reference
-from spikecam_env.sensor.effects.base import Effect, Exposure
+from spikecam_env.sensor.effects.base import Exposure
+from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import ahead, block, fast
-from spikecam_env.sensor.light import Keyframes, Segment, as_light, segments
+from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_uncovered
 from spikecam_env.sensor.model import SensorModel, generator
-from spikecam_env.sensor.unit import Unit
+from spikecam_env.sensor.unit import UNIT_RANGES, Unit
 
 ENGINES = ("auto", "cuda", "fast", "reference")
 
@@ -28,12 +28,14 @@ ENGINES = ("auto", "cuda", "fast", "reference")
 class SensorState:
     """A sensor mid-stream: which unit it is, the next frame, and its pixels.  Picklable.
 
-    Tied to its engine, its shape and the effects that act from frame to frame.
+    Tied to its engine, its shape, its model, and the unit that was given to the sensor, if one was.
+    unit: that one's digest.  phase: read-only.
     """
 
     engine: str
     shape: tuple[int, int]
-    effects: tuple[str, ...]
+    model: SensorModel
+    unit: str | None
     seed: int
     frame: int
     phase: NDArray[np.float64]
@@ -79,7 +81,7 @@ class SpikeSensor:
         self.take = checked_seed(take, "take")
         self._given = None if unit is None else (checked_unit(unit, self.shape), _checked(seed))
         self.engine = _chosen_engine(engine, self.model, unit)
-        self._optics = tuple(e for e in self.model.effects if e.overrides("image"))
+        self._imaging = Imaging(self.model.effects, self.shape)
         self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
         self._start(_checked(seed), phase=None)
 
@@ -99,8 +101,9 @@ class SpikeSensor:
         """
         frames = checked_count(frames)
         light = as_light(radiance, self.shape)
-        spikes = _recycled(out, (frames, *self.shape)).reshape(frames, -1)
-        seen = self._seen_by_pixels(light, frames)
+        spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)
+        warn_uncovered(light, self.frame, frames)
+        seen = map(self._imaging.seen, segments(light, self.frame, frames))
         if self.engine == "fast" and self._frame_effects:
             block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
         else:
@@ -114,20 +117,30 @@ class SpikeSensor:
     def state(self) -> SensorState:
         """A copy of everything that the next step depends on, besides the model."""
         pixels = copy.deepcopy(self._pixels)
-        return SensorState(self.engine, self.shape, self._names_of_effects(), self.seed, self.frame, self.phase, pixels)
+        unit = None if self._given is None else self._given[0].digest
+        return SensorState(self.engine, self.shape, self.model, unit, self.seed, self.frame, self.phase, pixels)
 
     def restore(self, state: SensorState) -> None:
-        """Go on from a saved state; raises InputError for the state of another engine, shape or model."""
+        """Go on from a saved state; raises InputError for that of another engine, shape, model or unit."""
+        if not isinstance(state, SensorState):
+            raise InputError(f"state is a {type(state).__name__}; it must be what SpikeSensor.state() returns")
+        if not all(hasattr(state, f.name) for f in fields(SensorState)):
+            raise InputError("this state was saved by another version of spikecam-env; record it again")
         if (state.engine, state.shape) != (self.engine, self.shape):
             raise InputError(
                 f"this state is of a {state.engine} sensor of {state.shape}; this one is {self.engine}, {self.shape}"
             )
-        if state.effects != self._names_of_effects():
-            theirs, ours = (", ".join(names) or "none" for names in (state.effects, self._names_of_effects()))
+        theirs, ours = (_frame_effects(model) for model in (state.model, self.model))
+        if theirs != ours:
             raise InputError(f"this state is of a model with other frame effects ({theirs}); this one has {ours}")
+        difference = state.model.difference(self.model)
+        if difference:
+            raise InputError(f"this state is of another model; the state's and this sensor's {difference}")
+        if state.unit != (None if self._given is None else self._given[0].digest):
+            raise InputError("this state is of another unit; give the sensor the unit (unit=...) that the state is of")
         if state.seed != self.seed:
             self._start(state.seed, phase=state.phase)
-        self.phase = state.phase
+        self.phase = _read_only(state.phase)
         self.frame = state.frame
         self._pixels = copy.deepcopy(state.pixels)
 
@@ -138,14 +151,13 @@ class SpikeSensor:
         return twin
 
     _pixels: Any
-    _seen: tuple[Keyframes, int, int, Segment] | None = None
 
     def _start(self, seed: int, phase: NDArray[np.float64] | None) -> None:
         self.seed = seed
         self.frame = 0
         self.unit, unit_seed = self._given or (self.model.draw_unit(self.shape, seed), seed)
         noise_seed = seed if self.take == 0 else int(generator(seed, f"take {self.take}").integers(1 << 62))
-        self.phase = generator(noise_seed, "phase").random(self.shape) if phase is None else phase
+        self.phase = _read_only(generator(noise_seed, "phase").random(self.shape) if phase is None else phase)
         flat = self.phase.reshape(-1)
         if self.engine == "fast" and not self._frame_effects:
             self._pixels = ahead.start(self.unit, flat, noise_seed)
@@ -167,54 +179,37 @@ class SpikeSensor:
         else:
             out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
 
-    def _seen_by_pixels(self, light: Keyframes | NDArray[np.float32], frames: int) -> Iterator[Segment]:
-        at = self.frame
-        for segment in segments(light, at, frames):
-            yield self._imaged(segment, light, at - segment.first)
-            at += segment.count
-
-    def _imaged(self, segment: Segment, light: Keyframes | NDArray[np.float32], begin: int) -> Segment:
-        """Optics act once a key interval, not once a step; `begin` is the interval's first frame."""
-        if not self._optics or not isinstance(light, Keyframes):
-            return imaged(segment, self._optics, self.shape)
-        seen = self._seen if self._seen is not None and self._seen[0] is light else None
-        if seen is None or seen[1:3] != (begin, segment.length):
-            last_end = seen[3].radiance1 if seen is not None and seen[1] + seen[2] == begin else None
-            self._seen = seen = (light, begin, segment.length, imaged(segment, self._optics, self.shape, last_end))
-        ends = seen[3]
-        return replace(segment, radiance0=ends.radiance0, radiance1=ends.radiance1)
-
-    def _names_of_effects(self) -> tuple[str, ...]:
-        return tuple(e.name for e in self._frame_effects)
-
     def _first_exposure(self) -> Exposure:
         return Exposure(0, self.model.frame_rate_hz, self.shape, self.unit)
 
 
-def imaged(
-    segment: Segment, optics: Sequence[Effect], shape: tuple[int, int], start: NDArray[np.float32] | None = None
-) -> Segment:
-    """Light as it reaches the pixels: optics are linear, so they act on the ramp's two ends.
-
-    start: (H*W,) of its first end, where that is known.
-    """
-    if start is None:
-        start = _image(segment.radiance0, optics, shape)
-    held = segment.radiance1 is segment.radiance0
-    return replace(segment, radiance0=start, radiance1=start if held else _image(segment.radiance1, optics, shape))
+def _frame_effects(model: SensorModel) -> str:
+    """Names of the effects that act from frame to frame."""
+    return ", ".join(e.name for e in model.effects if not e.is_fixed()) or "none"
 
 
-def _image(radiance: NDArray[np.float32], optics: Sequence[Effect], shape: tuple[int, int]) -> NDArray[np.float32]:
-    for effect in optics:
-        radiance = effect.image(radiance.reshape(shape)).reshape(-1)
-    return radiance
+def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The array, or a copy of one that can be written to; as two sensors may share it."""
+    if array.flags.writeable:
+        array = array.copy()
+        array.flags.writeable = False
+    return array
 
 
-def _recycled(out: NDArray[np.uint8] | None, shape: tuple[int, int, int]) -> NDArray[np.uint8]:
+def _recycled(
+    out: NDArray[np.uint8] | None, shape: tuple[int, int, int], light: Keyframes | NDArray[np.float32]
+) -> NDArray[np.uint8]:
     if out is None:
-        return np.empty(shape, dtype=np.uint8)
+        try:
+            return np.empty(shape, dtype=np.uint8)
+        except (MemoryError, ValueError) as error:
+            raise InputError(f"frames = {shown(shape[0])} of {shape[1:]} do not fit in memory; step fewer") from error
+    if not isinstance(out, np.ndarray):
+        raise InputError(f"out is a {type(out).__name__}; it must be a numpy array, uint8 {shape}")
     if out.shape != shape or out.dtype != np.uint8 or not (out.flags.c_contiguous and out.flags.writeable):
         raise InputError(f"out is {out.dtype} {out.shape}; it must be uint8 {shape}, C-contiguous and writeable")
+    if np.may_share_memory(out, light.radiance if isinstance(light, Keyframes) else light):
+        raise InputError("out and radiance share memory; give out memory of its own")
     return out
 
 
@@ -223,26 +218,26 @@ def _checked(seed: Any) -> int:
 
 
 def checked_unit(unit: Any, shape: tuple[int, int]) -> Unit:
-    """Raises InputError unless `unit` is a firing law of rows * columns pixels."""
+    """The unit, read-only; raises InputError unless it is a firing law of rows * columns pixels."""
     if not isinstance(unit, Unit):
         raise InputError(f"unit = {type(unit).__name__}; it must be a Unit (spikecam_env.sensor.Unit)")
-    arrays = {
-        field.name: getattr(unit, field.name) for field in fields(Unit) if field.name not in ("shot", "dark_is_noisy")
-    }
-    for name, values in arrays.items():
-        if np.shape(values) != (shape[0] * shape[1],):
+    for name in ("shot", "dark_is_noisy"):
+        if not isinstance(getattr(unit, name), (bool, np.bool_)):
+            raise InputError(f"unit.{name} = {shown(getattr(unit, name))}; it must be True or False")
+    for name, (low, high) in UNIT_RANGES.items():
+        values = real_numbers(getattr(unit, name), f"unit.{name}", "f")
+        if values.shape != (shape[0] * shape[1],):
             raise InputError(
-                f"unit.{name} is {np.shape(values)}, the sensor is {shape}; it must be one number a pixel, "
+                f"unit.{name} is {values.shape}, the sensor is {shape}; it must be one number a pixel, "
                 f"({shape[0] * shape[1]},)"
             )
-        least = 0.0 if name in ("gain", "dark", "kappa") else np.finfo(np.float64).tiny
-        bad = np.flatnonzero(~((values >= least) & (values < np.inf)))
+        bad = np.flatnonzero(~((values >= low) & (values <= high)))
         if bad.size:
             raise InputError(
                 f"unit.{name} is {values[bad[0]]:g} at pixel {bad[0]}; it must be finite and "
-                f"{'0 or more' if least == 0.0 else 'above 0'}"
+                f"{'0 or more' if low == 0.0 else 'above 0'}: {low:g} .. {high:g}"
             )
-    return unit
+    return unit.owned()
 
 
 def _chosen_engine(engine: str, model: SensorModel, unit: Unit | None) -> str:

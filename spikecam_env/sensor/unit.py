@@ -6,15 +6,37 @@ with shot noise the charge arrives as a Poisson stream of `electrons` to a thres
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import hashlib
+import math
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.errors import InputError
 from spikecam_env.sensor.light import GRAINS
+from spikecam_env.sensor.ranges import check_parameters, parameter
 
 ELEMENTARY_CHARGE_C = 1.602176634e-19
 BOLTZMANN_J_PER_K = 1.380649e-23
+
+SWING_V = (0.05, 20.0)
+"""Lowest and highest swing of a circuit.  Below, a comparator's own offset (published spread 49.7 mV) is the swing."""
+
+LEAST_SHARE = 0.01
+"""What a spread over pixels leaves a pixel of the nominal swing or capacitance, at least."""
+
+MOST_SPREAD = 0.5
+"""Standard deviation over pixels of swing or capacitance over nominal, at most: one pixel in forty is then at none."""
+
+MOST_KAPPA = 0.25
+"""Reset noise over the swing, at most.  A threshold is a charge: four standard deviations below its mean it would be
+negative."""
+
+FEWEST_ELECTRONS = 1.0
+"""Electrons to a threshold, at least."""
 
 
 @dataclass(frozen=True)
@@ -22,13 +44,22 @@ class Circuit:
     """The nominal pixel circuit, paper (6) and (12).
 
     Threshold phi = C (V_D - V_ref + V_bias).  Defaults: the public SCSim script's constants.
+    Raises InputError for a value outside its range, and for a swing outside SWING_V.
     """
 
-    reset_V: float = 3.3
-    reference_V: float = 2.2
-    bias_V: float = -0.0076
-    capacitance_fF: float = 4.348
-    temperature_K: float = 300.0
+    reset_V: float = parameter(3.3, unit="V", bounds=(-20.0, 20.0), doc="voltage that a reset leaves")
+    reference_V: float = parameter(2.2, unit="V", bounds=(-20.0, 20.0), doc="voltage at which the comparator trips")
+    bias_V: float = parameter(-0.0076, unit="V", bounds=(-5.0, 5.0), doc="mean bias of the comparators")
+    capacitance_fF: float = parameter(4.348, unit="fF", bounds=(0.01, 1e5), doc="capacitance that light discharges")
+    temperature_K: float = parameter(300.0, unit="K", bounds=(1.0, 1000.0), doc="temperature of the array")
+
+    def __post_init__(self) -> None:
+        check_parameters(self, "circuit")
+        if not SWING_V[0] <= self.swing_V <= SWING_V[1]:
+            raise InputError(
+                f"circuit: the swing reset_V - reference_V + bias_V = {self.reset_V:g} - {self.reference_V:g} + "
+                f"{self.bias_V:g} = {self.swing_V:g} V is outside {SWING_V[0]:g} .. {SWING_V[1]:g} V"
+            )
 
     @property
     def swing_V(self) -> float:
@@ -48,7 +79,10 @@ class Circuit:
 
 @dataclass(frozen=True)
 class PixelArray:
-    """The array in circuit units, as the effects leave their fixed pattern on it; arrays are (H, W) float64."""
+    """The array in circuit units, as the effects leave their fixed pattern on it; arrays are (H, W) float64.
+
+    swing_spread_V, capacitance_spread_fF: standard deviations over pixels of what the effects did to these so far.
+    """
 
     circuit: Circuit
     frame_rate_hz: float
@@ -59,6 +93,8 @@ class PixelArray:
     reset_noise_mV: float = 0.0
     quanta: float = 0.0
     dark_is_noisy: bool = True
+    swing_spread_V: float = 0.0
+    capacitance_spread_fF: float = 0.0
 
     @classmethod
     def nominal(cls, circuit: Circuit, frame_rate_hz: float, shape: tuple[int, int]) -> PixelArray:
@@ -72,6 +108,62 @@ class PixelArray:
             capacitance_fF=full(shape, circuit.capacitance_fF),
             swing_V=full(shape, circuit.swing_V),
         )
+
+    def check(self) -> None:
+        """Raise InputError where what the effects do together leaves no sensor, whatever the pixels draw."""
+        swing_V, capacitance_fF = self.circuit.swing_V, self.circuit.capacitance_fF
+        for what, value, most, unit, remedy in (
+            (
+                "the spread of swings over pixels (bias_voltage_spread, row_fixed_pattern, column_fixed_pattern)",
+                self.swing_spread_V,
+                MOST_SPREAD * swing_V,
+                "V",
+                f"{MOST_SPREAD:g} of the swing; lower it or raise circuit.reset_V",
+            ),
+            (
+                "the spread of capacitances over pixels (capacitor_spread)",
+                self.capacitance_spread_fF,
+                MOST_SPREAD * capacitance_fF,
+                "fF",
+                f"{MOST_SPREAD:g} of circuit.capacitance_fF; lower it or raise that",
+            ),
+            (
+                "the noise of a reset (reset_noise, excess_threshold_noise)",
+                self.reset_noise_mV,
+                1e3 * MOST_KAPPA * swing_V,
+                "mV",
+                f"{MOST_KAPPA:g} of the swing; lower it or raise circuit.reset_V",
+            ),
+        ):
+            if value > most * (1.0 + 1e-9):
+                raise InputError(f"{what} is {value:g} {unit}; at most {most:g} {unit}, {remedy}")
+
+    def with_swings_off(self, sigma_V: float, normal: NDArray[np.float64]) -> PixelArray:
+        """Swings off by sigma_V times normal numbers, (H, W) or broadcast to it; each keeps LEAST_SHARE of nominal."""
+        swing = np.maximum(self.swing_V + sigma_V * normal, LEAST_SHARE * self.circuit.swing_V)
+        return replace(self, swing_V=swing, swing_spread_V=math.hypot(self.swing_spread_V, sigma_V))
+
+    def with_capacitances_off(self, sigma_fF: float, normal: NDArray[np.float64]) -> PixelArray:
+        """Capacitances off by sigma_fF times normal numbers (H, W); each keeps LEAST_SHARE of nominal."""
+        capacitance = np.maximum(self.capacitance_fF + sigma_fF * normal, LEAST_SHARE * self.circuit.capacitance_fF)
+        spread = math.hypot(self.capacitance_spread_fF, sigma_fF)
+        return replace(self, capacitance_fF=capacitance, capacitance_spread_fF=spread)
+
+    def with_reset_noise(self, sigma_mV: float) -> PixelArray:
+        """Another noise of a reset besides what there is: variances add."""
+        return replace(self, reset_noise_mV=math.hypot(self.reset_noise_mV, sigma_mV))
+
+
+UNIT_RANGES = {
+    "gain": (0.0, 1e30),
+    "dark": (0.0, 1e30),
+    "electrons": (FEWEST_ELECTRONS, 1e15),
+    "kappa": (0.0, MOST_KAPPA),
+    "swing_V": (1e-6, 1e3),
+    "threshold_fC": (1e-9, 1e9),
+}
+"""Lowest and highest value of a pixel in a unit, in what `Unit` says.  Light is capped at two thresholds a frame, so
+gain and dark need only stay finite in single precision."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +185,40 @@ class Unit:
     shot: bool
     dark_is_noisy: bool
 
+    def owned(self) -> Unit:
+        """This unit, its arrays read-only; of arrays that somebody may change in place, copies."""
+        arrays = {name: getattr(self, name) for name in UNIT_RANGES}
+        copies: dict[str, Any] = {
+            name: np.array(array, dtype=np.float64) for name, array in arrays.items() if not _is_own(array)
+        }
+        for copy in copies.values():
+            copy.flags.writeable = False
+        return replace(self, **copies) if copies else self
+
+    def limited(self) -> Unit:
+        """This unit, its electrons and kappa within UNIT_RANGES, as those of single pixels of a spread may not be."""
+        within: dict[str, Any] = {
+            name: np.clip(getattr(self, name), *UNIT_RANGES[name]) for name in ("electrons", "kappa")
+        }
+        return replace(self, **within)
+
+    @cached_property
+    def digest(self) -> str:
+        """Tells units apart: SHA-256 of all that they hold."""
+        sha = hashlib.sha256()
+        for f in fields(self):
+            sha.update(np.ascontiguousarray(getattr(self, f.name)).tobytes())
+        return sha.hexdigest()
+
     @property
     def grains_per_frame(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Gain and dark in the light law's unit, (P,) float32 each."""
         return (self.gain * GRAINS).astype(np.float32), (self.dark * GRAINS).astype(np.float32)
+
+
+def _is_own(array: NDArray[np.float64]) -> bool:
+    """Whether nobody can change an array: read-only, and no view of another."""
+    return isinstance(array, np.ndarray) and not array.flags.writeable and array.base is None
 
 
 def firing_law(pixels: PixelArray) -> Unit:
@@ -114,4 +236,4 @@ def firing_law(pixels: PixelArray) -> Unit:
         threshold_fC=threshold_fC.reshape(-1),
         shot=pixels.quanta > 0,
         dark_is_noisy=pixels.dark_is_noisy,
-    )
+    ).limited()

@@ -17,10 +17,10 @@ Normalised plane: 1 / ISI, in (0, 1], an estimate of the rate [spikes/frame].  S
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import as_spikes
 
@@ -61,7 +61,7 @@ def isi_planes(
 
 
 # Not parallel: numba's OpenMP layer changes torch's number of threads, and the networks then ran 60 times slower.
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _isi(spikes, start, stop, ahead, normalised, planes):  # pragma: no cover - compiled
     count, pixels = spikes.shape
     strip = 2048
@@ -88,7 +88,7 @@ def _isi(spikes, start, stop, ahead, normalised, planes):  # pragma: no cover - 
                     following[i] = t
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _first_that_matters(spikes, start, a, b):  # pragma: no cover - compiled
     """The latest t <= start such that every pixel in [a, b) has a spike in t .. start, or 0."""
     missing = b - a

@@ -230,3 +230,35 @@ def test_the_sensor_package_is_imported_without_torch() -> None:
     code = "import sys, spikecam_env.sensor; print('torch' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.int64, bool, complex, object])
+def test_a_batch_takes_no_pictures_for_light(kind: type) -> None:
+    picture = np.ones(SHAPE, dtype=kind)
+    with pytest.raises(InputError, match="radiance is"):
+        batch().step(picture)
+    if kind is not object:
+        with pytest.raises(InputError, match="radiance is"):
+            batch().step(torch.from_numpy(picture))
+    with pytest.raises(InputError, match="masked in part"):
+        batch().step(np.ma.masked_array(np.ones(SHAPE), mask=picture.astype(bool)))
+
+
+def test_a_batch_doubts_keys_relative_to_a_call_and_refuses_other_states() -> None:
+    cameras, film = batch(), Keyframes([0, 8], np.full((2, *SHAPE), 0.3, np.float32))
+    cameras.step(film, 8)
+    with pytest.warns(UserWarning, match="the stream's absolute frames"):
+        cameras.step(film, 8)
+    with pytest.raises(InputError, match="state is a dict"):
+        cameras.restore({"frame": 0})  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="other models"):
+        cameras.restore(batch("physical").state())
+
+
+def test_films_changed_in_place_are_seen_by_a_batch_with_optics() -> None:
+    model = SensorModel.preset("scsim").with_effect(CATALOGUE["optical_blur"](sigma_pixels=1.0))
+    changed, films = wild_film(16, 1), [wild_film(16, seed) for seed in (1, 2)]
+    one, two = batch(model), batch(model)
+    for film in (*films, *films):
+        changed.radiance[:] = film.radiance
+        equal(one.step(changed, 20), two.step(film, 20).numpy())

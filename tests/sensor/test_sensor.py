@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import pickle
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
+from spikecam_env.sensor import CATALOGUE, Circuit, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.kernels import block, fast
 from spikecam_env.sensor.kernels.threads import together
 
@@ -166,3 +170,216 @@ def test_frames_can_be_written_to_given_memory() -> None:
     assert np.array_equal(out, fresh.step(light, 9))
     with pytest.raises(InputError, match=r"it must be uint8 \(8, 5, 7\)"):
         fresh.step(light, 8, out=out)
+
+
+SCSIM = SensorModel.preset("scsim")
+OTHERS = {
+    r"frame effects \(none\); this one has dead_time": SCSIM.with_effect(CATALOGUE["dead_time"]()),
+    r"reset_noise\.sigma_mV: 6\.36, 3\.0": SCSIM.with_effect(CATALOGUE["reset_noise"](sigma_mV=3.0)),
+    r"frame_rate_hz: 40000\.0, 20000\.0": replace(SCSIM, frame_rate_hz=20_000.0),
+    r"circuit\.reset_V: 3\.3, 3\.5": replace(SCSIM, circuit=Circuit(reset_V=3.5)),
+    r"shot_noise\.quanta: 50000\.0, none": SCSIM.without("shot_noise"),
+}
+
+
+@pytest.mark.parametrize("message", OTHERS)
+def test_state_of_another_model_is_refused(message: str) -> None:
+    state = SpikeSensor(SCSIM, SHAPE, 1).state()
+    other = SpikeSensor(OTHERS[message], SHAPE, 1)
+    with pytest.raises(InputError, match=message):
+        other.restore(state)
+    SpikeSensor(replace(SCSIM, name="the same, renamed"), SHAPE, 1).restore(state)
+    with pytest.raises(InputError, match="state is a dict"):
+        other.restore({"frame": 0})  # type: ignore[arg-type]
+
+
+def test_state_of_another_unit_is_refused() -> None:
+    unit = SCSIM.draw_unit(SHAPE, 5)
+    warmer = replace(unit, dark=2.0 * unit.dark)
+    state = SpikeSensor(SCSIM, SHAPE, 1, unit=unit).state()
+    for other in (SpikeSensor(SCSIM, SHAPE, 1), SpikeSensor(SCSIM, SHAPE, 1, unit=warmer)):
+        with pytest.raises(InputError, match="state is of another unit"):
+            other.restore(state)
+    with pytest.raises(InputError, match="state is of another unit"):
+        SpikeSensor(SCSIM, SHAPE, 1, unit=unit).restore(SpikeSensor(SCSIM, SHAPE, 1).state())
+    SpikeSensor(SCSIM, SHAPE, 1, unit=pickle.loads(pickle.dumps(unit))).restore(state)
+
+
+GOES_ON = """
+import pickle, sys
+import numpy as np
+from spikecam_env.sensor import SpikeSensor
+sensor = SpikeSensor("scsim", (9, 13), 1, sys.argv[2])
+sensor.restore(pickle.load(open(sys.argv[1], "rb")))
+print(sensor.step(np.full((9, 13), 0.3, np.float32), 50).tobytes().hex())
+"""
+
+
+def test_state_goes_on_in_another_process(tmp_path) -> None:
+    light, sensor = np.full(SHAPE, 0.3, np.float32), SpikeSensor("scsim", SHAPE, 1)
+    sensor.step(light, 30)
+    (tmp_path / "state").write_bytes(pickle.dumps(sensor.state()))
+    done = subprocess.run(
+        [sys.executable, "-c", GOES_ON, str(tmp_path / "state"), "fast"], capture_output=True, text=True, check=True
+    )
+    assert bytes.fromhex(done.stdout.strip()) == sensor.step(light, 50).tobytes()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("blurred", [False, True], ids=["bare", "through optics"])
+def test_keys_changed_in_place_between_steps_are_seen(engine: str, blurred: bool) -> None:
+    model = SCSIM.with_effect(CATALOGUE["optical_blur"](sigma_pixels=1.0)) if blurred else SCSIM
+    first, second = (moving_light(16, seed).radiance for seed in (1, 2))
+    frame = moving_light().frame
+    changed = Keyframes(frame, first.copy())
+    one, two = (SpikeSensor(model, SHAPE, 1, engine) for _ in range(2))
+    for cut in (5, 3, 30):
+        for light in (first, second):
+            changed.radiance[:] = light
+            np.testing.assert_array_equal(one.step(changed, cut), two.step(Keyframes(frame, light), cut))
+
+
+@pytest.mark.parametrize("name", ["optical_blur", "dead_time"])
+def test_ramps_that_stand_still_are_light_that_stays(name: str) -> None:
+    """Through optics and without, whole and a frame at a time, on both engines where nothing is drawn."""
+    model = SensorModel.preset("ideal").with_effect(CATALOGUE["optical_blur"](sigma_pixels=1.0))
+    model = model.with_effect(CATALOGUE[name]())
+    one, two = moving_light().radiance[:2]
+    light = Keyframes([0, 16, 40, 70, 90], np.stack([one, one, two, two, one]))
+    whole = SpikeSensor(model, SHAPE, 1, "reference").step(light, 120)
+    for cuts in ([120], [1] * 90 + [30], [7] * 15 + [15]):
+        np.testing.assert_array_equal(stream(SpikeSensor(model, SHAPE, 1), light, cuts), whole)
+
+
+def test_optics_act_once_a_key_and_not_once_a_step(monkeypatch) -> None:
+    blur, calls = CATALOGUE["optical_blur"], []
+    image = blur.image
+    monkeypatch.setattr(blur, "image", lambda self, picture: (calls.append(1), image(self, picture))[1])
+    sensor = SpikeSensor(SCSIM.with_effect(blur(sigma_pixels=1.0)), SHAPE, 1)
+    for _ in range(64):
+        sensor.step(moving_light(16))
+    assert len(calls) == 64 // 16 + 1
+    for _ in range(9):
+        sensor.step(np.full(SHAPE, 0.3, np.float32))
+    assert len(calls) == 64 // 16 + 2
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_nobody_changes_a_sensor_through_an_array(engine: str) -> None:
+    drawn = SCSIM.draw_unit(SHAPE, 5)
+    given = replace(drawn, gain=drawn.gain.copy(), dark=drawn.dark.copy())
+    light = np.full(SHAPE, 0.3, np.float32)
+    expected = SpikeSensor(SCSIM, SHAPE, 1, engine, unit=drawn).step(light, 60)
+    sensor = SpikeSensor(SCSIM, SHAPE, 1, engine, unit=given)
+    state, twin = sensor.state(), sensor.clean_twin()
+    given.gain[:] = 0.0
+    for owned in (sensor.phase, sensor.unit.gain, sensor.unit.kappa, state.phase, twin.phase, drawn.gain):
+        with pytest.raises(ValueError, match="read-only"):
+            owned[...] = 0.0
+    np.testing.assert_array_equal(sensor.step(light, 60), expected)
+    other = SpikeSensor(SCSIM, SHAPE, 2, engine, unit=drawn)
+    other.restore(pickle.loads(pickle.dumps(state)))
+    kept = other.state()
+    other.step(light, 7)
+    other.restore(kept)
+    np.testing.assert_array_equal(other.step(light, 60), expected)
+
+
+def test_out_of_the_lights_own_memory_is_refused() -> None:
+    memory = np.full(np.prod(SHAPE) * 4, 7, dtype=np.uint8)
+    light = memory.view(np.float32).reshape(SHAPE)
+    light[:] = 0.3
+    with pytest.raises(InputError, match="out and radiance share memory"):
+        SpikeSensor("ideal", SHAPE).step(light, 4, out=memory.reshape(4, *SHAPE))
+    with pytest.raises(InputError, match="out is a list"):
+        SpikeSensor("ideal", SHAPE).step(light.copy(), 1, out=[1])  # type: ignore[arg-type]
+
+
+PLAIN = np.random.default_rng(3).uniform(0, 1, SHAPE).astype(np.float16).astype(np.float32)
+NO_LIGHT = {
+    "uint8": (200 * PLAIN).astype(np.uint8),
+    "int64": (200 * PLAIN).astype(int),
+    "a list of whole numbers": [[1] * SHAPE[1]] * SHAPE[0],
+    "bool": PLAIN > 0.5,
+    "complex": PLAIN + 0j,
+    "objects": PLAIN.astype(object),
+    "text": PLAIN.astype(str),
+    "dates": np.full(SHAPE, np.datetime64("2026-01-01")),
+    "masked": np.ma.masked_less(PLAIN, 0.5),
+    "masked rows": list(np.ma.masked_less(PLAIN, 0.5)),
+    "ragged": [[0.5] * 13, [0.5]],
+    "nothing": None,
+    "infinite in float32": np.full(SHAPE, 1e300),
+    "too large for any float": [[10**400] * SHAPE[1]] * SHAPE[0],
+}
+
+
+@pytest.mark.parametrize("kind", NO_LIGHT)
+def test_what_is_no_light_is_refused(kind: str) -> None:
+    with pytest.raises(InputError, match="radiance"):
+        SpikeSensor("ideal", SHAPE).step(NO_LIGHT[kind])
+    with pytest.raises(InputError, match=r"radiance|Keyframes need"):
+        Keyframes([0.0], [NO_LIGHT[kind]])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_light_of_any_layout_and_precision_gives_the_same_bits(engine: str) -> None:
+    expected = SpikeSensor("scsim", SHAPE, 1, engine).step(PLAIN, 40)
+    strided = np.repeat(PLAIN, 2, axis=1)[:, ::2]
+    layouts = (
+        PLAIN.astype(np.float16), PLAIN.astype(float), PLAIN.astype(np.longdouble), PLAIN.astype(">f4"),
+        np.asfortranarray(PLAIN), strided, PLAIN[::-1, ::-1].copy()[::-1, ::-1], PLAIN.tolist(),
+        np.ma.masked_array(PLAIN), np.frombuffer(PLAIN.tobytes(), np.float32).reshape(SHAPE),
+    )  # fmt: skip
+    for light in layouts:
+        np.testing.assert_array_equal(SpikeSensor("scsim", SHAPE, 1, engine).step(light, 40), expected)
+        keys = Keyframes(np.array([0], ">i4"), [light])
+        np.testing.assert_array_equal(SpikeSensor("scsim", SHAPE, 1, engine).step(keys, 40), expected)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [[3, 1], [1, 1], [0, np.nan], [0, np.inf], [0, 2.0**63], [0, 10**400], [False, True], ["0", "1"], [0, 1j],
+     np.array([0, 1], object), np.ma.masked_equal([0, 1], 1), [[0, 1]], np.array([0, 1], "M8[s]")],
+    ids=str,
+)  # fmt: skip
+def test_frames_of_keys_that_are_no_times_are_refused(frame) -> None:
+    with pytest.raises(InputError, match="Keyframes"):
+        Keyframes(frame, np.stack([PLAIN, PLAIN]))
+
+
+def test_keys_relative_to_a_call_are_doubted_aloud() -> None:
+    """Keys that begin at 0 in every call hold their last picture from the second call on."""
+    keys = Keyframes([0, 64], np.stack([PLAIN, 0.5 * PLAIN]))
+    sensor = SpikeSensor("scsim", SHAPE, 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sensor.step(keys, 64)
+        sensor.step(Keyframes([0], PLAIN[None]), 8)
+        sensor.step(Keyframes([72, 79], np.stack([PLAIN, PLAIN])), 8)
+    with pytest.warns(UserWarning, match="do not cover"):
+        sensor.step(Keyframes([0, 100], np.stack([PLAIN, PLAIN])), 64)
+    with pytest.warns(UserWarning, match=r"keys of frames 0 \.\. 64 do not cover .* the stream's absolute frames"):
+        sensor.step(keys, 64)
+    with pytest.warns(UserWarning, match="do not cover"):
+        sensor.step(Keyframes([1000, 1064], np.stack([PLAIN, PLAIN])), 8)
+
+
+@pytest.mark.parametrize("name", ["gain", "dark", "electrons", "kappa", "swing_V", "threshold_fC"])
+def test_units_that_are_no_law_are_refused(name: str) -> None:
+    unit = SCSIM.draw_unit(SHAPE, 0)
+    for bad in (-1.0, np.nan, np.inf, 1e300, *([] if name in ("gain", "dark", "kappa") else [1e-300])):
+        with pytest.raises(InputError, match=rf"unit\.{name} is .* at pixel 0"):
+            SpikeSensor("scsim", SHAPE, unit=replace(unit, **{name: np.full(unit.gain.size, bad)}))
+    with pytest.raises(InputError, match=r"unit\.shot = 'no'"):
+        SpikeSensor("scsim", SHAPE, unit=replace(unit, shot="no"))
+
+
+@pytest.mark.parametrize("bad", [True, -1, 1.0, "4", None, 10**5000], ids=lambda bad: type(bad).__name__)
+def test_counts_and_shapes_are_whole_numbers_that_fit(bad) -> None:
+    for call in (
+        lambda: SpikeSensor("ideal", SHAPE).step(PLAIN, bad),
+        lambda: SpikeSensor("ideal", (bad, 4)),
+    ):
+        with pytest.raises(InputError, match=r"frames|shape"):
+            call()

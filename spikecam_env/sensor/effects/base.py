@@ -36,7 +36,6 @@ rest from `feedback`; an effect that reacts to spikes and does not declare it, i
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 from collections.abc import Sequence
 from enum import IntEnum
@@ -45,7 +44,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import unknown_name
+from spikecam_env.sensor.ranges import check_parameters
+from spikecam_env.sensor.ranges import parameter as parameter
 from spikecam_env.sensor.unit import PixelArray, Unit
 
 Array = NDArray[np.float64]
@@ -178,11 +179,6 @@ class Feedback(NamedTuple):
     droop: float = 0.0
 
 
-def parameter(default: Any, *, unit: str, bounds: tuple[float, float] | None = None, doc: str) -> Any:
-    """Declare a parameter of an effect: its default, unit, allowed range and meaning."""
-    return dataclasses.field(default=default, metadata={"unit": unit, "bounds": bounds, "doc": doc})
-
-
 @dataclasses.dataclass(frozen=True)
 class Effect:
     """Base of all effects; every hook here does nothing.  Charge is in thresholds of each pixel.
@@ -201,20 +197,7 @@ class Effect:
         cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
     def __post_init__(self) -> None:
-        for f in dataclasses.fields(self):
-            value, bounds = getattr(self, f.name), f.metadata["bounds"]
-            if bounds is None:
-                continue
-            try:
-                number = float(value)
-            except (TypeError, ValueError):
-                number = math.nan
-            if not bounds[0] <= number <= bounds[1]:
-                raise InputError(
-                    f"{self.name}.{f.name} = {value!r} is outside {bounds[0]:g} .. {bounds[1]:g} {f.metadata['unit']}"
-                )
-            if isinstance(f.default, int) and not number.is_integer():
-                raise InputError(f"{self.name}.{f.name} = {value!r} must be a whole number")
+        check_parameters(self, self.name)
 
     @classmethod
     def neutralised(cls) -> Effect:

@@ -8,7 +8,7 @@ Source: paper (10)-(12); published 0.0497 V.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,5 +24,4 @@ class BiasVoltageSpread(Effect):
     strength = "sigma_V"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
-        swing = pixels.swing_V + self.sigma_V * rng.standard_normal(pixels.gain.shape)
-        return replace(pixels, swing_V=np.maximum(swing, 0.01 * pixels.circuit.swing_V))
+        return pixels.with_swings_off(self.sigma_V, rng.standard_normal(pixels.gain.shape))

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
 
 

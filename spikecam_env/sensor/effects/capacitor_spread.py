@@ -8,7 +8,7 @@ Source: paper (10); published 0.0128 fF.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,5 +24,4 @@ class CapacitorSpread(Effect):
     strength = "sigma_fF"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
-        capacitance = pixels.capacitance_fF + self.sigma_fF * rng.standard_normal(pixels.gain.shape)
-        return replace(pixels, capacitance_fF=np.maximum(capacitance, 0.01 * pixels.circuit.capacitance_fF))
+        return pixels.with_capacitances_off(self.sigma_fF, rng.standard_normal(pixels.gain.shape))

@@ -9,7 +9,7 @@ Source: EMVA 1288 release 4 (column non-uniformity); 5 mV is about 0.5 % of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,5 +25,4 @@ class ColumnFixedPattern(Effect):
     strength = "sigma_mV"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
-        offset = 1e-3 * self.sigma_mV * rng.standard_normal((1, pixels.gain.shape[1]))
-        return replace(pixels, swing_V=np.maximum(pixels.swing_V + offset, 0.01 * pixels.circuit.swing_V))
+        return pixels.with_swings_off(1e-3 * self.sigma_mV, rng.standard_normal((1, pixels.gain.shape[1])))

@@ -9,8 +9,7 @@ Source: comparator input noise, white and sampled once a spike; about 1 mV rms i
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,4 +25,4 @@ class ExcessThresholdNoise(Effect):
     strength = "sigma_mV"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
-        return replace(pixels, reset_noise_mV=math.hypot(pixels.reset_noise_mV, self.sigma_mV))
+        return pixels.with_reset_noise(self.sigma_mV)

@@ -22,6 +22,9 @@ from scipy.optimize import brentq
 
 from spikecam_env.sensor.effects.base import Effect, Stage, parameter
 
+_NO_BLUR = 1e-9
+"""[pixels] Below, the neighbours' weight is under 1e-18, and no float32 moves by it."""
+
 
 @dataclass(frozen=True)
 class OpticalBlur(Effect):
@@ -31,7 +34,7 @@ class OpticalBlur(Effect):
     strength = "sigma_pixels"
 
     def image(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
-        if self.sigma_pixels == 0:
+        if self.sigma_pixels < _NO_BLUR:
             return radiance
         kernel = gaussian_weights(self.sigma_pixels)
         return convolve1d(convolve1d(radiance, kernel, axis=0, mode="nearest"), kernel, axis=1, mode="nearest")

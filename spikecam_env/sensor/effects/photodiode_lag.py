@@ -14,8 +14,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
 
 

@@ -10,8 +10,7 @@ Source: paper (7), (12).
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,4 +26,4 @@ class ResetNoise(Effect):
     strength = "sigma_mV"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
-        return replace(pixels, reset_noise_mV=math.hypot(pixels.reset_noise_mV, self.sigma_mV))
+        return pixels.with_reset_noise(self.sigma_mV)

@@ -23,6 +23,7 @@ class ShotNoise(Effect):
         29648.0,
         unit="electrons",
         bounds=(2.0, math.inf),
+        largest=1e15,
         doc="electrons to a nominal threshold; C V / q by default, infinite for no shot noise",
     )
     dark_is_noisy: bool = parameter(

@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels import fast
 from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
 from spikecam_env.sensor.light import MAX_SEGMENT, Segment
@@ -119,7 +119,7 @@ def _goes_on(ready: Ready, segment: Segment) -> bool:
         return False
     if not steady and (segment.length, segment.first) != (ours.length, ours.first + ready.served):
         return False
-    return _equal(segment.radiance0, ours.radiance0) and (steady or _equal(segment.radiance1, ours.radiance1))
+    return same_light(segment.radiance0, ours.radiance0) and (steady or same_light(segment.radiance1, ours.radiance1))
 
 
 def _is_steady(segment: Segment) -> bool:
@@ -131,7 +131,8 @@ def _sample(segment: Segment) -> bytes:
     return segment.radiance0[::every].tobytes() + segment.radiance1[::every].tobytes()
 
 
-def _equal(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
+def same_light(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
+    """Whether two pictures have the same values, every pixel."""
     if a.flags.c_contiguous and a.flags.writeable:
         return bool(_same_words(a.view(np.uint32), b.view(np.uint32)))
     return np.array_equal(a, b)

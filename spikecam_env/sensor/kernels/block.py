@@ -95,9 +95,9 @@ def start(
     """Pixels part-way through a cycle; arguments as for `reference.start`."""
     pixels = fast.start(first.unit, phase, seed)
     charge = np.floor(phase * GRAINS)
-    inverse = 1.0 / first.unit.electrons if first.unit.shot else np.zeros(phase.size)
+    per_electron = fast.per_electron(first.unit)
     return BlockState(
-        BlockLaw(*first.unit.grains_per_frame, inverse, first.unit.kappa**2, pixels.law.polynomial),
+        BlockLaw(*first.unit.grains_per_frame, per_electron, first.unit.kappa**2, pixels.law.polynomial),
         charge,
         threshold=charge + pixels.remaining[: phase.size],
         fired=np.zeros(phase.size, dtype=np.uint32),

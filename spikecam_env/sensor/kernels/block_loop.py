@@ -20,11 +20,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
-from spikecam_env.sensor.light import GRAINS
+from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
 
 BAND = 1024
 """Pixels of a band: what is worked on frame after frame stays in the processor's cache."""
@@ -45,6 +45,8 @@ decay = njit(inline="always")(decayed)
 _U = np.uint32
 _Q = np.uint64
 _G = float(GRAINS)
+_MOST = float(MOST_GRAINS)
+_TRIPS = float(LEAST_LIMIT)
 
 # Rows of a band's scratch: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
 _HELD, _LIMIT, _PHI, _ARRIVES, _STANDS, _MOVED, _FACTOR, _LOAD, _NOISE, _JITTER, _ELECTRONS, _CROSSED, _AT, _UNTIL = (
@@ -260,7 +262,7 @@ def on_grid(charge):  # type: ignore[no-untyped-def]
 @njit(inline="always")
 def gets(light, dark):  # type: ignore[no-untyped-def]
     """Charge [grains] of a pixel in one frame, of light and dark [thresholds], neither of which takes any away."""
-    return on_grid((max(light, 0.0) + max(dark, 0.0)) * _G)
+    return on_grid(min((max(light, 0.0) + max(dark, 0.0)) * _G, _MOST))
 
 
 @njit(inline="always")
@@ -298,7 +300,7 @@ def references(grains_per_mV, field, phi, factor, common, load, moved, stands, l
     for j in range(limit.size):
         stands[j] = (_G * factor + moved[j]) * load
     for j in range(limit.size):
-        limit[j] = (phi[j] * factor + moved[j]) * load
+        limit[j] = max((phi[j] * factor + moved[j]) * load, _TRIPS)
 
 
 @njit(inline="always")
@@ -354,7 +356,7 @@ def fire(x, words, hit, live, groups, reset, polynomial):  # type: ignore[no-unt
             if not whole:
                 over, electrons = after_reset(over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept)
             phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
-            limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+            limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
             fires = hit[j] != 0
             words[_FIRED + j] = _U(words[_FIRED + j] + _U(hit[j]))
             x[_ELECTRONS + j] = electrons
@@ -390,7 +392,7 @@ def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-un
             if not whole:
                 over, electrons = after_reset(over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept)
             phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
-            limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+            limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
             fires = words[_DUE + j] != 0
             x[_ELECTRONS + j] = electrons if fires else x[_ELECTRONS + j]
             x[_HELD + j] = over if fires else x[_HELD + j]
@@ -413,7 +415,7 @@ def stay(x, hit, live, groups, end, left, left_tau):  # type: ignore[no-untyped-
             crossed = end - min(max(held / max(rate, 1e-12), 0.0), 1.0)
             stays = left * (decay(min((crossed - x[_CROSSED + j]) / left_tau, LONG)) - 1.0)
             phi = needed(x[_ELECTRONS + j] + stays, x[_NOISE + j], x[_JITTER + j], draws[_DRAW + j])
-            limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+            limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
             fires = hit[j] != 0
             x[_CROSSED + j] = crossed if fires else x[_CROSSED + j]
             x[_HELD + j] = on_grid((held - stays) * _G) if fires else x[_HELD + j]
@@ -466,7 +468,7 @@ def jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_t
                         over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept
                     )
                 phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
-                limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+                limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
                 due = words[_DUE + j] != 0
                 x[_ELECTRONS + j] = electrons
                 x[_HELD + j] = over if due else x[_HELD + j]
@@ -481,7 +483,7 @@ def jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_t
                     crossed = number + x[_AT + j] - min(max(held / max(rate, 1e-12), 0.0), 1.0)
                     stays = left * (decay(min((crossed - x[_CROSSED + j]) / left_tau, LONG)) - 1.0)
                     phi = needed(x[_ELECTRONS + j] + stays, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
-                    limit = (phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j]
+                    limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
                     due = words[_DUE + j] > words[_AGAIN + j]
                     x[_CROSSED + j] = crossed if due else x[_CROSSED + j]
                     x[_HELD + j] = on_grid((held - stays) * _G) if due else x[_HELD + j]

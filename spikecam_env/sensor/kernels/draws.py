@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels.loop import _GOLDEN as GOLDEN
 from spikecam_env.sensor.kernels.loop import bell, first_key, second_key
 

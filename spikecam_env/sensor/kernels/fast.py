@@ -34,6 +34,10 @@ _NO_WORDS = np.empty((0, 0), dtype=np.uint64)
 DENSE = 0.7
 """Spikes a pixel and frame from which on streaming frame by frame is faster than jumping."""
 
+FEWEST = MIN_ELECTRONS / 2
+"""Electrons to a threshold, at least, of which a spike's noise is drawn.  The law's shape is that of the median pixel:
+with the noise of fewer electrons, in the tail of a spread, it would reach below zero charge."""
+
 _WORTH_A_THREAD = 400_000
 """Pixel-steps below which handing work to another thread costs more than it saves (0.1 ms)."""
 
@@ -62,12 +66,16 @@ class PixelLaw:
     def of(cls, unit: Unit) -> PixelLaw:
         """The shape is fitted at the median pixel; the spread is each pixel's own."""
         gain, dark = unit.grains_per_frame
-        inverse = 1.0 / unit.electrons if unit.shot else np.zeros_like(unit.electrons)
-        spread = GRAINS * np.sqrt(inverse + unit.kappa**2)
+        spread = GRAINS * np.sqrt(per_electron(unit) + unit.kappa**2)
         return cls(_padded(gain), _padded(dark), _padded(spread.astype(np.float32)), _shape_of_law(unit))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> PixelLaw:
         return self  # never written to
+
+
+def per_electron(unit: Unit) -> NDArray[np.float64]:
+    """1/N of every pixel (P,), 0 without shot noise; N no less than FEWEST."""
+    return 1.0 / np.maximum(unit.electrons, FEWEST) if unit.shot else np.zeros(unit.electrons.size)
 
 
 @dataclass

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
 from spikecam_env.sensor.kernels.quantile import fitted_polynomial

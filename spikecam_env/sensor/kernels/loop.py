@@ -23,8 +23,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels.intrinsics import take_ticket, use_widest_vectors
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
 
@@ -46,6 +46,7 @@ _B = np.uint8
 _Q = np.uint64
 
 _GRAINS = _F(GRAINS)
+_LEAST = _F(1.0)  # grain to the next spike: no draw takes a pixel back in time
 _CAP = _F(MAX_GRAINS_PER_FRAME)
 _LONGEST = _F(MAX_SEGMENT)
 _GOLDEN_SIGNED = _I(0x9E3779B9 - (1 << 32))
@@ -109,7 +110,7 @@ def bell_of(word1: Any, word2: Any) -> Any:
 def charge_of(x: Any, spread: Any, c: Any) -> Any:
     """Grains to the next spike, of a draw of `bell`."""
     z = ((((((c[7] * x + c[6]) * x + c[5]) * x + c[4]) * x + c[3]) * x + c[2]) * x + c[1]) * x + c[0]
-    return _I(_GRAINS + spread * z)
+    return _I(max(_GRAINS + spread * z, _LEAST))
 
 
 @njit(inline="always")

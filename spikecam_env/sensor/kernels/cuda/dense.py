@@ -71,7 +71,7 @@ def _drawn(state: BatchState, camera: Tensor, pixel: Tensor) -> Tensor:
     z = c[7]
     for lower in c[6::-1]:
         z = z * x + lower
-    return (state.law.spread[camera, pixel] * z + float(GRAINS)).to(torch.int32)
+    return (state.law.spread[camera, pixel] * z + float(GRAINS)).clamp(min=1.0).to(torch.int32)
 
 
 def _bell(counter: Tensor, key: Tensor) -> Tensor:

@@ -146,7 +146,7 @@ def drawn(counter, key, spread, polynomial):
     z = tl.load(polynomial + 7)
     for i in tl.static_range(6, -1, -1):
         z = z * x + tl.load(polynomial + i)
-    return (spread * z + _GRAINS).to(tl.int32)
+    return tl.maximum(spread * z + _GRAINS, 1.0).to(tl.int32)
 
 
 @triton.jit

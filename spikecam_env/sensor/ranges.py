@@ -1,0 +1,84 @@
+"""Numbers with a unit and a range: declared where the field stands, checked whenever an instance is made.
+
+@dataclass(frozen=True)
+class Circuit:
+    reset_V: float = parameter(3.3, unit="V", bounds=(0.1, 20.0), doc="voltage a reset leaves")
+
+    def __post_init__(self) -> None:
+        check_parameters(self, "circuit")
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from spikecam_env.errors import InputError, shown
+
+
+def parameter(
+    default: Any = dataclasses.MISSING,
+    *,
+    unit: str,
+    bounds: tuple[float, float] | None = None,
+    largest: float | None = None,
+    doc: str,
+) -> Any:
+    """Declare a field: its default, unit, allowed range and meaning.
+
+    A default that is True or False makes a switch, a whole number a whole number, anything else a number.
+    bounds: lowest and highest value, both allowed; None for a switch.
+    largest: where the upper bound is infinite, the largest value besides infinity.
+    """
+    return dataclasses.field(default=default, metadata={"unit": unit, "bounds": bounds, "largest": largest, "doc": doc})
+
+
+def check_parameters(owner: Any, name: str) -> None:
+    """Check every declared field of a frozen dataclass, and keep its value as plain bool, int or float.
+
+    Raises InputError, `name.field = value ...`, for a value of another kind or outside its range.
+    """
+    for field in dataclasses.fields(owner):
+        if "bounds" in field.metadata:
+            value = _checked(getattr(owner, field.name), field, f"{name}.{field.name}".lstrip("."))
+            object.__setattr__(owner, field.name, value)
+
+
+def range_text(field: dataclasses.Field[Any]) -> str:
+    """The allowed range of a declared field in words, without its unit: `0 .. 1`, `2 .. 1e+12 or inf`; empty for a
+    switch."""
+    bounds, largest = field.metadata["bounds"], field.metadata["largest"]
+    if bounds is None:
+        return ""
+    return f"{bounds[0]:g} .. {bounds[1]:g}" if largest is None else f"{bounds[0]:g} .. {largest:g} or {bounds[1]:g}"
+
+
+def _checked(value: Any, field: dataclasses.Field[Any], place: str) -> bool | int | float:
+    if isinstance(field.default, bool):
+        if not isinstance(value, (bool, np.bool_)):
+            raise InputError(f"{place} = {shown(value)} must be true or false")
+        return bool(value)
+    low, high = field.metadata["bounds"]
+    largest = field.metadata["largest"]
+    number = _number(value)
+    if not low <= number <= high or (largest is not None and largest < number < math.inf):
+        raise InputError(f"{place} = {shown(value)} is outside {range_text(field)} {field.metadata['unit']}".rstrip())
+    if isinstance(field.default, int):
+        if not number.is_integer():
+            raise InputError(f"{place} = {shown(value)} must be a whole number")
+        return int(number)
+    return number + 0.0  # of -0.0 too: 0.0
+
+
+def _number(value: Any) -> float:
+    """As float; NaN, which is in no range, for what is no number (text, True, arrays, None) or too large for one."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return math.nan
+    try:
+        return float(value)
+    except (OverflowError, ValueError):
+        return math.nan

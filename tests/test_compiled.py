@@ -1,0 +1,138 @@
+"""Compiled code runs where the package does: read-only, without a home, on a full disk; kept where no other writes."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from spikecam_env import compiled
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("spikecam_env", "scenes", "denoiser")
+BOUND_BY_MODES = ["setpriv", "--bounding-set=-dac_override,-dac_read_search", "--inh-caps=-all"]
+"""Makes root heed permission bits."""
+
+USES_A_KERNEL = """
+import numpy as np
+from spikecam_env.sensor.kernels import ahead
+a = np.ones(5, np.float32)
+assert ahead.same_light(a, a)
+print(sum(ahead._same_words.stats.cache_hits.values()), "from the cache")
+"""
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Iterator[Path]:
+    """A copy of the packages and a home, neither of which can be written to."""
+    package = tmp_path / "package"
+    for name in PACKAGES:
+        shutil.copytree(ROOT / name, package / name, ignore=shutil.ignore_patterns("__pycache__", "*.pt"))
+    (tmp_path / "home").mkdir()
+    (tmp_path / "tmp").mkdir()
+    closed = [tmp_path / "home", package, *package.rglob("*")]
+    for path in closed:
+        path.chmod(path.stat().st_mode & ~0o222)
+    yield tmp_path
+    for path in closed:
+        path.chmod(path.stat().st_mode | 0o200)
+
+
+def run(folder: Path, *arguments: str) -> str:
+    """Output of Python with a read-only package, no home to write to, and TMPDIR in `folder`."""
+    as_user = BOUND_BY_MODES if os.getuid() == 0 else []
+    if as_user and not shutil.which("setpriv"):
+        pytest.skip("root writes everywhere, and there is no setpriv to hold it back")
+    environment = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    environment |= {
+        "HOME": str(folder / "home"),
+        "TMPDIR": str(folder / "tmp"),
+        "PYTHONPATH": str(folder / "package"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    done = subprocess.run(
+        [*as_user, sys.executable, *arguments], env=environment, cwd=folder, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_read_only_package_without_a_home_runs_and_keeps_what_it_compiles(read_only: Path) -> None:
+    assert "tau_us" in run(read_only, "-m", "spikecam_env", "effects", "dead_time")
+    assert run(read_only, "-c", USES_A_KERNEL) == "0 from the cache\n"
+    assert run(read_only, "-c", USES_A_KERNEL) == "1 from the cache\n"
+    kept = read_only / "tmp" / f"spikecam-env-{os.getuid()}"
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o700
+    assert list(kept.rglob("ahead._same_words*.nbc"))
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Where the private folder is looked for, instead of among the machine's temporary files."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    compiled.private_folder.cache_clear()
+    yield tmp_path / f"spikecam-env-{os.getuid()}"
+    compiled.private_folder.cache_clear()
+
+
+def test_a_private_folder_is_made_for_its_user_alone(temporary: Path) -> None:
+    assert compiled.private_folder() == temporary
+    assert stat.S_IMODE(temporary.stat().st_mode) == 0o700
+    compiled.private_folder.cache_clear()
+    assert compiled.private_folder() == temporary
+
+
+@pytest.mark.parametrize("trap", ["others may write", "a link", "a file", "somebody else's"])
+def test_code_is_not_kept_where_others_could_put_theirs(trap: str, temporary: Path, monkeypatch) -> None:
+    if trap == "others may write":
+        temporary.mkdir()
+        temporary.chmod(0o777)
+    elif trap == "a link":
+        (temporary.parent / "theirs").mkdir(mode=0o700)
+        temporary.symlink_to(temporary.parent / "theirs")
+    elif trap == "a file":
+        temporary.touch()
+    else:
+        uid = os.getuid()
+        temporary.with_name(f"spikecam-env-{uid + 1}").mkdir(mode=0o700)
+        monkeypatch.setattr(os, "getuid", lambda: uid + 1)
+    assert compiled.private_folder() is None
+
+
+def no_place(dispatcher: object) -> None:
+    raise RuntimeError("cannot cache function: no locator available")
+
+
+def test_without_any_place_for_a_cache_functions_are_compiled_all_the_same(monkeypatch) -> None:
+    from numba.core.dispatcher import Dispatcher
+
+    monkeypatch.setattr(Dispatcher, "enable_caching", no_place)
+    for folder in (None, Path("/nowhere")):
+        monkeypatch.setattr(compiled, "private_folder", lambda folder=folder: folder)
+        assert compiled.njit(cache=True)(lambda x: x + 1)(2) == 3
+
+
+def test_a_full_disk_loses_the_cache_and_not_the_result(monkeypatch) -> None:
+    from numba.core.caching import FunctionCache
+
+    def full(*arguments: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(FunctionCache, "_save_overload", full)
+    doubled = compiled.njit(cache=True)(lambda x: 2 * x)
+    assert doubled(4) == 8
+    assert doubled._cache.cache_path
+
+
+def test_all_compiled_code_is_decorated_in_one_place() -> None:
+    files = [f for name in PACKAGES for f in (ROOT / name).rglob("*.py") if f.name != "compiled.py"]
+    others = re.compile(r"numba\.(njit|jit)\b|from numba import .*\bn?jit\b|cache=True.*\bvectorize")
+    assert not [str(f.relative_to(ROOT)) for f in files if others.search(f.read_text(encoding="utf-8"))]
