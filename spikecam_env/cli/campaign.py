@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from spikecam_env.cli.camera import Camera
 from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
+from spikecam_env.cli.reading import Reading
 
 if TYPE_CHECKING:
     from spikecam_env.calibration import Campaign as Folder
@@ -66,7 +67,7 @@ class Simulate:
 
 @dataclass
 class Import:
-    """Make a campaign of a real camera's files: .dat, .npz, .h5 recordings, rates, flat maps.
+    """Make a campaign of a real camera's files: recordings in any format, rates, flat maps.
 
     example:  spikecam campaign import recordings wall --label wall.npz=unknown --frame-rate-hz 40000
     """
@@ -90,20 +91,7 @@ class Import:
     """Share of every recording, its end, to hold out for judging."""
     radiance_per_unit: Positive = 1.0
     """Radiance that 1 in the labels is, if they are in lux or another unit."""
-    height: Count | None = None
-    """Rows in .dat files; default 250."""
-    width: Count | None = None
-    """Columns in .dat files; default 400."""
-    crop_width: Count | None = None
-    """Columns of .dat files that are pixels, from the left."""
-    flip: bool = False
-    """Files store the bottom row first, as public Vidar .dat do."""
-    bit_order: Literal["little", "big"] | None = None
-    """First pixel in the least or the most significant bit."""
-    time_axis: int | None = None
-    """Axis of time in .npz files: 0 or 2; default told from the spikes."""
-    key: str | None = None
-    """Name of the array in .npz files."""
+    reading: Reading = field(default_factory=Reading)
     outside: bool = False
     """Read files that labels name outside of the folder too."""
 
@@ -111,11 +99,6 @@ class Import:
         from spikecam_env.gap import import_campaign, label_from_text, labels_from_table
 
         labels = labels_from_table(self.table) if self.table else ()
-        reading = {
-            name: getattr(self, name)
-            for name in ("height", "width", "crop_width", "bit_order", "time_axis", "key")
-            if getattr(self, name) is not None
-        }
         report(
             import_campaign(
                 self.folder,
@@ -128,8 +111,7 @@ class Import:
                 radiance_per_unit=self.radiance_per_unit,
                 outside=self.outside,
                 progress=True,
-                **reading,
-                **({"flip": True} if self.flip else {}),
+                **self.reading.options(),
             )
         )
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import tyro
 
 from spikecam_env.cli.options import Count
+from spikecam_env.cli.reading import Reading
 
 
 @dataclass
@@ -19,7 +20,8 @@ class Denoise:
     """
 
     file: tyro.conf.Positional[Path]
-    """.h5 (from `spikecam record`), .npz (a spike array) or .dat (raw Vidar bits)."""
+    """.h5 (of `spikecam record`, or an array in another), .npz, .npy, .mat (a spike array), .dat (Vidar bits), .raw,
+    .bin (a byte a pixel)."""
     out: Path = Path("denoised")
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Literal["best", "paper"] = "best"
@@ -28,20 +30,7 @@ class Denoise:
     """Frames averaged in the pictures (TFP window); odd."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised."""
-    height: Count | None = None
-    """Rows of a .dat file (250 if not given)."""
-    width: Count | None = None
-    """Columns of a .dat file (400 if not given)."""
-    crop_width: Count | None = None
-    """Columns of a .dat file to keep, where it holds wider rows (416 for 400)."""
-    flip: bool = False
-    """The file is stored bottom row first (public Vidar files are)."""
-    bit_order: Literal["little", "big"] | None = None
-    """Which bit of a .dat byte comes first (little if not given)."""
-    key: str | None = None
-    """Array of an .npz file to read; found by itself where there is only one candidate."""
-    time_axis: Literal[0, 1, 2] | None = None
-    """Which axis of an .npz array is time; found by itself where that is clear."""
+    reading: Reading = field(default_factory=Reading)
 
     def run(self) -> None:
         import numpy as np
@@ -57,9 +46,8 @@ class Denoise:
 
         if self.window % 2 == 0:
             raise InputError(f"--window {self.window}; it must be odd and at least 1 (41 is usual)")
-        names = ("height", "width", "crop_width", "bit_order", "key", "time_axis")
-        options = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        recording = read_recording(self.file, **options, **({"flip": True} if self.flip else {}))
+        recording = read_recording(self.file, **self.reading.options())
+        print(f"{self.file}: {recording}")
         noisy = recording.spikes
         frames = picture_frames(len(noisy), self.window)
         with out_folder(self.out) as folder:

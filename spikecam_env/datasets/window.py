@@ -10,13 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane
-from spikecam_env.streams.hdf5 import CHUNK_FRAMES, open_recording, read_crop
+from spikecam_env.streams.hdf5 import CHUNK_FRAMES, OpenRecording, open_recording
 
 FIRST_REACH = 32
 """Frames of the clean stream read on either side at first."""
@@ -39,25 +38,25 @@ def read_window(
     `isi_plane(clean, frame, normalised=True)` of the whole clean stream, to the bit.
     Errors: InputError if the window or the crop leaves the recording, or it has no clean twin.
     """
-    with open_recording(path) as file:
-        if "clean" not in file:
+    with open_recording(path) as recording:
+        if "clean" not in recording.streams:
             raise InputError(f"{path} holds no clean twin; make it with `spikecam dataset`")
-        height, width = int(file.attrs["height"]), int(file.attrs["width"])
+        height, width = recording.shape
         across, along = _inside(rows, height, "rows", path), _inside(columns, width, "columns", path)
-        window = _inside(slice(frame - reach, frame + reach + 1), len(file["spikes"]), "frames", path)
-        spikes = read_crop(file["spikes"], width, window, across, along)
-        return Window(spikes, _clean_plane(file["clean"], width, frame, across, along))
+        window = _inside(slice(frame - reach, frame + reach + 1), recording.frames("spikes"), "frames", path)
+        spikes = recording.read_crop("spikes", window, across, along)
+        return Window(spikes, _clean_plane(recording, frame, across, along))
 
 
-def _clean_plane(stream: h5py.Dataset, width: int, frame: int, rows: slice, columns: slice) -> NDArray[np.float32]:
-    reach = FIRST_REACH
+def _clean_plane(recording: OpenRecording, frame: int, rows: slice, columns: slice) -> NDArray[np.float32]:
+    reach, frames = FIRST_REACH, recording.frames("clean")
     while True:
         first = max(0, (frame - reach) // CHUNK_FRAMES * CHUNK_FRAMES)
-        stop = min(len(stream), -(-(frame + reach) // CHUNK_FRAMES) * CHUNK_FRAMES)
-        spikes = read_crop(stream, width, slice(first, stop), rows, columns)
+        stop = min(frames, -(-(frame + reach) // CHUNK_FRAMES) * CHUNK_FRAMES)
+        spikes = recording.read_crop("clean", slice(first, stop), rows, columns)
         at = frame - first
         starts = first == 0 or spikes[: at + 1].any(axis=0).all()
-        ends = stop == len(stream) or spikes[at + 1 :].any(axis=0).all()
+        ends = stop == frames or spikes[at + 1 :].any(axis=0).all()
         if starts and ends:
             return isi_plane(spikes, at, normalised=True)
         reach *= 2

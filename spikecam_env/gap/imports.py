@@ -33,7 +33,7 @@ from spikecam_env.gap.labels import READING, RELATIVE, UNKNOWN, Label
 from spikecam_env.names import file_name, inside
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import read_recording
-from spikecam_env.streams.recording import reading_options
+from spikecam_env.streams.recording import ENDINGS, reading_options
 from spikecam_env.untrusted import array_names
 from spikecam_env.whole import whole_folder
 
@@ -260,5 +260,5 @@ def _agreed_frame_rate(frame_rate_hz: float | None, piece: _Piece) -> float | No
 
 
 def _listing(folder: Path) -> str:
-    found = sorted(p.name for p in folder.iterdir() if p.suffix.lower() in (".dat", ".npz", ".h5", ".hdf5"))
-    return f"{folder} holds {', '.join(found) or 'no recordings (.dat, .npz, .h5)'}"
+    found = sorted(p.name for p in folder.iterdir() if p.suffix.lower() in ENDINGS)
+    return f"{folder} holds {', '.join(found) or 'no recordings (' + ', '.join(ENDINGS) + ')'}"

@@ -21,7 +21,10 @@ from spikecam_env.untrusted import read_table
 
 UNKNOWN, RELATIVE = "unknown", "relative"
 
-READING = ("height", "width", "flip", "bit_order", "crop_width", "key", "time_axis", "first", "count")
+READING = (
+    *("height", "width", "flip", "bit_order", "crop_width", "layout"),
+    *("key", "item", "batch_axis", "time_axis", "first", "count"),
+)
 """Options of `read_recording`, here also columns of a table."""
 
 _COLUMNS = ("file", "radiance", "name", "use", "v_d", "temperature_k", "note", *READING)
@@ -86,7 +89,7 @@ def _label(row: Mapping[str, str], where: str) -> Label:
 
 
 def _reading_cell(name: str, text: str, where: str) -> Any:
-    if name in ("bit_order", "key"):
+    if name in ("bit_order", "layout", "key"):
         return text
     if name == "flip":
         if text.lower() not in ("true", "false", "0", "1"):

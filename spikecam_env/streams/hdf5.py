@@ -8,22 +8,42 @@ attributes        format = "spikecam-recording/1", height, width, package_versio
 
 Spikes are stored in chunks of CHUNK_FRAMES frames x CHUNK_ROWS rows, so that a window of a crop is read without the
 rest.  The same calls write the same bytes: the file holds no time of its making.
+
+Every byte that matters is under a checksum: arrays by the filter fletcher32, all else by HDF5's own (library versions
+from 1.10); text is stored in place, since the heap of HDF5's text of varying length has none.  Files without
+checksums, from earlier versions of this package, open as well.
 """
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import ConfigDict
 
+from spikecam_env.checked import checked_number, shown
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
-from spikecam_env.streams.files import check_range, existing_file
-from spikecam_env.streams.packing import as_spikes, check_shape, pack_frames, packed_bytes, unpack_frames
+from spikecam_env.streams.files import check_range
+from spikecam_env.streams.packing import as_spikes, check_shape, pack_checked, packed_bytes, unpack_frames
+from spikecam_env.untrusted import (
+    Count,
+    Declared,
+    Positive,
+    declared,
+    hdf5_attributes,
+    hdf5_item,
+    hdf5_values,
+    open_hdf5,
+)
 from spikecam_env.version import __version__
 from spikecam_env.whole import beside_path
 
@@ -31,8 +51,10 @@ FORMAT = "spikecam-recording/1"
 CHUNK_FRAMES = 32
 CHUNK_ROWS = 16
 CACHE_BYTES = 1 << 24
-LIBRARY_VERSIONS = ("earliest", "v110")
+LIBRARY_VERSIONS = ("v110", "v110")
 """Oldest and newest HDF5 format features in the files; fixed, so that bytes do not depend on the library's default."""
+MOST_COMPRESSED = 1100
+"""Largest ratio of an array's bytes to those stored that is believed; gzip reaches 1032 on zeros."""
 COMPRESSED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 RESERVED = ("format", "height", "width", "frame_rate_hz", "package_version")
 
@@ -62,7 +84,9 @@ class SpikeWriter:
 
     def __enter__(self) -> SpikeWriter:
         self._file = h5py.File(self._beside, "w", libver=LIBRARY_VERSIONS, rdcc_nbytes=CACHE_BYTES)
-        self._file.attrs.update(self._attributes)
+        for name, value in self._attributes.items():
+            text = h5py.string_dtype("utf-8", max(1, len(value))) if isinstance(value, bytes) else None
+            self._file.attrs.create(name, value, dtype=text)
         self._make_stream("spikes")
         return self
 
@@ -90,13 +114,15 @@ class SpikeWriter:
         if set(streams) != {"spikes", "clean"} & set(file) or len({len(frames) for frames in streams.values()}) > 1:
             raise InputError("spikes and clean must come together, as many frames of each, in every call or in none")
         for name, frames in streams.items():
-            _grow(file[name], pack_frames(frames))
+            _grow(file[name], pack_checked(frames))
 
     def append_truth(self, frame: float, **arrays: ArrayLike) -> None:
         """Add ground truth at a frame, e.g. radiance, flow: the same names, shapes and dtypes at each call."""
         group = self._open_file().require_group("truth")
         for name, value in {"frame": np.float64(frame), **arrays}.items():
             array = np.asarray(value)
+            if array.dtype.kind not in "biuf" or not array.size:
+                raise InputError(f"truth {name} is {array.dtype} of shape {array.shape}; it must be real numbers")
             if name not in group:
                 group.create_dataset(
                     name,
@@ -104,16 +130,23 @@ class SpikeWriter:
                     array.dtype,
                     maxshape=(None, *array.shape),
                     chunks=(1, *array.shape),
+                    fletcher32=True,
                     **(COMPRESSED if array.ndim else {}),
                 )
-            if group[name].shape[1:] != array.shape:
-                raise InputError(f"truth {name} is {array.shape}; it was {group[name].shape[1:]} before")
+            before = group[name]
+            if (before.shape[1:], before.dtype) != (array.shape, array.dtype):
+                raise InputError(
+                    f"truth {name} is {array.dtype} of shape {array.shape}; "
+                    f"it was {before.dtype} of shape {before.shape[1:]} before"
+                )
             _grow(group[name], array[None])
 
     def _make_stream(self, name: str) -> None:
         size = packed_bytes(self.shape)
         chunk = (CHUNK_FRAMES, min(size, CHUNK_ROWS * self.shape[1] // 8))
-        self._open_file().create_dataset(name, (0, size), np.uint8, maxshape=(None, size), chunks=chunk)
+        self._open_file().create_dataset(
+            name, (0, size), np.uint8, maxshape=(None, size), chunks=chunk, fletcher32=True
+        )
 
     def _checked(self, spikes: ArrayLike) -> NDArray[np.uint8]:
         frames = as_spikes(spikes)
@@ -135,57 +168,141 @@ def read_hdf5(
     """A recording -> (T, H, W) uint8 spikes and its attributes; only the frames asked are read.
 
     stream: "spikes", or "clean" for the noise-free twin's.
-    Errors: InputError if the file is absent, truncated, not HDF5, of another format, or has no such stream.
+    Raises InputError if the file is absent, truncated, damaged, not HDF5, of another format, declares more than it
+    stores, or has no such stream.
     """
-    with open_recording(path) as file:
-        if stream not in ("spikes", "clean") or stream not in file:
-            raise unknown_name(f"stream of {path}", stream, {"spikes", "clean"} & set(file))
-        attributes = {name: _plain(value) for name, value in file.attrs.items()}
-        shape = (attributes["height"], attributes["width"])
-        first, stop = check_range(first, count, len(file[stream]), str(path))
-        return unpack_frames(file[stream][first:stop], shape), attributes
-
-
-def read_crop(stream: h5py.Dataset, width: int, frames: slice, rows: slice, columns: slice) -> NDArray[np.uint8]:
-    """(frames, rows, columns) uint8 of 0 and 1 from a packed stream of an open recording of this width.
-
-    The slices have start and stop, within the stream.  Read are the chunks that hold these frames and rows.
-    """
-    first_byte, skipped = divmod(rows.start * width, 8)
-    bits = (rows.stop - rows.start) * width
-    packed = stream[frames, first_byte : first_byte + -(-(skipped + bits) // 8)]
-    pixels = np.unpackbits(packed, axis=1, count=skipped + bits, bitorder="little")[:, skipped:]
-    return np.ascontiguousarray(pixels.reshape(len(packed), -1, width)[:, :, columns])
+    with open_recording(path) as recording:
+        if stream not in recording.streams:
+            raise unknown_name(f"stream of {path}", stream, recording.streams)
+        first, stop = check_range(first, count, recording.frames(stream), str(path))
+        packed = recording.read(stream, slice(first, stop))
+        return unpack_frames(packed, recording.shape), recording.attributes
 
 
 def read_truth(path: str | Path) -> dict[str, NDArray[Any]]:
     """Ground truth beside a recording: name -> (N, ...), with "frame" (N,); empty where there is none."""
-    with open_recording(path) as file:
-        return {name: dataset[:] for name, dataset in file["truth"].items()} if "truth" in file else {}
+    with open_recording(path) as recording, _damage_named(path):
+        if "truth" not in recording.file.keys():  # noqa: SIM118 - `in` follows links
+            return {}
+        group = hdf5_item(recording.file, "truth", str(path))
+        if not isinstance(group, h5py.Group):
+            raise InputError(f"{path}: truth is an array; it must be a group of arrays")
+        return {name: hdf5_values(group, name, f"{path}: truth") for name in group}
 
 
-def open_recording(path: str | Path) -> h5py.File:
-    """The file, open for reading; raises InputError as `read_hdf5` does."""
-    source = existing_file(path)
+@dataclass(frozen=True)
+class OpenRecording:
+    """An HDF5 recording, open for reading.
+
+    shape: (rows, columns).  streams: names of the packed streams in it, "spikes" and perhaps "clean".
+    """
+
+    file: h5py.File
+    path: Path
+    shape: tuple[int, int]
+    attributes: dict[str, Any]
+    streams: dict[str, h5py.Dataset]
+
+    def frames(self, stream: str) -> int:
+        """Length of a stream [frames]."""
+        return len(self.streams[stream])
+
+    def read(self, stream: str, frames: slice, columns: slice = slice(None)) -> NDArray[np.uint8]:
+        """Packed frames, or their part from byte to byte; raises InputError where they are damaged."""
+        return hdf5_values(self.file, stream, str(self.path), (frames, columns))
+
+    def read_crop(self, stream: str, frames: slice, rows: slice, columns: slice) -> NDArray[np.uint8]:
+        """(frames, rows, columns) uint8 of 0 and 1.
+
+        The slices have start and stop, within the stream.  Read are the chunks that hold these frames and rows.
+        """
+        width = self.shape[1]
+        first_byte, skipped = divmod(rows.start * width, 8)
+        bits = (rows.stop - rows.start) * width
+        packed = self.read(stream, frames, slice(first_byte, first_byte + -(-(skipped + bits) // 8)))
+        pixels = np.unpackbits(packed, axis=1, count=skipped + bits, bitorder="little")[:, skipped:]
+        return np.ascontiguousarray(pixels.reshape(len(packed), -1, width)[:, :, columns])
+
+
+class _Header(Declared):
+    """Attributes that every recording has; those that a writer added are his."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    format: Literal["spikecam-recording/1"]
+    height: Count
+    width: Count
+    frame_rate_hz: Positive | None = None
+
+
+@contextmanager
+def open_recording(path: str | Path) -> Iterator[OpenRecording]:
+    """The recording, open for reading inside the `with` block; raises InputError as `read_hdf5` does."""
+    with open_hdf5(path) as file:
+        with _damage_named(path):
+            recording = _opened(file, Path(path))
+        yield recording
+
+
+def _opened(file: h5py.File, path: Path) -> OpenRecording:
+    where = str(path)
+    attributes = hdf5_attributes(file, where)
+    if attributes.get("format") != FORMAT:
+        found = attributes.get("format", "no format attribute")
+        raise InputError(f"{where} is not a recording of this package: found {shown(found)}, need {FORMAT!r}")
+    header = declared(_Header, attributes, where)
+    shape = check_shape((header.height, header.width), f"{where}: (height, width)")
+    held = [name for name in ("spikes", "clean") if name == "spikes" or name in file.keys()]  # noqa: SIM118
+    return OpenRecording(file, path, shape, attributes, {name: _stream(file, name, shape, where) for name in held})
+
+
+@contextmanager
+def _damage_named(path: str | Path) -> Iterator[None]:
+    """Whatever h5py raises over a damaged file becomes an InputError that names it."""
     try:
-        file = h5py.File(source, "r")
-    except OSError as error:
-        raise InputError(f"{source} is truncated or not an HDF5 file ({error}); record it again") from error
-    if file.attrs.get("format") == FORMAT and {"height", "width"} <= set(file.attrs) and "spikes" in file:
-        return file
-    found = file.attrs.get("format", "no format attribute")
-    file.close()
-    raise InputError(f"{source} is not a recording of this package: found {found!r}, need {FORMAT!r}")
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # OSError, RuntimeError, KeyError, ...: as many as there are ways to damage a file
+        raise InputError(f"{path} cannot be read ({shown(str(error))}); it is damaged") from error
+
+
+def is_recording(path: str | Path) -> bool:
+    """Whether an HDF5 file says it is a recording of this package; raises InputError where it is no HDF5 file."""
+    with open_hdf5(path) as file:
+        return bool(hdf5_attributes(file, str(path)).get("format") == FORMAT)
+
+
+def check_stored(dataset: h5py.Dataset, where: str) -> None:
+    """Raises InputError where an array declares more than is stored: what lacks would be read as zeros."""
+    declared_bytes = math.prod(dataset.shape) * dataset.dtype.itemsize
+    most = 1 if dataset.compression is None else MOST_COMPRESSED
+    if declared_bytes > most * dataset.id.get_storage_size():
+        raise InputError(
+            f"{where} declares {dataset.dtype} of shape {dataset.shape}, {declared_bytes} bytes; "
+            f"it stores {dataset.id.get_storage_size()}"
+        )
+
+
+def _stream(file: h5py.File, name: str, shape: tuple[int, int], where: str) -> h5py.Dataset:
+    found = hdf5_item(file, name, where)
+    if not isinstance(found, h5py.Dataset) or found.shape is None:
+        raise InputError(f"{where}: {name} is no array")
+    if found.dtype != np.uint8 or found.ndim != 2 or found.shape[1] != packed_bytes(shape):
+        raise InputError(
+            f"{where}: {name} is {found.dtype} of shape {found.shape}; {shape[0]} x {shape[1]} pixels need uint8 of "
+            f"shape (frames, {packed_bytes(shape)})"
+        )
+    check_stored(found, f"{where}: {name}")
+    return found
 
 
 def _file_attributes(
     shape: tuple[int, int], frame_rate_hz: float | None, added: dict[str, object]
 ) -> dict[str, object]:
-    for name, value in added.items():
+    for name in added:
         if name in RESERVED:
             raise InputError(f"attribute {name} is written by the recording itself; choose another name")
-        if not isinstance(value, str | int | float | bool | np.number):
-            raise InputError(f"attribute {name} is a {type(value).__name__}; give text, a number or a bool")
     own: dict[str, object] = {
         "format": FORMAT,
         "height": shape[0],
@@ -193,10 +310,8 @@ def _file_attributes(
         "package_version": __version__,
     }
     if frame_rate_hz is not None:
-        if not 0 < frame_rate_hz < np.inf:
-            raise InputError(f"frame_rate_hz is {frame_rate_hz}; it must be positive, or None where unknown")
-        own["frame_rate_hz"] = float(frame_rate_hz)
-    return {**own, **added}
+        own["frame_rate_hz"] = checked_number(frame_rate_hz, "frame_rate_hz", 0, above=True, unit="Hz")
+    return {name: _storable(value, name) for name, value in {**own, **added}.items()}
 
 
 def _grow(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
@@ -204,5 +319,17 @@ def _grow(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
     dataset[len(dataset) - len(rows) :] = rows
 
 
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
+def _storable(value: object, name: str) -> object:
+    """A value as h5py takes it: text as bytes, which lie in place; raises InputError for what HDF5 cannot hold."""
+    if isinstance(value, str):
+        if "\0" in value:
+            raise InputError(f"attribute {name} has a zero character; give other text")
+        try:
+            return value.encode()
+        except UnicodeEncodeError as error:
+            raise InputError(f"attribute {name} = {shown(value)} has no UTF-8; give other text") from error
+    if not isinstance(value, int | float | bool | np.integer | np.floating):
+        raise InputError(f"attribute {name} is a {type(value).__name__}; give text, a number or a bool")
+    if isinstance(value, int) and not -(2**63) <= value < 2**64:
+        raise InputError(f"attribute {name} = {shown(value)}; it must be a number of 64 bits")
+    return value

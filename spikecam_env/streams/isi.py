@@ -12,6 +12,7 @@ data, one frame after them, or one frame after the look-ahead): a lower bound on
 
 `future` is the look-ahead in frames.  Plane t depends on frames 0 .. t + future only, so a causal
 filter that lags by `future` frames computes the same plane.  None looks to the end of the data.
+Intervals are exact to 2^24 frames (7 minutes at 40 kHz); a longer one is the nearest float32.
 Normalised plane: 1 / ISI, in (0, 1], an estimate of the rate [spikes/frame].  Source: DESIGN section 5.
 """
 
@@ -23,6 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import as_spikes
+
+MOST_FRAMES = 2**31 - 1
+"""Frames are counted in int32; 15 hours at 40 kHz."""
 
 
 def isi_plane(spikes: ArrayLike, t: int, *, future: int | None = None, normalised: bool = False) -> NDArray[np.float32]:
@@ -54,15 +58,19 @@ def isi_planes(
     if future is not None and future < 0:
         raise InputError(f"future is {future}; it is a look-ahead in frames, 0 or more")
     ahead = count if future is None else future
+    if count >= MOST_FRAMES:
+        raise InputError(f"a stream of {count} frames; intervals are counted over fewer than {MOST_FRAMES}")
     flat = np.ascontiguousarray(frames).reshape(count, -1)
     planes = np.empty((stop - start, flat.shape[1]), np.float32)
-    _isi(flat, start, stop, min(ahead, count), normalised, planes)
+    _isi(flat, start, stop, min(ahead, count), normalised, planes, planes.view(np.int32))
     return planes.reshape(stop - start, *frames.shape[1:])
 
 
 # Not parallel: numba's OpenMP layer changes torch's number of threads, and the networks then ran 60 times slower.
 @njit(cache=True, nogil=True)
-def _isi(spikes, start, stop, ahead, normalised, planes):  # pragma: no cover - compiled
+def _isi(spikes, start, stop, ahead, normalised, planes, last_of):  # pragma: no cover - compiled
+    """Fill `planes`.  last_of: the same memory as int32, which holds last(t) until the interval is known: float32 would
+    round frames beyond 2^24."""
     count, pixels = spikes.shape
     strip = 2048
     for s in range((pixels + strip - 1) // strip):
@@ -74,14 +82,14 @@ def _isi(spikes, start, stop, ahead, normalised, planes):  # pragma: no cover - 
                     last[i] = t
             if t >= start:
                 for i in range(b - a):
-                    planes[t - start, a + i] = last[i]
+                    last_of[t - start, a + i] = last[i]
         horizon = min(count, stop + ahead)
         following = np.full(b - a, horizon, np.int32)
         for t in range(horizon - 1, start - 1, -1):
             if t < stop:
                 limit = min(t + ahead + 1, count)
                 for i in range(b - a):
-                    interval = np.float32(min(following[i], limit)) - planes[t - start, a + i]
+                    interval = np.float32(min(following[i], limit) - last_of[t - start, a + i])
                     planes[t - start, a + i] = np.float32(1.0) / interval if normalised else interval
             for i in range(b - a):
                 if spikes[t, a + i]:

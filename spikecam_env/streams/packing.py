@@ -19,8 +19,12 @@ BitOrder = Literal["little", "big"]
 
 
 def pack_frames(spikes: ArrayLike, *, bit_order: BitOrder = "little") -> NDArray[np.uint8]:
-    """(T, H, W) spikes -> (T, ceil(H W / 8)) uint8."""
-    frames = as_spikes(spikes)
+    """(T, H, W) spikes -> (T, ceil(H W / 8)) uint8; raises InputError as `as_spikes` does."""
+    return pack_checked(as_spikes(spikes), bit_order)
+
+
+def pack_checked(frames: NDArray[np.uint8], bit_order: BitOrder = "little") -> NDArray[np.uint8]:
+    """`pack_frames` of frames that `as_spikes` gave."""
     flat = frames.reshape(frames.shape[0], frames.shape[1] * frames.shape[2])
     return np.packbits(flat, axis=1, bitorder=check_bit_order(bit_order))
 
@@ -49,10 +53,17 @@ def packed_bytes(shape: tuple[int, int]) -> int:
 
 
 def as_spikes(spikes: ArrayLike) -> NDArray[np.uint8]:
-    """The stream as (T, H, W) uint8, without a copy where it is uint8, int8 or bool already.
+    """The stream as (T, H, W) uint8 of 0 and 1, without a copy where it is uint8, int8 or bool already.
 
-    Errors: InputError for another dtype or number of axes.
+    Raises InputError for another dtype or number of axes, a masked array, and values other than 0 and 1.
     """
+    return check_values(as_stream(spikes), spikes)
+
+
+def as_stream(spikes: ArrayLike) -> NDArray[np.uint8]:
+    """What `as_spikes` gives, its values unseen: for a part of a long stream, whose values `check_values` then sees."""
+    if isinstance(spikes, np.ma.MaskedArray):
+        raise InputError("spikes are a masked array, whose masked pixels have no value; give spikes.filled(0)")
     array = np.asarray(spikes)
     if array.ndim != 3 or array.dtype not in (np.uint8, np.int8, np.bool_):
         raise InputError(
@@ -60,6 +71,21 @@ def as_spikes(spikes: ArrayLike) -> NDArray[np.uint8]:
             "of shape (frames, rows, columns)"
         )
     return array.view(np.uint8)
+
+
+def check_values(frames: NDArray[np.uint8], given: ArrayLike = ()) -> NDArray[np.uint8]:
+    """The frames; raises InputError where a value is neither 0 nor 1.  A pass over them, at some 10 GB a second.
+
+    given: the array as the caller has it, whose values the error names.
+    """
+    if frames.max(initial=0) > 1:
+        signed = np.asarray(given)
+        lowest = signed.min() if signed.dtype == np.int8 else frames.max()
+        raise InputError(
+            f"spikes hold the value {lowest if lowest < 0 else frames.max()}; a stream holds 0 and 1 only: "
+            "give spikes > 0 if every other value is a spike"
+        )
+    return frames
 
 
 def check_bit_order(bit_order: str) -> BitOrder:

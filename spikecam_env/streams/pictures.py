@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.errors import InputError
 from spikecam_env.streams.isi import isi_plane
-from spikecam_env.streams.packing import as_spikes
+from spikecam_env.streams.packing import as_spikes, as_stream, check_values
 
 
 def middleTFP(spikes: ArrayLike, t: int | None = None, window: int = 41) -> NDArray[np.float32]:
@@ -24,10 +24,10 @@ def middleTFP(spikes: ArrayLike, t: int | None = None, window: int = 41) -> NDAr
     t defaults to the middle.  The window holds `window` frames from t - window // 2, cut to the stream.
     Errors: InputError if t is outside the stream or window < 1.
     """
-    frames = as_spikes(spikes)
+    frames = as_stream(spikes)
     t = _middle(frames, t)
     first, stop = _window(t, window, len(frames))
-    return frames[first:stop].mean(axis=0, dtype=np.float32)
+    return check_values(frames[first:stop], spikes).mean(axis=0, dtype=np.float32)
 
 
 def middleTFI(spikes: ArrayLike, t: int | None = None) -> NDArray[np.float32]:
@@ -35,8 +35,7 @@ def middleTFI(spikes: ArrayLike, t: int | None = None) -> NDArray[np.float32]:
 
     Errors: InputError if t is outside the stream.
     """
-    frames = as_spikes(spikes)
-    return isi_plane(frames, _middle(frames, t), normalised=True)
+    return isi_plane(spikes, _middle(as_stream(spikes), t), normalised=True)
 
 
 def tfp_film(spikes: ArrayLike, window: int = 41, *, every: int = 1) -> NDArray[np.float32]:

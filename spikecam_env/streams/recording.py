@@ -1,4 +1,4 @@
-"""Any recording by its path: `.dat`, `.npz`, `.h5`."""
+"""Any recording by its path."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
-from spikecam_env.streams.hdf5 import read_hdf5
-from spikecam_env.streams.npz import load_npz
-from spikecam_env.streams.vidar import load_vidar_dat
+from spikecam_env.streams.foreign_hdf5 import read_foreign_hdf5
+from spikecam_env.streams.hdf5 import is_recording, read_hdf5
+from spikecam_env.streams.mat import read_mat
+from spikecam_env.streams.npz import load_npz, read_npy
+from spikecam_env.streams.vidar import read_dat, read_raw
 
 
 @dataclass(frozen=True)
@@ -25,41 +27,76 @@ class Recording:
     frame_rate_hz: float | None = None
     attributes: dict[str, Any] = field(default_factory=dict)
 
+    def __str__(self) -> str:
+        """How it was read, e.g. `301 frames of 250 rows x 400 columns, flip`."""
+        frames, rows, columns = self.spikes.shape
+        said = [f"{frames} frames of {rows} rows x {columns} columns"]
+        if "geometry_from" in self.attributes:
+            stored = (self.attributes["height"], self.attributes["width"])
+            if stored != (rows, columns):
+                said.append(f"of {stored[0]} x {stored[1]} stored")
+            said.append("flipped upside down" if self.attributes["flip"] else "not flipped")
+            said.append(f"{self.attributes['bit_order']}-endian bits")
+            said.append(f"size {self.attributes['geometry_from']}")
+        for name in ("key", "item", "time_axis"):
+            if name in self.attributes:
+                said.append(f"{name} {self.attributes[name]}")
+        return ", ".join(said)
+
 
 def read_recording(path: str | Path, **options: Any) -> Recording:
-    """Read a recording; the ending of its name says how, and which options there are.
+    """Read a recording; the ending of its name says how, and which options there are.  All take first, count.
 
-        .dat          load_vidar_dat: height, width, flip, bit_order, crop_width, first, count
-        .npz          load_npz: key, time_axis, flip, bit_order, first, count
-        .h5, .hdf5    read_hdf5: first, count
+        .dat          read_dat: height, width, flip, bit_order, crop_width, layout
+        .raw, .bin    read_raw, one byte a pixel: height, width, flip, crop_width
+        .npz          load_npz: key, item, batch_axis, time_axis, flip, bit_order
+        .npy          read_npy: item, batch_axis, time_axis, flip
+        .mat          read_mat: key, item, batch_axis, time_axis, flip
+        .h5, .hdf5    of this package, read_hdf5: stream
+                      of others, read_foreign_hdf5: key, item, batch_axis, time_axis, flip
 
-    Errors: InputError for another ending, an option the format does not have, and all that its loader refuses.
+    Warns (UserWarning) where the spikes say that it was read wrong.
+    Raises InputError for another ending, an option the format does not have, and all that its loader refuses.
     """
-    allowed = reading_options(path)
+    loader = _loader(path)
+    allowed = _options(loader)
     for name in options:
         if name not in allowed:
             ending = Path(path).suffix.lower()
-            raise InputError(f"option {name} does not apply to {ending} files; they take {', '.join(allowed)}")
-    loaded = _loader(path)(path, **options)
-    spikes, attributes = loaded if isinstance(loaded, tuple) else (loaded, {})
+            own = " of this package" if loader is read_hdf5 else ""
+            raise InputError(f"option {name} does not apply to {ending} files{own}; they take {', '.join(allowed)}")
+    spikes, attributes = loader(path, **options)
     return Recording(spikes, attributes.get("frame_rate_hz"), attributes)
 
 
 def reading_options(path: str | Path) -> tuple[str, ...]:
-    """Names of the options that apply to a recording, by the ending of its name; InputError for another ending."""
-    return tuple(name for name in inspect.signature(_loader(path)).parameters if name != "path")
+    """Names of the options that apply to a recording, by its name, and for HDF5 by what is in it.
+
+    Raises InputError for another ending, or no HDF5 file.
+    """
+    return _options(_loader(path))
+
+
+def _options(loader: Callable[..., Any]) -> tuple[str, ...]:
+    return tuple(name for name in inspect.signature(loader).parameters if name != "path")
 
 
 def _loader(path: str | Path) -> Callable[..., Any]:
     ending = Path(path).suffix.lower()
+    if ending in (".h5", ".hdf5"):
+        return read_hdf5 if is_recording(path) else read_foreign_hdf5
     if ending not in _LOADERS:
-        raise InputError(f"{path} ends in {ending!r}; a recording is one of {', '.join(_LOADERS)}")
+        raise InputError(f"{path} ends in {ending!r}; a recording is one of {', '.join(ENDINGS)}")
     return _LOADERS[ending]
 
 
 _LOADERS: dict[str, Callable[..., Any]] = {
-    ".dat": load_vidar_dat,
+    ".dat": read_dat,
+    ".raw": read_raw,
+    ".bin": read_raw,
     ".npz": load_npz,
-    ".h5": read_hdf5,
-    ".hdf5": read_hdf5,
+    ".npy": read_npy,
+    ".mat": read_mat,
 }
+ENDINGS = (*_LOADERS, ".h5", ".hdf5")
+"""Of the names of files that `read_recording` reads."""

@@ -1,4 +1,4 @@
-"""`.dat` spike files: no header, 1 bit a pixel, frames one after the other.
+"""`.dat` spike files: no header, 1 bit a pixel, frames one after the other; `.raw`, `.bin`: the same, 1 byte a pixel.
 
 A frame is ceil(H W / 8) bytes, rows from the top, row-major, first pixel in the least significant bit.
 Known variants, by option:
@@ -7,71 +7,227 @@ Known variants, by option:
     416-wide dumps         width=416, crop_width=400
     SPIFT, PHM             height=500, width=800, not flipped
     big-endian dumps       bit_order="big"
+    SPS100 dumps           layout="packets", 1000 x 1000, see `packets`
 
-Nothing in the file says which: geometry and flip are always the caller's to give.  Source: DESIGN section 5.
+Nothing in the file says which: geometry and flip are the caller's to give, or a side file's (`side_file`).  The spikes
+say when it is wrong (`geometry`), and the loaders warn.  Source: DESIGN section 5.
 """
 
 from __future__ import annotations
 
+import warnings
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.checked import checked_memory
 from spikecam_env.errors import InputError
-from spikecam_env.streams.files import check_range, existing_file
-from spikecam_env.streams.packing import BitOrder, as_spikes, check_shape, pack_frames, packed_bytes, unpack_frames
+from spikecam_env.streams import packets
+from spikecam_env.streams.files import check_range
+from spikecam_env.streams.geometry import KNOWN_SHAPES, geometry_doubt, looks_right
+from spikecam_env.streams.packing import BitOrder, as_spikes, check_values, pack_checked, packed_bytes, unpack_frames
+from spikecam_env.streams.side_file import Geometry, Layout, geometry, write_side_file
+from spikecam_env.untrusted import existing_file
 from spikecam_env.whole import whole_file
 
-KNOWN_SHAPES = ((250, 400), (250, 416), (500, 800), (250, 250), (1000, 1000), (256, 448))
-"""(rows, columns) of the cameras and dumps whose files are about."""
+USUAL = {"height": 250, "width": 400}
+"""Of a `.dat` file of which nobody says it: the Vidar's."""
+PROBE = 256
+"""Frames, of the middle of a file, that are asked whether its geometry is right."""
 
 
 def load_vidar_dat(
     path: str | Path,
     *,
-    height: int = 250,
-    width: int = 400,
-    flip: bool = False,
-    bit_order: BitOrder = "little",
+    height: int | None = None,
+    width: int | None = None,
+    flip: bool | None = None,
+    bit_order: BitOrder | None = None,
     crop_width: int | None = None,
+    layout: Layout | None = None,
     first: int = 0,
     count: int | None = None,
 ) -> NDArray[np.uint8]:
     """A `.dat` file -> (count, height, crop_width or width) uint8 of 0 and 1; only the frames asked are read.
 
-    flip: turn each frame upside down, as public Vidar files need.  crop_width: keep that many columns from
-    the left.  first, count: frames to read, default all.
-    Errors: InputError if the file is absent or empty, its size is no whole number of frames, or the frames or
-    columns asked are not in it.
+    height, width: default the side file's, else 250 x 400.  flip: turn each frame upside down, as public Vidar files
+    need.  bit_order: little, or big.  crop_width: keep that many columns from the left.  layout: bits, or packets.
+    first, count: frames to read, default all.
+    Warns (UserWarning) where the spikes say that the geometry is wrong, where the last frame is cut, and where an
+    option is not what the side file says.
+    Raises InputError if the file is absent or holds no frame, its size is a whole number of frames of another known
+    geometry only, or the frames or columns asked are not in it.
+    """
+    return read_dat(
+        path,
+        height=height,
+        width=width,
+        flip=flip,
+        bit_order=bit_order,
+        crop_width=crop_width,
+        layout=layout,
+        first=first,
+        count=count,
+    )[0]
+
+
+def read_dat(
+    path: str | Path,
+    *,
+    height: int | None = None,
+    width: int | None = None,
+    flip: bool | None = None,
+    bit_order: BitOrder | None = None,
+    crop_width: int | None = None,
+    layout: Layout | None = None,
+    first: int = 0,
+    count: int | None = None,
+) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+    """As `load_vidar_dat`, and the geometry that was taken: height, width, flip, ..., geometry_from, frame_rate_hz."""
+    source = existing_file(path)
+    given = {"height": height, "width": width, "flip": flip, "bit_order": bit_order, "crop_width": crop_width}
+    usual = USUAL if layout != "packets" else dict(zip(("height", "width"), packets.SHAPE, strict=True))
+    taken = geometry(source, {**given, "layout": layout}, usual)
+    spikes = (_from_packets if taken.layout == "packets" else _from_bits)(source, taken, first, count)
+    return _turned(spikes, taken), taken.attributes()
+
+
+def read_raw(
+    path: str | Path,
+    *,
+    height: int | None = None,
+    width: int | None = None,
+    flip: bool | None = None,
+    crop_width: int | None = None,
+    first: int = 0,
+    count: int | None = None,
+) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+    """A file of one byte a pixel, 0 or 1 -> (T, H, W) uint8 spikes and the geometry, as `read_dat`.
+
+    height, width: needed, here or in the side file.
+    Raises InputError as `load_vidar_dat`, and for bytes that are neither 0 nor 1.
     """
     source = existing_file(path)
-    shape = check_shape((height, width))
-    if crop_width is not None and not 1 <= crop_width <= width:
-        raise InputError(f"crop_width is {crop_width}; it must be 1 to {width}, the width of the file")
-    frames = _count_frames(source, shape)
-    first, stop = check_range(first, count, frames, str(source))
-    size = packed_bytes(shape)
-    packed = np.fromfile(source, np.uint8, count=(stop - first) * size, offset=first * size).reshape(-1, size)
-    spikes = unpack_frames(packed, shape, bit_order=bit_order)[:, :, :crop_width]
-    return np.ascontiguousarray(spikes[:, ::-1] if flip else spikes)
+    taken = geometry(source, {"height": height, "width": width, "flip": flip, "crop_width": crop_width}, {})
+    size = taken.height * taken.width
+    first, stop = check_range(first, count, _whole_frames(source, size, taken), str(source))
+    frames = _read(source, first * size, (stop - first) * size).reshape(-1, *taken.shape)
+    try:
+        check_values(frames)
+    except InputError as error:
+        raise InputError(f"{source}: {error} (bits, eight a byte, are a .dat file)") from error
+    return _turned(frames, taken), taken.attributes()
 
 
-def save_vidar_dat(path: str | Path, spikes: ArrayLike, *, flip: bool = False, bit_order: BitOrder = "little") -> None:
-    """(T, H, W) spikes -> a `.dat` file that `load_vidar_dat` reads with the same options.  The file appears whole."""
+def save_vidar_dat(
+    path: str | Path,
+    spikes: ArrayLike,
+    *,
+    flip: bool = False,
+    bit_order: BitOrder = "little",
+    side_file: bool = False,
+    frame_rate_hz: float | None = None,
+) -> None:
+    """(T, H, W) spikes -> a `.dat` file that `load_vidar_dat` reads with the same options.  The file appears whole.
+
+    side_file: also write its geometry to `<name>.dat.json`, so that it reads without options; frame_rate_hz goes there.
+    """
     frames = as_spikes(spikes)
-    packed = pack_frames(frames[:, ::-1] if flip else frames, bit_order=bit_order)
+    packed = pack_checked(frames[:, ::-1] if flip else frames, bit_order)
     with whole_file(path) as beside:
         packed.tofile(beside)
+    if side_file:
+        entries = {"height": frames.shape[1], "width": frames.shape[2], "flip": flip, "bit_order": bit_order}
+        write_side_file(Path(path), {**entries, "frame_rate_hz": frame_rate_hz})
 
 
-def _count_frames(source: Path, shape: tuple[int, int]) -> int:
-    size, frame = source.stat().st_size, packed_bytes(shape)
-    if size and size % frame == 0:
-        return size // frame
-    fitting = [f"{h} x {w}" for h, w in KNOWN_SHAPES if size and size % packed_bytes((h, w)) == 0]
-    hint = f"known geometries that divide it: {', '.join(fitting)}" if fitting else "no known geometry divides it"
+def _from_bits(source: Path, taken: Geometry, first: int, count: int | None) -> NDArray[np.uint8]:
+    size = packed_bytes(taken.shape)
+    frames = _whole_frames(source, size, taken)
+    first, stop = check_range(first, count, frames, str(source))
+    doubt = _doubt_of(source, taken)
+    if doubt:
+        warnings.warn(
+            f"{source} read as {taken.height} x {taken.width} pixels, bit order {taken.bit_order}: {doubt}",
+            UserWarning,
+            stacklevel=4,
+        )
+    packed = _read(source, first * size, (stop - first) * size).reshape(-1, size)
+    checked_memory(8 * packed.nbytes, f"{source}: {stop - first} frames of {taken.height} x {taken.width}")
+    return unpack_frames(packed, taken.shape, bit_order=taken.bit_order)
+
+
+def _from_packets(source: Path, taken: Geometry, first: int, count: int | None) -> NDArray[np.uint8]:
+    if taken.shape != packets.SHAPE:
+        raise InputError(
+            f"{source}: packets are of 1000 x 1000 pixels, not {taken.height} x {taken.width}; leave height and width"
+        )
+    offset, frames = packets.find_frames(source)
+    first, stop = check_range(first, count, frames, str(source))
+    return packets.read_frames(source, offset, first, stop - first)
+
+
+def _turned(spikes: NDArray[np.uint8], taken: Geometry) -> NDArray[np.uint8]:
+    spikes = spikes[:, :, : taken.crop_width]
+    return np.ascontiguousarray(spikes[:, ::-1] if taken.flip else spikes)
+
+
+def _read(source: Path, offset: int, size: int) -> NDArray[np.uint8]:
+    checked_memory(size, str(source))
+    try:
+        read = np.fromfile(source, np.uint8, count=size, offset=offset)
+    except OSError as error:
+        raise InputError(f"cannot read {source}: {error.strerror or error}") from error
+    if read.size < size:
+        raise InputError(f"{source} became shorter while it was read")
+    return read
+
+
+def _whole_frames(source: Path, frame: int, taken: Geometry) -> int:
+    """Whole frames of `frame` bytes in a file; warns where the last one is cut."""
+    size = source.stat().st_size
+    frames, rest = divmod(size, frame)
+    if frames and not rest:
+        return frames
+    bits = frame == packed_bytes(taken.shape)
+    fitting = [(h, w) for h, w in KNOWN_SHAPES if size and size % (packed_bytes((h, w)) if bits else h * w) == 0]
+    doubt = _doubt_of(source, taken) if frames and bits else ""
+    regular = bool(frames and bits and fitting) and looks_right(_probe(source, frame), taken.bit_order)
+    if frames and not doubt and (regular or not fitting):
+        warnings.warn(
+            f"{source} ends in the middle of a frame of {taken.height} x {taken.width} pixels, {rest} of {frame} "
+            f"bytes; its {frames} whole frames are read",
+            UserWarning,
+            stacklevel=5,
+        )
+        return frames
+    names = ", ".join(f"{h} x {w}" for h, w in fitting)
+    hint = f"known geometries that divide it: {names}" if fitting else "no known geometry divides it"
     raise InputError(
-        f"{source} has {size} bytes; {shape[0]} x {shape[1]} pixels take {frame} bytes a frame, "
-        f"remainder {size % frame}.  Give the height and width it was recorded with ({hint})"
+        f"{source} has {size} bytes; {taken.height} x {taken.width} pixels take {frame} bytes a frame, "
+        f"remainder {size % frame}.  Give the height and width it was recorded with ({doubt or hint})"
     )
+
+
+def _doubt_of(source: Path, taken: Geometry) -> str:
+    seen = source.stat()
+    return _doubt(str(source), seen.st_mtime_ns, seen.st_size, taken.shape, taken.bit_order)
+
+
+@lru_cache(maxsize=256)
+def _doubt(path: str, changed_ns: int, size: int, shape: tuple[int, int], bit_order: BitOrder) -> str:
+    """What the middle of a file says against a geometry; once a file, however often it is read in parts."""
+    probe = _probe(Path(path), packed_bytes(shape))
+    if packets.looks_like_packets(probe.ravel()):
+        return "it looks like the 64-byte packets of a megapixel camera; give layout='packets'"
+    doubt = geometry_doubt(probe, shape, bit_order)
+    return str(doubt) if doubt else ""
+
+
+def _probe(source: Path, frame: int) -> NDArray[np.uint8]:
+    frames = source.stat().st_size // frame
+    count = min(frames, PROBE, max(2, (1 << 21) // frame))
+    return np.fromfile(source, np.uint8, count * frame, offset=(frames - count) // 2 * frame).reshape(-1, frame)

@@ -63,3 +63,15 @@ def test_bad_requests_say_what_is_allowed() -> None:
         isi_planes(spikes, future=-1)
     with pytest.raises(InputError, match="float64"):
         isi_planes(np.zeros((5, 2, 2)))
+
+
+def test_frames_beyond_two_to_the_24_are_counted_exactly() -> None:
+    """float32 holds whole numbers to 2^24 only; a stream of one pixel is that long in 17 MB."""
+    spikes = np.zeros((2**24 + 64, 1, 1), np.uint8)
+    at = 2**24 + np.array([3, 10, 17, 24])
+    spikes[at] = 1
+    planes = isi_planes(spikes, start=int(at[0]), stop=int(at[-1]))[:, 0, 0]
+    np.testing.assert_array_equal(planes, 7.0)
+    np.testing.assert_array_equal(
+        isi_planes(spikes, start=int(at[0]), stop=int(at[0]) + 3, future=2)[:, 0, 0], [3, 4, 5]
+    )

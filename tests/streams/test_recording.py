@@ -148,7 +148,7 @@ def test_attributes_are_plain_and_not_reserved(tmp_path: Path) -> None:
         SpikeWriter(tmp_path / "a.h5", (5, 9), None, seed={})
     with pytest.raises(InputError, match="height"):
         SpikeWriter(tmp_path / "a.h5", (5, 9), None, height=4)
-    with pytest.raises(InputError, match="frame_rate_hz is 0"):
+    with pytest.raises(InputError, match="frame_rate_hz = 0"):
         SpikeWriter(tmp_path / "a.h5", (5, 9), 0)
 
 
