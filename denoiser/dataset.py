@@ -9,8 +9,9 @@ noisy and clean twins have forgotten their common phase (DESIGN section 7).
 
 from __future__ import annotations
 
+import operator
 from pathlib import Path
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 import torch
@@ -21,6 +22,7 @@ from denoiser.pairs import WARM_UP
 from spikecam_env.datasets import read_window
 from spikecam_env.datasets.manifest import Manifest
 from spikecam_env.errors import InputError
+from spikecam_env.streams.packing import check_shape
 
 
 class Item(TypedDict):
@@ -44,7 +46,7 @@ class SpikeWindows(Dataset[Item]):
     split   "train" or "test"
     reach   frames before and after the middle one; 20 is the paper's window of 41
     crop    (rows, columns); None: the whole picture
-    seed    of the crops; item i of an epoch is always the same.  `epoch` may be set to draw others
+    seed    of the crops; item i of an epoch is always the same.  Set `epoch` before each pass to draw others
     Errors: InputError for a folder that is no dataset or not finished, a split that it has not, and a window or a crop
     that its scenes are too small for.
     """
@@ -66,22 +68,36 @@ class SpikeWindows(Dataset[Item]):
             raise InputError(f"{folder} has no scenes of split {split!r}; it has {', '.join(sorted(splits))}")
         if any(file["sha256"] is None for file in files):
             raise InputError(f"{folder} is not finished; run its `spikecam dataset` command again")
+        reach, stride, seed = _whole(reach, "reach", 0), _whole(stride, "stride", 1), _whole(seed, "seed", 0)
         rows, columns = manifest.settings["shape"]
         self.paths = [Path(folder) / file["path"] for file in files]
         self.shape = (int(rows), int(columns))
-        self.crop = self.shape if crop is None else crop
-        if reach < 0 or stride < 1 or not all(1 <= n <= full for n, full in zip(self.crop, self.shape, strict=True)):
-            raise InputError(
-                f"reach {reach}, stride {stride}, crop {self.crop}; need reach >= 0, stride >= 1 "
-                f"and a crop of at most {self.shape}"
-            )
-        self.reach, self.seed, self.epoch = reach, seed, 0
+        self.crop = self.shape if crop is None else check_shape(crop)
+        if not all(n <= full for n, full in zip(self.crop, self.shape, strict=True)):
+            raise InputError(f"crop {self.crop}; it must be at most {self.shape}")
+        self.reach, self.seed = reach, seed
+        self._epoch = torch.zeros(1, dtype=torch.int64).share_memory_()
         self.frames = range(WARM_UP + reach, int(manifest.settings["frames"]) - reach, stride)
         if not self.frames:
             raise InputError(
                 f"scenes of {manifest.settings['frames']} frames hold no window of {2 * reach + 1} "
                 f"after the first {WARM_UP}; make longer ones"
             )
+
+    @property
+    def epoch(self) -> int:
+        """Number of the pass over the data, 0 or more; the workers of a loader see it change, persistent ones too."""
+        return int(self._epoch)
+
+    @epoch.setter
+    def epoch(self, epoch: int) -> None:
+        self._epoch[0] = _whole(epoch, "epoch", 0)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy shares its epoch with the workers it gets, not with the data set it is a copy of."""
+        self.__dict__.update(state)
+        if not self._epoch.is_shared():
+            self._epoch.share_memory_()
 
     def __len__(self) -> int:
         return len(self.paths) * len(self.frames)
@@ -103,3 +119,13 @@ class SpikeWindows(Dataset[Item]):
             "row": row,
             "column": column,
         }
+
+
+def _whole(value: Any, name: str, least: int) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = least - 1
+    if not least <= number < 2**63:
+        raise InputError(f"{name} is {value!r}; it must be a whole number, {least} or more")
+    return number

@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from denoiser.threads import where_torch_can
 from denoiser.window import Window
+
+
+def prepared(network: nn.Module, number_type: torch.dtype) -> nn.Module:
+    """A copy for many passes: weights in the type that autocast computes in, so that no pass converts them.
+
+    `rates` gives the same bits with it: autocast still decides what each operation computes in.
+    """
+
+    def copied() -> nn.Module:
+        mine = copy.deepcopy(network).eval().requires_grad_(False)
+        return mine.to(dtype=number_type, memory_format=torch.channels_last)  # type: ignore[call-overload,no-any-return]
+
+    return where_torch_can(copied)
 
 
 def rates(network: nn.Module, window: Window, number_type: torch.dtype) -> NDArray[np.float32]:
     """(count, H, W) float32 rates in the frames the window covers, cut to [0, 1] [spikes/frame]."""
+    return where_torch_can(lambda: _rates(network, window, number_type))
+
+
+def _rates(network: nn.Module, window: Window, number_type: torch.dtype) -> NDArray[np.float32]:
     layout, device = torch.channels_last, next(network.parameters()).device
     spikes = torch.from_numpy(np.ascontiguousarray(window.spikes))[None].to(device, number_type)
     planes = torch.from_numpy(window.planes)[None].to(device)

@@ -21,9 +21,10 @@ from torch import nn
 
 from denoiser import accumulate, infer, mus
 from denoiser.recipe import Recipe
-from denoiser.weights import load_weights, pretrained_path
-from denoiser.window import RollingWindow, Window
+from denoiser.weights import digest, load_weights, pretrained_path
+from denoiser.window import RollingWindow, Window, check_like
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
+from spikecam_env.sensor.sensor import checked_count
 from spikecam_env.streams.packing import as_spikes
 
 OUTPUTS = ("spikes", "rate", "both")
@@ -40,6 +41,8 @@ class OnlineDnSS:
     output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
     stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things move).
     precision: of the network; "auto" is bfloat16 where the processor has it, else float32.
+    The network is copied: training it further changes nothing here.  One object denoises one stream: for another stream
+    take `another()`.
     Errors: InputError for unknown options and unusable spikes; NotReadyError for a push after `flush`.
     """
 
@@ -52,16 +55,15 @@ class OnlineDnSS:
         stride: int = 1,
         precision: str = "auto",
     ) -> None:
-        if output not in OUTPUTS:
-            raise unknown_name("output", output, OUTPUTS)
-        if precision not in PRECISIONS:
+        self.output = _checked_output(output)
+        if not isinstance(precision, str) or precision not in PRECISIONS:
             raise unknown_name("precision", precision, PRECISIONS)
-        if stride < 1 or (stride > 1 and recipe.layout.planes > 1):
-            raise InputError(f"stride is {stride}; it must be at least 1, and 1 for a network of many planes a pass")
-        self.output = output
-        self._recipe, self._stride = recipe, stride
-        self._network = network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        if checked_count(stride, "stride") > 1 and recipe.layout.planes > 1:
+            raise InputError(f"stride is {stride}; it must be 1 for a network of many planes a pass")
+        self._recipe, self._stride = recipe, int(stride)
         self._type = infer.number_type(precision)
+        self._network = infer.prepared(network, self._type)
+        self._digest = digest(recipe, network.state_dict())
         self.reset()
 
     @classmethod
@@ -74,6 +76,16 @@ class OnlineDnSS:
         """With the weights of a checkpoint."""
         recipe, network, _ = load_weights(path)
         return cls(recipe, network, **options)
+
+    def another(self, output: str | None = None) -> OnlineDnSS:
+        """A denoiser like this one for another stream, from its first frame; both use the same weights.
+
+        output: of the other, default this one's.
+        """
+        other = copy.copy(self)
+        other.output = self.output if output is None else _checked_output(output)
+        other.reset()
+        return other
 
     @property
     def latency(self) -> int:
@@ -98,9 +110,8 @@ class OnlineDnSS:
             raise NotReadyError("the stream has ended (flush was called); call reset() to begin another")
         chunk = self._checked(spikes)
         if self._window is None:
-            size = (chunk.shape[1], chunk.shape[2])
-            self._window = RollingWindow(self._recipe.layout, size)
-            self._decoding = _DECODERS[self._recipe.decoder].start(size)
+            self._begin((chunk.shape[1], chunk.shape[2]))
+        assert self._window is not None
         return self._denoise(self._window.push(chunk))
 
     def flush(self) -> Denoised:
@@ -111,30 +122,60 @@ class OnlineDnSS:
         return self._denoise(self._window.end())
 
     def state(self) -> dict[str, Any]:
-        """Everything later frames depend on, but the weights: plain arrays and numbers, picklable."""
-        if self._window is None:
-            return {"shape": None}
-        return {
-            "shape": self._window.shape,
-            "layout": self._recipe.layout,
-            "window": self._window.state(),
-            "decoding": copy.deepcopy(self._decoding),
-            "held": copy.deepcopy(self._held),
-            "ended": self._ended,
-        }
+        """A copy of everything later frames depend on, but the weights: plain arrays and numbers, picklable."""
+        state: dict[str, Any] = {"of": self._identity(), "shape": self.shape}
+        if self._window is not None:
+            state |= {
+                "window": self._window.state(),
+                "decoding": copy.deepcopy(self._decoding),
+                "held": copy.deepcopy(self._held),
+                "ended": self._ended,
+            }
+        return state
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from `state()`; raises InputError for the state of another kind of denoiser."""
-        self.reset()
-        if state["shape"] is None:
-            return
-        if state["layout"] != self._recipe.layout:
-            raise InputError(f"the state is of a denoiser with {state['layout']}, this one has {self._recipe.layout}")
-        self._window = RollingWindow(self._recipe.layout, state["shape"])
+        """Go on from a copy of `state()`; the output may be another one.
+
+        Raises InputError for the state of a denoiser with other weights, recipe, stride or precision, which would go on
+        differently, and for anything that is no state; this one is then as it was.
+        """
+        try:
+            for name, ours in self._identity().items():
+                if state["of"][name] != ours:
+                    raise InputError(
+                        f"the state is of a denoiser with {name} {state['of'][name]}, this one has {ours}; "
+                        "restore it into one made with the same weights and options"
+                    )
+            other = self.another()
+            if state["shape"] is not None:
+                other._begin(state["shape"])
+                other._go_on(state)
+        except (KeyError, TypeError, AttributeError, IndexError) as error:
+            raise InputError(
+                f"the state is no whole state of a denoiser ({type(error).__name__}: {error}); "
+                "give what `OnlineDnSS.state()` returned"
+            ) from error
+        self._window, self._decoding, self._held = other._window, other._decoding, other._held
+        self._ended = other._ended
+
+    def _begin(self, shape: tuple[int, int]) -> None:
+        self._window = RollingWindow(self._recipe.layout, shape)
+        self._decoding = _DECODERS[self._recipe.decoder].start(shape)
+
+    def _go_on(self, state: dict[str, Any]) -> None:
+        assert self._window is not None
         self._window.restore(state["window"])
-        self._decoding = copy.deepcopy(state["decoding"])
-        self._held = copy.deepcopy(state["held"])
-        self._ended = state["ended"]
+        for found, ours in zip(state["decoding"], self._decoding, strict=True):
+            check_like(found, ours, "decoding")
+        if state["held"] is not None:
+            check_like(state["held"], np.empty((1, *self._window.shape), np.float32), "held", lengths=False)
+        self._decoding, self._held = copy.deepcopy(state["decoding"]), copy.deepcopy(state["held"])
+        self._ended = bool(state["ended"])
+
+    def _identity(self) -> dict[str, Any]:
+        """What frames depend on besides the stream."""
+        precision = "bfloat16" if self._type == torch.bfloat16 else "float32"
+        return {"recipe and weights": self._digest, "stride": self._stride, "precision": precision}
 
     def _denoise(self, windows: Iterator[Window]) -> Denoised:
         assert self._window is not None
@@ -171,12 +212,19 @@ class OnlineDnSS:
         return chunk
 
 
+def _checked_output(output: str) -> str:
+    if not isinstance(output, str) or output not in OUTPUTS:
+        raise unknown_name("output", output, OUTPUTS)
+    return output
+
+
 def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **options: Any) -> Denoised:
     """(T, H, W) recorded spikes -> as many denoised frames; options as for `OnlineDnSS`.
 
     The same bits as pushing the stream piece by piece; it is pushed `chunk` frames at a time to save memory.
+    Raises InputError as `OnlineDnSS` does, and for a chunk that is no whole number, 1 or more.
     """
-    frames = as_spikes(spikes)
+    frames, chunk = as_spikes(spikes), checked_count(chunk, "chunk")
     online = OnlineDnSS.pretrained(mode, **options)
     pieces = [online.push(frames[:0]), *(online.push(frames[i : i + chunk]) for i in range(0, len(frames), chunk))]
     pieces.append(online.flush())

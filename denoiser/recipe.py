@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
+from pydantic import AfterValidator, Field
 from torch import nn
 
 from denoiser.block_network import BlockDnSS
 from denoiser.network import DnSS
 from denoiser.window import WindowLayout
-from spikecam_env.errors import InputError, unknown_name
-
-TARGETS = ("clean_inverse_interval", "light")
-DECODERS = ("mus", "accumulate")
+from spikecam_env.errors import unknown_name
+from spikecam_env.untrusted import Declared, declared
 
 
 @dataclass(frozen=True)
@@ -36,18 +35,38 @@ class Recipe:
         return asdict(self)
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Recipe:
-        """The inverse of `to_dict`; raises InputError for anything else."""
-        try:
-            layout = dict(data["layout"])
-            layout["half_widths"] = tuple(int(h) for h in layout["half_widths"])
-            layout["memories"] = tuple(float(m) for m in layout["memories"])
-            recipe = cls(WindowLayout(**layout), data["target"], data["decoder"], bool(data["refine"]))
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"not a denoiser recipe ({error}); train again with `spikecam train`") from error
-        if recipe.decoder not in DECODERS or recipe.target not in TARGETS:
-            raise InputError(f"recipe names decoder {recipe.decoder!r} and target {recipe.target!r}; not known here")
-        return recipe
+    def from_dict(cls, data: Any, where: str = "recipe") -> Recipe:
+        """The inverse of `to_dict`; raises InputError for anything else.  where: begins the error's text."""
+        found = declared(_DeclaredRecipe, data, where)
+        return cls(WindowLayout(**found.layout.model_dump()), found.target, found.decoder, found.refine)
+
+
+def _none_or_some(memory: float) -> float:
+    if 0 < memory < 1:
+        raise ValueError("it must be 0 or at least 1")
+    return memory
+
+
+_Frames = Annotated[int, Field(ge=0, le=1000)]
+_Memory = Annotated[float, Field(ge=1, le=1e6)]
+
+
+class _DeclaredLayout(Declared):
+    """Ranges: a network of any such layout has fewer than a million weights."""
+
+    past: _Frames
+    planes: Annotated[int, Field(ge=1, le=64)]
+    future: _Frames
+    half_widths: Annotated[tuple[_Frames, ...], Field(max_length=16, strict=False)]
+    memories: Annotated[tuple[_Memory, ...], Field(max_length=16, strict=False)]
+    gain_memory: Annotated[float, Field(ge=0, le=1e6), AfterValidator(_none_or_some)]
+
+
+class _DeclaredRecipe(Declared):
+    layout: _DeclaredLayout
+    target: Literal["clean_inverse_interval", "light"]
+    decoder: Literal["mus", "accumulate"]
+    refine: bool
 
 
 RECIPES = {
@@ -62,6 +81,6 @@ RECIPES = {
 
 def recipe_of(mode: str) -> Recipe:
     """The recipe of a mode, "paper" or "best"."""
-    if mode not in RECIPES:
+    if not isinstance(mode, str) or mode not in RECIPES:
         raise unknown_name("denoiser mode", mode, RECIPES)
     return RECIPES[mode]

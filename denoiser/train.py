@@ -24,21 +24,24 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
+from pydantic import Field
 from torch import Tensor, nn
 from tqdm import tqdm
 
 from denoiser import infer
-from denoiser.pairs import ClipFeed, draw_clip
+from denoiser.pairs import CLIP_SHAPE, ClipFeed, draw_clip
+from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.pool import Batch, SamplePool
 from denoiser.recipe import Recipe, recipe_of
-from denoiser.weights import read_plain, save_weights, write_whole
+from denoiser.weights import save_weights, write_whole
 from denoiser.window import Window
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.untrusted import Declared, Name, Whole, declared
 from spikecam_env.whole import whole_file, write_text_whole
 
 POOL_CLIPS = 160
@@ -46,6 +49,22 @@ FIRST_CLIPS = 24
 VALIDATION_CLIPS = 10
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 WARM_UP_STEPS = 100
+
+
+_COUNTS = {
+    "steps": (1, 10**9),
+    "batch": (1, 65_536),
+    "seed": (0, 2**62),
+    "threads": (1, 1024),
+    "patch": (4, CLIP_SHAPE[0]),
+    "steps_per_clip": (1, 10**9),
+    "refresh_every": (1, 10**9),
+    "workers": (1, 1024),
+}
+"""Options that are whole numbers, with the least and the most."""
+
+_AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
+"""Options that are numbers above 0, with the most."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +94,22 @@ class TrainConfig:
     workers: int = 1
 
     def __post_init__(self) -> None:
-        counts = (self.steps, self.batch, self.steps_per_clip, self.refresh_every, self.workers)
-        if min(counts) < 1 or not 4 <= self.patch <= 96 or self.lr <= 0:
-            raise InputError(
-                f"steps {self.steps}, batch {self.batch}, patch {self.patch}, lr {self.lr}, steps_per_clip "
-                f"{self.steps_per_clip}, refresh_every {self.refresh_every}, workers {self.workers}; all must be "
-                "positive and the patch 4 to 96 pixels"
-            )
+        recipe_of(self.mode)
+        for name, (least, most) in _COUNTS.items():
+            value = getattr(self, name)
+            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+                raise InputError(f"{name} is {value!r}; it must be a whole number from {least} to {most}")
+        for name, highest in _AMOUNTS.items():
+            amount = getattr(self, name)
+            if name == "minutes" and amount is None:
+                continue
+            if not isinstance(amount, int | float) or isinstance(amount, bool) or not 0 < amount <= highest:
+                raise InputError(f"{name} is {amount!r}; it must be a number above 0, at most {highest:g}")
+        if not isinstance(self.resume, bool):
+            raise InputError(f"resume is {self.resume!r}; it must be True or False")
+        if not isinstance(self.out, str | os.PathLike):
+            raise InputError(f"out is {self.out!r}; it must be the path of a folder")
+        object.__setattr__(self, "out", Path(self.out))
         checked_device(self.device, "train with --device cpu")
 
 
@@ -141,13 +169,65 @@ class _Run:
     def load(self, path: Path) -> None:
         data = read_plain(path)
         try:
-            self.network.load_state_dict(data["network"])
-            self.optimiser.load_state_dict(data["optimiser"])
-            self.rng.bit_generator.state = json.loads(data["rng"])
-            self.step, self.seconds, self.curve = data["step"], data["seconds"], data["curve"]
-            self.resumed_at = [*data["resumed_at"], self.step]
-        except (KeyError, TypeError, RuntimeError, ValueError) as error:
-            raise InputError(f"{path} is not a run of this mode; give another --out, or resume=False") from error
+            parts = {name: data.pop(name) for name in ("network", "optimiser", "rng")}
+            generator = json.loads(parts["rng"])
+        except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
+            raise InputError(f"{path} is not a run; give another --out, or resume=False") from error
+        try:
+            progress = declared(_Progress, data, str(path))
+            draws = declared(_Generator, generator, f"{path}: rng")
+            tensors_like(self.network.state_dict(), parts["network"], str(path))
+            _refuse_other_moments(parts["optimiser"], self.optimiser, str(path))
+        except InputError as error:
+            raise InputError(f"{error}; it is not a run of this mode: give another --out, or resume=False") from error
+        self.network.load_state_dict(parts["network"])
+        self.optimiser.load_state_dict(parts["optimiser"])
+        self.rng.bit_generator.state = draws.model_dump()
+        self.step, self.seconds, self.curve = progress.step, progress.seconds, [dict(p) for p in progress.curve]
+        self.resumed_at = [*progress.resumed_at, self.step]
+
+
+class _Progress(Declared):
+    """Where a run is, besides network, optimiser and generator."""
+
+    step: Whole
+    seconds: Annotated[float, Field(ge=0)]
+    curve: list[dict[Name, float]]
+    resumed_at: list[Whole]
+
+
+class _Words(Declared):
+    state: Annotated[int, Field(ge=0, lt=2**128)]
+    inc: Annotated[int, Field(ge=0, lt=2**128)]
+
+
+class _Generator(Declared):
+    """numpy's PCG64."""
+
+    bit_generator: Literal["PCG64"]
+    state: _Words
+    has_uint32: Literal[0, 1]
+    uinteger: Annotated[int, Field(ge=0, lt=2**32)]
+
+
+def _refuse_other_moments(found: Any, optimiser: torch.optim.Optimizer, where: str) -> None:
+    """Raises InputError unless `found` is the state of an Adam of the same parameters."""
+    ours = optimiser.state_dict()["param_groups"]
+    groups = found.get("param_groups") if isinstance(found, dict) else None
+    settings = [{name: v for name, v in group.items() if name != "lr"} for group in ours]
+    if not isinstance(groups, list) or not all(isinstance(group, dict) for group in groups):
+        raise InputError(f"{where}: the optimiser's groups are missing")
+    if [{name: v for name, v in group.items() if name != "lr"} for group in groups] != settings:
+        raise InputError(f"{where}: the optimiser has other settings or parameters")
+    if any(not isinstance(g.get("lr"), float) or not 0 <= g["lr"] <= _AMOUNTS["lr"] for g in groups):
+        raise InputError(f"{where}: the optimiser's rate of learning is out of range")
+    weights = [p for group in optimiser.param_groups for p in group["params"]]
+    moments = found.get("state")
+    if not isinstance(moments, dict) or set(moments) not in (set(), set(range(len(weights)))):
+        raise InputError(f"{where}: the optimiser has no moments of these parameters")
+    for number, moment in moments.items():
+        like = weights[number].detach()
+        tensors_like({"step": torch.zeros(()), "exp_avg": like, "exp_avg_sq": like}, moment, f"{where}: optimiser")
 
 
 def _loop(

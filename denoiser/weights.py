@@ -1,21 +1,27 @@
 """Checkpoints: trained networks as small files that say what they are and how they were made.
 
 A file is `torch.save` of plain values: format, mode, recipe, state_dict, training (command, seed, steps, minutes,
-package version).  It is read with `weights_only=True`, so a foreign file cannot run code.
+package version) and sha256, the digest of recipe and weights.  A foreign file cannot run code (`denoiser.plain_torch`).
+`seal` adds the digest to a file without one.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
-import pickle
+import warnings
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 
+from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.recipe import RECIPES, Recipe
+from denoiser.threads import where_torch_can
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.whole import whole_file
 
@@ -25,49 +31,71 @@ FORMAT = "spikecam-denoiser/1"
 def save_weights(path: str | os.PathLike[str], mode: str, recipe: Recipe, network: nn.Module, training: dict) -> None:
     """Write a checkpoint; the file appears whole."""
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-    write_whole(
-        path,
-        {"format": FORMAT, "mode": mode, "recipe": recipe.to_dict(), "state_dict": state, "training": training},
-    )
+    data = {"format": FORMAT, "mode": mode, "recipe": recipe.to_dict(), "state_dict": state, "training": training}
+    write_whole(path, data | {"sha256": digest(recipe, state)})
 
 
 def load_weights(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[str, Any]]:
     """Read a checkpoint: (recipe, network in evaluation mode, training record).
 
-    Raises InputError for a missing or truncated file, a file of another kind, and weights of another network.
+    Warns where it has no digest.  Raises InputError for a missing or damaged file, a file of another kind, weights of
+    another network, and weights that are not finite or not those of the digest.
     """
-    data = read_plain(path)
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        found = data.get("format") if isinstance(data, dict) else type(data).__name__
-        raise InputError(f"{path} is not a {FORMAT} checkpoint (found {found!r}); give a file of `spikecam train`")
-    recipe = Recipe.from_dict(data.get("recipe", {}))
-    network = recipe.network()
-    try:
-        network.load_state_dict(data["state_dict"])
-    except (KeyError, RuntimeError, TypeError, AttributeError) as error:
-        first_line = str(error).splitlines()[0]
-        raise InputError(f"{path} holds weights of another network ({first_line}); train again") from error
-    return recipe, network.eval(), dict(data.get("training", {}))
+    return where_torch_can(lambda: _load(path))
+
+
+def digest(recipe: Recipe, weights: Mapping[str, Tensor]) -> str:
+    """SHA-256 of what a network computes with: its recipe, and its weights by name."""
+    found = hashlib.sha256(json.dumps(recipe.to_dict(), sort_keys=True).encode())
+    for name in sorted(weights):
+        tensor = weights[name].detach().cpu().contiguous()
+        found.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}".encode())
+        found.update(tensor.numpy().tobytes())
+    return found.hexdigest()
 
 
 def pretrained_path(mode: str) -> Path:
     """Where the shipped weights of a mode are."""
-    if mode not in RECIPES:
+    if not isinstance(mode, str) or mode not in RECIPES:
         raise unknown_name("denoiser mode", mode, RECIPES)
     return Path(str(resources.files("denoiser") / "weights" / f"{mode}.pt"))
-
-
-def read_plain(path: str | os.PathLike[str]) -> Any:
-    """Any `torch.save` file of plain values; raises InputError where it is missing, cut short or foreign."""
-    try:
-        return torch.load(path, map_location="cpu", weights_only=True)
-    except OSError as error:
-        raise InputError(f"cannot read weights {path}: {error.strerror or error}") from error
-    except (RuntimeError, pickle.UnpicklingError, EOFError, ValueError, KeyError) as error:
-        raise InputError(f"{path} is not a whole torch file of plain values; copy it again or train anew") from error
 
 
 def write_whole(path: str | os.PathLike[str], data: Any) -> None:
     """`torch.save` beside, then rename."""
     with whole_file(Path(path)) as beside:
         torch.save(data, beside)
+
+
+def seal(path: str | os.PathLike[str]) -> None:
+    """Add the digest to a checkpoint without one; nothing else changes.  Raises InputError as `load_weights`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        recipe, _, _ = load_weights(path)
+    data = read_plain(path)
+    write_whole(path, data | {"sha256": digest(recipe, data["state_dict"])})
+
+
+def _load(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[str, Any]]:
+    data = read_plain(path)
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        found = data.get("format") if isinstance(data, dict) else type(data).__name__
+        raise InputError(
+            f"{path} is not a {FORMAT} checkpoint (found {str(found)[:60]!r}); give a file of `spikecam train`"
+        )
+    recipe = Recipe.from_dict(data.get("recipe"), f"{path}: recipe")
+    network, training = recipe.network(), data.get("training", {})
+    weights = tensors_like(network.state_dict(), data.get("state_dict"), str(path))
+    if not isinstance(training, dict):
+        raise InputError(f"{path}: training is {type(training).__name__}; it must be a table; copy the file again")
+    if "sha256" not in data:
+        warnings.warn(
+            f"{path} has no digest, so whether its weights are whole cannot be checked; "
+            "if they are yours, add one with denoiser.weights.seal(path)",
+            UserWarning,
+            stacklevel=2,
+        )
+    elif data["sha256"] != digest(recipe, weights):
+        raise InputError(f"{path} is damaged: its weights are not those of its digest; copy it again or train anew")
+    network.load_state_dict(weights)
+    return recipe, network.eval(), dict(training)

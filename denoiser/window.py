@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
+from spikecam_env.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,10 @@ class RollingWindow:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`."""
+        """Continue from `state()`; raises InputError for arrays of another size or type."""
+        check_like(state["frames"], self._frames, "frames", lengths=False)
+        for name, ours in (("last", self._last), ("means", self._means), ("sums", self._sums)):
+            check_like(state[name], ours, name)
         self.start, self.seen, self._averaged = state["start"], state["seen"], state["averaged"]
         self._frames, self._last = state["frames"].copy(), state["last"].copy()
         self._means = state["means"].copy()
@@ -179,6 +183,18 @@ class RollingWindow:
             new = self._frames[self._averaged - held : stop - held]
             _running_means(new, np.float32(1.0) / np.asarray(self.layout.memories, np.float32), self._means)
         self._averaged = max(stop, self._averaged)
+
+
+def check_like(found: Any, ours: Any, name: str, *, lengths: bool = True) -> None:
+    """Raises InputError unless an entry of a state has this one's type and shape; without `lengths`, but for its first
+    axis."""
+    first = 0 if lengths else 1
+    alike = type(found) is type(ours) and (
+        not isinstance(ours, np.ndarray) or (found.dtype == ours.dtype and found.shape[first:] == ours.shape[first:])
+    )
+    if not alike:
+        kind = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else type(found).__name__
+        raise InputError(f"{name} of the state is {kind}; the state is of another stream, or damaged")
 
 
 def without_gain(window: Window) -> Window:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -9,51 +11,83 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS
-from spikecam_env.errors import InputError, unknown_name
+from denoiser.recipe import RECIPES
+from spikecam_env.errors import InputError, NotReadyError, unknown_name
+
+OUTPUTS = ("spikes", "rate")
 
 
 class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     """Replaces each (K, H, W) block of spikes by the denoised block of the same length, `denoiser_latency` frames late.
 
-    mode: "best", "paper", or an `OnlineDnSS` of your own.  output: "spikes" (same space) or "rate" (float32 in [0, 1]).
+    mode: "best", "paper", the path of a checkpoint (.pt), or an `OnlineDnSS` of your own, of which the wrapper takes
+    another one: the same weights, stride and precision, a stream of its own.
+    output: "spikes" (same space) or "rate" (float32 in [0, 1]).
     The first `denoiser_latency` frames of an episode are zero; `info["denoiser_latency"]` says how late the block is.
-    Errors: InputError for packed or other observations.
+    Errors: InputError for packed or other observations, an unknown mode or output, and an unusable checkpoint;
+    NotReadyError for a step before the first reset or after `close`.
     """
 
-    def __init__(self, env: gymnasium.Env, mode: str | OnlineDnSS = "best", output: str = "spikes") -> None:
+    def __init__(
+        self, env: gymnasium.Env, mode: str | os.PathLike[str] | OnlineDnSS = "best", output: str = "spikes"
+    ) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(self, mode=mode, output=output)
         super().__init__(env)
         space = env.observation_space
-        if output not in ("spikes", "rate"):
-            raise unknown_name("output", output, ("spikes", "rate"))
+        if not isinstance(output, str) or output not in OUTPUTS:
+            raise unknown_name("output", output, OUTPUTS)
         if space.shape is None or len(space.shape) != 3:
             raise InputError(
                 f"observations are {space}; the denoiser needs unpacked spike blocks (frames, rows, columns)"
             )
-        self._denoiser = OnlineDnSS.pretrained(mode, output=output) if isinstance(mode, str) else mode
-        self._denoiser.output = output
+        self._denoiser: OnlineDnSS | None = _denoiser(mode, output)
         self._type = space.dtype if output == "spikes" else np.dtype(np.float32)
-        self._due: NDArray[Any] = np.empty((0, *space.shape[1:]), self._type)
+        self._due: NDArray[Any] | None = None  # frames that are denoised and not seen yet; None before the first reset
         if output == "rate":
             self.observation_space = gymnasium.spaces.Box(0.0, 1.0, space.shape, np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode, and with it another stream."""
+        denoiser = self._open()
         observation, info = self.env.reset(seed=seed, options=options)
-        self._denoiser.reset()
-        self._due = np.zeros((self._denoiser.latency, *observation.shape[1:]), self._type)
-        return self._late(observation), self._told(info)
+        denoiser.reset()
+        self._due = np.zeros((denoiser.latency, *observation.shape[1:]), self._type)
+        return self._late(observation), self._with_latency(info)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Step the environment and denoise what it saw."""
+        self._open()
         observation, reward, terminated, truncated, info = self.env.step(action)
-        return self._late(observation), reward, terminated, truncated, self._told(info)
+        return self._late(observation), reward, terminated, truncated, self._with_latency(info)
+
+    def close(self) -> None:
+        """Close the environment, and give back the denoiser; may be called again."""
+        self._denoiser = self._due = None
+        super().close()
 
     def _late(self, block: NDArray[Any]) -> NDArray[Any]:
-        ready = np.asarray(self._denoiser.push(block))
+        if self._due is None:
+            raise NotReadyError("the environment has not begun; call reset first")
+        ready = np.asarray(self._open().push(block))
         due = np.concatenate([self._due, ready.astype(self._type)])
         self._due = due[len(block) :]
         return due[: len(block)].copy()
 
-    def _told(self, info: dict[str, Any]) -> dict[str, Any]:
-        return {**info, "denoiser_latency": self._denoiser.latency}
+    def _with_latency(self, info: dict[str, Any]) -> dict[str, Any]:
+        return {**info, "denoiser_latency": self._open().latency}
+
+    def _open(self) -> OnlineDnSS:
+        if self._denoiser is None:
+            raise NotReadyError("the environment is closed; make a new one")
+        return self._denoiser
+
+
+def _denoiser(mode: Any, output: str) -> OnlineDnSS:
+    """One of the wrapper's own."""
+    if isinstance(mode, OnlineDnSS):
+        return mode.another(output)
+    if isinstance(mode, str) and mode in RECIPES:
+        return OnlineDnSS.pretrained(mode, output=output)
+    if isinstance(mode, os.PathLike) or (isinstance(mode, str) and mode.endswith(".pt")):
+        return OnlineDnSS.from_file(Path(mode), output=output)
+    raise unknown_name("denoiser mode", mode, (*RECIPES, "the path of a checkpoint (.pt)", "an OnlineDnSS"))

@@ -30,12 +30,17 @@ def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = No
     metered   measure this one instead, e.g. the same scene at a smaller shape
     Errors: InputError for an interval below 1 (a pixel fires at most once a frame) or a scene without light.
     """
-    checked_number(mean_interval, "mean_interval", 1.0, MOST_INTERVAL, unit="frames, e.g. 10")
+    checked_interval(mean_interval)
     mean = float(np.mean([(metered or scene).truth(frame).radiance.mean() for frame in METERED_FRAMES]))
     if not mean > 0:
         raise InputError("the scene has no light to expose; give it a lamp, an emission or a background")
     gain = 1.0 / (mean_interval * mean)
     return scene.lit(gain) if isinstance(scene, Dimmable) else Exposed(scene, gain)
+
+
+def checked_interval(mean_interval: float) -> float:
+    """The interval as a number; raises InputError below 1 frame and above MOST_INTERVAL."""
+    return checked_number(mean_interval, "mean_interval", 1.0, MOST_INTERVAL, unit="frames, e.g. 10")
 
 
 @dataclass(frozen=True)

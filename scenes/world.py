@@ -22,7 +22,6 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 from os import getpid
-from threading import get_ident
 from typing import Any, TypeVar
 
 import cv2
@@ -35,8 +34,8 @@ from scipy.spatial.transform import Rotation
 from scenes.camera import Camera
 from scenes.layers import Carried, Key, carry, fit, lay, project, render_key
 from scenes.protocol import Gaze, Truth
-from scenes.renderers.choose import choose_renderer
 from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
+from scenes.renderers.shared import shared_renderer
 from scenes.trajectories import AT_REST, Still, Trajectory
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
@@ -410,7 +409,7 @@ class World:
     def _draw(self) -> Renderer:
         if self.renderer is not None:
             return self.renderer
-        return _renderer_of(getpid(), get_ident())
+        return shared_renderer()
 
     def _pinhole(self, frame: Floats) -> Pinhole:
         return Pinhole(self._focal, self._centre, self.camera.pose(frame / self.frame_rate_hz))
@@ -683,12 +682,6 @@ class _Kept:
                 kept.popitem(last=False)
         kept.move_to_end(name)
         return kept[name]
-
-
-@lru_cache(maxsize=64)
-def _renderer_of(process: int, thread: int) -> Renderer:
-    """Chosen once a thread, as OpenGL's contexts belong to the thread and process that made them."""
-    return choose_renderer()
 
 
 @lru_cache(maxsize=1)

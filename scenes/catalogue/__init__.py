@@ -77,11 +77,23 @@ def make_scene(
     renderer   default: chosen on first use, in each process (`scenes.renderers`)
     Errors: InputError for an unknown name, with those that there are.
     """
+    return exposed(unexposed_scene(name, shape, seed, frame_rate_hz, renderer), mean_interval)
+
+
+def unexposed_scene(
+    name: str, shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Renderer | None = None
+) -> Scene:
+    """A scene of the catalogue in light of its own; nothing is rendered yet.  Arguments and errors: `make_scene`."""
     if name not in SCENES:
         raise unknown_name("scene", name, SCENES)
     shape, seed = checked_shape(shape), checked_seed(seed, most=LARGEST_DERIVED_SEED)
     checked_number(frame_rate_hz, "frame_rate_hz", *FRAME_RATES_HZ)
-    scene, metered = SCENES[name](shape, seed, frame_rate_hz, renderer), None
+    return SCENES[name](shape, seed, frame_rate_hz, renderer)
+
+
+def exposed(scene: Scene, mean_interval: float) -> Scene:
+    """`scenes.exposure.expose`, worlds measured small."""
+    metered, shape = None, scene.shape
     if isinstance(scene, World) and shape[0] > METERED_ROWS:
         metered = replace(scene, shape=(METERED_ROWS, max(1, round(METERED_ROWS * shape[1] / shape[0]))))
     return expose(scene, mean_interval, metered)

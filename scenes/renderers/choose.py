@@ -17,7 +17,9 @@ from functools import cache
 from glob import glob
 from importlib.util import find_spec
 
+from scenes.renderers import contexts
 from scenes.renderers.contexts import FIX
+from scenes.renderers.elsewhere import Elsewhere
 from scenes.renderers.opengl import OpenGL
 from scenes.renderers.protocol import Renderer
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
@@ -41,9 +43,7 @@ def choose_renderer(wanted: str | None = None) -> Renderer:
     wanted: one of `BACKENDS`, or "auto" for the first that works; default: SPIKECAM_RENDERER, else "auto".
     Errors: InputError for an unknown name, or with the fix where the wanted back-end, or none at all, serves here.
     """
-    name = wanted or os.environ.get(VARIABLE) or "auto"
-    if name == "auto":
-        name = _first_that_works()
+    name = chosen(wanted)
     renderer = make(name)
     if name == "embree" and wanted != "embree" and os.environ.get(VARIABLE) != "embree":
         logger.warning(
@@ -54,8 +54,17 @@ def choose_renderer(wanted: str | None = None) -> Renderer:
     return renderer
 
 
+def chosen(wanted: str | None = None) -> str:
+    """The name of what `choose_renderer` would make; nothing is begun in this process.  Errors: InputError as there."""
+    name = wanted or os.environ.get(VARIABLE) or "auto"
+    return _first_that_works() if name == "auto" else name
+
+
 def make(name: str) -> Renderer:
-    """The back-end of this name in this process.  Errors: as `choose_renderer`."""
+    """The back-end of this name: in this process, or beside it where OpenGL cannot begin in it (`contexts.may_begin`).
+
+    Errors: as `choose_renderer`.
+    """
     if name not in BACKENDS:
         raise unknown_name("renderer", name, (*BACKENDS, "auto"))
     try:
@@ -63,6 +72,8 @@ def make(name: str) -> Renderer:
             from scenes.renderers.embree import Embree
 
             return Embree()
+        if not contexts.may_begin():
+            return Elsewhere(name)
         return OpenGL(name)
     except NotReadyError:
         raise

@@ -7,6 +7,7 @@ with the display every other context of the process.
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from scenes.renderers.pyrender_import import import_pyrender
+from spikecam_env.forked import may_be_forked
 
 _PACKAGES = "install the system packages libegl1 and libgl1 (Debian, Ubuntu: apt-get install -y libegl1 libgl1)"
 
@@ -25,6 +27,9 @@ FIX = {
 }
 """What to do where a back-end cannot be had."""
 
+_LIBRARIES = ("libEGL.so.1", "libOSMesa.so.8", "libOSMesa.so.6")
+_begun_in: int | None = None
+
 EGL_EXTENSIONS = 0x3055
 SOFTWARE = b"EGL_MESA_device_software"
 
@@ -35,6 +40,16 @@ class Context:
 
     make_current: Callable[[], None]
     end: Callable[[], None]
+
+
+def may_begin() -> bool:
+    """Whether OpenGL can begin in this process, or has: not where a process has begun it and then forked this one.
+
+    Its displays and threads are copied half, and the first call hangs.
+    """
+    if _begun_in is not None:
+        return _begun_in == os.getpid()
+    return not (may_be_forked() and any(map(_is_loaded, _LIBRARIES)))
 
 
 def egl(software: bool) -> Context:
@@ -95,7 +110,17 @@ def osmesa() -> Context:
     return Context(make_current, lambda: library.OSMesaDestroyContext(handle))
 
 
+def _is_loaded(library: str) -> bool:
+    try:
+        ctypes.CDLL(library, mode=os.RTLD_NOLOAD)
+    except OSError:
+        return False
+    return True
+
+
 def _load(*names: str) -> ctypes.CDLL:
+    global _begun_in
+    _begun_in = os.getpid()
     for name in names:
         try:
             return ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)

@@ -67,7 +67,8 @@ class OpenGL:
         self._kept: WeakKeyDictionary[Surface, _Uploaded] = WeakKeyDictionary()
         self._forgotten: list[_Uploaded] = []
         self._targets: _Targets | None = None
-        self._closed = False
+        self._end = finalize(self, _end, self._context, self._home)
+        self._end.atexit = False
 
     def render(
         self,
@@ -99,15 +100,12 @@ class OpenGL:
         return pasted(sprite, window)
 
     def close(self) -> None:
-        if self._closed or self._home != _here():
-            return
-        self._enter()
-        self._context.end()
-        self._closed = True
+        if self._home == _here():
+            self._end()
 
     def _enter(self) -> None:
         """The context is current, and what belonged to surfaces that are gone is given back."""
-        if self._closed:
+        if not self._end.alive:
             raise NotReadyError("this renderer is closed; make a new one with choose_renderer()")
         if self._home != _here():
             raise NotReadyError(
@@ -265,6 +263,13 @@ class _Targets:
 def _here() -> tuple[int, int]:
     """This process, this thread."""
     return os.getpid(), threading.get_ident()
+
+
+def _end(context: contexts.Context, home: tuple[int, int]) -> None:
+    """Give the context back with all that is in it, where that can be done: in its own process and thread."""
+    if home == _here():
+        context.make_current()
+        context.end()
 
 
 def _to_window(camera: Pinhole, window: Window, near: float, far: float) -> NDArray[np.float64]:

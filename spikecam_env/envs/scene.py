@@ -6,9 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from scenes.catalogue import SCENES, make_scene
+from scenes.catalogue import SCENES, exposed, unexposed_scene
+from scenes.exposure import checked_interval
 from scenes.later import Later
 from scenes.protocol import Gaze, Placed
+from scenes.renderers.choose import chosen
+from scenes.world import World
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
 from spikecam_env.envs.task import in_the_middle, is_inside
 from spikecam_env.errors import InputError, unknown_name
@@ -58,14 +61,20 @@ class SceneEnv(SpikeCameraEnv):
         self.start_offset_px = 0.25 * min(self.shape) if start_offset_px is None else float(start_offset_px)
         if not 0 <= self.start_offset_px < np.inf:
             raise InputError(f"start_offset_px is {start_offset_px}; it must be 0 or more, and finite")
-        self.scene_name, self.target, self.mean_interval = scene, target, mean_interval
-        self._named = None if scene == "random" else self._build(scene_seed)
+        self.scene_name, self.target, self.mean_interval = scene, target, checked_interval(mean_interval)
+        self._unexposed = None if scene == "random" else self._build(scene_seed)
+        self._named: Placed | None = None
+        if scene == "random" or isinstance(self._unexposed, World):
+            chosen()  # in this process, once: workers forked from it need not try again
+
+    def close(self) -> None:
+        """See `SpikeCameraEnv.close`."""
+        self._unexposed = self._named = None
+        super().close()
 
     def _build(self, seed: int) -> Placed:
-        """The scene of this seed; raises InputError where there is nothing to follow in it."""
-        rate = self.model.frame_rate_hz
-        options: Any = {"seed": seed, "shape": self.shape, "mean_interval": self.mean_interval, "frame_rate_hz": rate}
-        scene = make_scene(self.scene_name, **options)
+        """The scene of this seed, not yet exposed; raises InputError where there is nothing to follow in it."""
+        scene = unexposed_scene(self.scene_name, self.shape, seed, self.model.frame_rate_hz)
         places = scene.places(0.0) if isinstance(scene, Placed) else {}
         if not isinstance(scene, Placed) or not places:
             raise InputError(f"nothing moves in the scene {self.scene_name!r}, so there is nothing to follow")
@@ -77,17 +86,26 @@ class SceneEnv(SpikeCameraEnv):
         """The scene of one episode: always the same number of draws, so that an option changes nothing else."""
         seed, starts = int(rng.integers(2**31)), rng.integers(LATEST_START, size=_STARTS)
         distance, direction = self.start_offset_px * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi)
-        known = ("start_frame", "offset", *(("seed",) if self._named is None else ()))
+        known = ("start_frame", "offset", *(("seed",) if self._unexposed is None else ()))
         for name in options:
             if name not in known:
                 raise unknown_name("option of reset", name, known)
-        scene = self._named or self._build(int(options.get("seed", seed)))
+        scene = self._named or self._exposed(int(options.get("seed", seed)))
         pan, tilt = options.get("offset", (distance * np.cos(direction), distance * np.sin(direction)))
         offset = (float(pan), float(tilt))
         if "start_frame" in options:
             return Later(scene, int(options["start_frame"]), offset)
         episodes = [Later(scene, int(start), offset) for start in starts]
         return next((e for e in episodes if is_inside(self._place(e, 0.0, None), e.shape)), episodes[0])
+
+    def _exposed(self, seed: int) -> Placed:
+        """The scene of an episode.  Its first picture is rendered here, not at construction: a vector environment makes
+        one in the parent, only to ask for its spaces, and OpenGL does not survive the fork that follows."""
+        scene = exposed(self._unexposed or self._build(seed), self.mean_interval)
+        assert isinstance(scene, Placed)
+        if self._unexposed is not None:
+            self._named = scene
+        return scene
 
     def _place(self, scene: Placed, frame: float, gaze: Gaze | None) -> tuple[float, float]:
         places = scene.places(frame, gaze)

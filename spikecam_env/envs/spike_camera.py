@@ -12,6 +12,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.protocol import Gaze, Scene
+from scenes.renderers.shared import begin_to_use, done_with
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams.packing import check_shape, pack_frames, packed_bytes
@@ -51,7 +52,8 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
 
     `sensor` and `scene` are open to look at: `env.unwrapped.sensor.clean_twin()`, `env.unwrapped.scene.truth(...)`.
 
-    Errors: InputError for a value out of range or unknown, by name; NotReadyError before the first reset.
+    Errors: InputError for a value out of range or unknown, by name; NotReadyError before the first reset and
+    after `close`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012
@@ -82,7 +84,7 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         self.frames_per_step, self.packed, self.ground_truth = int(frames_per_step), packed, ground_truth
         self.render_mode = render_mode
         self._make_scene, self._judge = make_scene, judge
-        self.sensor = SpikeSensor(self.model, self.shape, seed=0, engine=engine)
+        self._sensor: SpikeSensor | None = SpikeSensor(self.model, self.shape, seed=0, engine=engine)
         self._scene: Scene | None = None
         self._position = (0.0, 0.0)
         self._recent: list[NDArray[np.uint8]] = []
@@ -93,9 +95,11 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[Any], dict[str, Any]]:
         """A new episode; `options` go to `make_scene`."""
+        sensor = self.sensor
         super().reset(seed=seed)
+        begin_to_use(self)
         self._scene = self._checked(self._make_scene(self.np_random, dict(options or {})))
-        self.sensor.reset(seed=int(self.np_random.integers(2**31)))
+        sensor.reset(seed=int(self.np_random.integers(2**31)))
         self._position = (0.0, 0.0)
         self._recent = []
         observation, info, _ = self._expose((0.0, 0.0))
@@ -116,18 +120,39 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         if self.render_mode is None:
             return None
         if not self._recent:
-            raise NotReadyError("nothing to render yet; call reset first")
+            raise self._not_ready()
         frames = sum(len(block) for block in self._recent)
         rate = sum(block.sum(axis=0, dtype=np.float32) for block in self._recent) / frames
         grey = (255 * rate ** (1 / 2.2) + 0.5).astype(np.uint8)
         return np.repeat(grey[:, :, None], 3, axis=2)
 
+    def close(self) -> None:
+        """Give back the sensor, the scene and, with the last environment of the thread, the renderer.
+
+        May be called again; anything else after it raises NotReadyError.
+        """
+        self._sensor = self._scene = None
+        self._recent = []
+        done_with(self)
+
+    @property
+    def sensor(self) -> SpikeSensor:
+        """The camera; NotReadyError after `close`."""
+        if self._sensor is None:
+            raise self._not_ready()
+        return self._sensor
+
     @property
     def scene(self) -> Scene:
-        """Of this episode; NotReadyError before the first reset."""
+        """Of this episode; NotReadyError before the first reset and after `close`."""
         if self._scene is None:
-            raise NotReadyError("the environment has no scene yet; call reset first")
+            raise self._not_ready()
         return self._scene
+
+    def _not_ready(self) -> NotReadyError:
+        if self._sensor is None:
+            return NotReadyError("the environment is closed; make a new one")
+        return NotReadyError("the environment has no scene yet; call reset first")
 
     def _expose(self, rate: tuple[float, float]) -> tuple[NDArray[Any], dict[str, Any], Gaze]:
         """The next K frames while the gaze moves at `rate` [pixels/frame]: (observation, info, the gaze's path)."""
