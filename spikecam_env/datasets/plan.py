@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from scenes.catalogue import SCENES, make_scene
-from scenes.exposure import MOST_INTERVAL
+from scenes.exposure import checked_interval
 from scenes.protocol import Scene
 from scenes.renderers.choose import BACKENDS
-from spikecam_env.checked import checked_count, checked_number, checked_seed, checked_shape
+from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.datasets.renderer import AUTO, renderer_of_process
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import SensorModel
@@ -73,7 +73,7 @@ class Plan:
         for entry in self.entries:
             if entry.scene not in SCENES:
                 raise unknown_name("scene", entry.scene, SCENES)
-        checked_number(self.mean_interval, "mean_interval", 1.0, MOST_INTERVAL, unit="frames, e.g. 10")
+        checked_interval(self.mean_interval)
         if self.renderer not in (AUTO, *BACKENDS):
             raise unknown_name("renderer", self.renderer, (AUTO, *BACKENDS))
         checked_seed(self.truth_every, "truth_every")
