@@ -13,6 +13,7 @@ Only the command stops so: in a library's user the handlers are the user's.
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -121,6 +122,17 @@ def without_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def finish(code: int) -> NoReturn:
+    """End the command that is done.  Python takes a tenth of a second to take itself apart, deaf to our handlers."""
+    if is_command():
+        with suppress(Exception):
+            atexit._run_exitfuncs()
+        with suppress(Exception):
+            sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def is_stopping() -> bool:

@@ -1,17 +1,21 @@
 """Files and folders that appear whole: written beside their place, then renamed; nothing is left if writing fails.
 
-What is being written is hidden, `.NAME.PID.RANDOM.partial.SUFFIX`, and locked by the process that writes it.  The
-system lifts the lock when that process ends, however it ends.  So what a killed one left is known, also from another
-machine or container, and the next that writes into the folder removes it.
+What is being written is hidden, `.NAME.PID.HOST-RANDOM.partial.SUFFIX`, and locked by the process that writes it.  The
+system lifts the lock when that process ends, however it ends.  So what a killed one left is known, and the next that
+writes into the folder removes it.  Some shared file systems lock for one machine only: what another machine began is
+removed when nobody has touched it for a day.
 """
 
 from __future__ import annotations
 
 import errno
 import os
+import platform
 import re
 import secrets
 import shutil
+import time
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -30,7 +34,9 @@ LONGEST_SUFFIX = 16
 """Bytes of an ending that libraries may go by; a longer one is a part of the name."""
 ATTEMPTS = 8
 """At a hidden name, which another process may clear before it is locked."""
-PARTIAL = re.compile(r"\..*\.\d+\.[0-9a-f]{8}\.partial(\..*)?", re.DOTALL)
+PARTIAL = re.compile(r"\..*\.\d+\.(?P<host>[0-9a-f]{8})-[0-9a-f]{8}\.partial(\..*)?", re.DOTALL)
+ABANDONED_S = 86_400.0
+"""Time [s] after which what another machine left untouched is given up."""
 
 
 @contextmanager
@@ -142,11 +148,14 @@ def clear_abandoned(folder: Path) -> None:
     if fcntl is None:
         return
     try:
-        names = [name for name in os.listdir(folder) if PARTIAL.fullmatch(name)]
+        found = [match for match in map(PARTIAL.fullmatch, os.listdir(folder)) if match]
     except OSError:
         return
-    for name in names:
+    for match in found:
+        name = match[0]
         with suppress(OSError):  # somebody is at work on it, or it is not ours to remove
+            if match["host"] != _host() and time.time() - (folder / name).stat().st_mtime < ABANDONED_S:
+                continue
             handle = _lock(folder / name)
             try:
                 _remove(folder / name)
@@ -227,9 +236,14 @@ def _hidden_name(name: str) -> str:
     stem, suffix = os.path.splitext(name)
     if len(os.fsencode(suffix)) > LONGEST_SUFFIX:
         stem, suffix = name, ""
-    mark = f".{os.getpid()}.{secrets.token_hex(4)}.partial{suffix}"
+    mark = f".{os.getpid()}.{_host()}-{secrets.token_hex(4)}.partial{suffix}"
     room = LONGEST_NAME - 1 - len(os.fsencode(mark))
     return f".{os.fsencode(stem)[:room].decode(errors='ignore')}{mark}"
+
+
+def _host() -> str:
+    """This machine, or container, in eight digits."""
+    return f"{zlib.crc32(os.fsencode(platform.node())):08x}"
 
 
 def _new_file(place: Path) -> None:

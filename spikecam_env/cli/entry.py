@@ -24,7 +24,7 @@ def main(args: list[str] | None = None) -> None:
         # Torch's threads spin long while they wait: beside other work on the same cores that costs a factor of seven.
         os.environ.setdefault("GOMP_SPINCOUNT", "10000")
         code = _with_streams(args)
-    sys.exit(code)
+    stopping.finish(code)
 
 
 def _with_streams(args: list[str] | None) -> int:

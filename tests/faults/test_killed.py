@@ -12,7 +12,7 @@ from pathlib import Path
 
 from spikecam_env.cli.main import run
 from spikecam_env.errors import WriteError
-from spikecam_env.whole import PARTIAL, whole_file, whole_folder, write_text_whole
+from spikecam_env.whole import ABANDONED_S, PARTIAL, whole_file, whole_folder, write_text_whole
 from tests.faults.writing import SMALL, python, tree
 
 LONG_S = 60.0
@@ -70,6 +70,16 @@ def test_what_a_living_process_is_writing_stays_and_a_killed_ones_folder_goes(tm
     with whole_folder(tmp_path / "folder"):
         pass
     assert tree(tmp_path) == {"next", "folder"}
+
+
+def test_what_another_machine_began_stays_for_a_day(tmp_path: Path) -> None:
+    """Its lock may not be seen from here."""
+    fresh, old = tmp_path / ".a.12.00000000-01234567.partial.h5", tmp_path / ".b.12.00000000-01234567.partial.h5"
+    for path, age_s in ((fresh, ABANDONED_S - 60), (old, ABANDONED_S + 60)):
+        path.touch()
+        os.utime(path, (time.time() - age_s,) * 2)
+    write_text_whole(tmp_path / "next", "x")
+    assert tree(tmp_path) == {"next", fresh.name}
 
 
 def test_two_threads_of_a_process_do_not_clear_each_other(tmp_path: Path) -> None:
