@@ -1,6 +1,6 @@
 """Whether this process may be a fork of another: then what threads of the other one held is not to be relied on.
 
-A fork copies one thread.  Libraries with threads of their own (OpenMP, OpenGL) wait in it for ever.
+A fork copies one thread.  In it, libraries with threads of their own (OpenMP, OpenGL) wait for threads that are gone.
 """
 
 from __future__ import annotations
