@@ -92,9 +92,7 @@ def checked_memory(size: int, what: str) -> None:
     """Raises InputError where so many bytes are more than the memory of this machine or container."""
     most = memory_bytes()
     if size > most:
-        raise InputError(
-            f"{what} would take {size / 1e9:.3g} GB of memory, this machine has {most / 1e9:.3g}; ask less"
-        )
+        raise InputError(f"{what} would take {_amount(size)} of memory, this machine has {_amount(most)}; ask less")
 
 
 def checked_disk(size: int, path: str | Path, what: str) -> None:
@@ -104,7 +102,7 @@ def checked_disk(size: int, path: str | Path, what: str) -> None:
         place = place.parent
     free = shutil.disk_usage(place).free
     if size > free:
-        raise InputError(f"{what} would take {size / 1e9:.3g} GB on disk; {place} has {free / 1e9:.3g} GB free")
+        raise InputError(f"{what} would take {_amount(size)} on disk; {place} has {_amount(free)} free")
 
 
 def memory_bytes() -> int:
@@ -119,6 +117,15 @@ def memory_bytes() -> int:
         except (OSError, ValueError):  # none, or "max"
             continue
     return most
+
+
+def _amount(size: float) -> str:
+    """Bytes in the unit that fits: `38.4 kB`, `12 GB`."""
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} TB"
 
 
 def _said(name: str, value: Any) -> str:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -38,6 +39,8 @@ def test_a_disk_that_fills_up_ends_every_command_in_a_line(
             if path.is_file()
         )
         sizes = sorted({PAGE * max(1, int(share * pages)) for share in SHARES})
+    roomy = SimpleNamespace(free=1 << 40)  # as if others fill it up meanwhile: nothing is refused beforehand
+    monkeypatch.setattr("shutil.disk_usage", lambda _: roomy)
     for size in sizes:
         folder = disk(size)
         capsys.readouterr()
@@ -50,6 +53,17 @@ def test_a_disk_that_fills_up_ends_every_command_in_a_line(
         left = tree(folder)
         assert not any("partial" in name for name in left), left
         assert not (writing.is_file and left), left
+
+
+@pytest.mark.parametrize("command", ["record h5", "record dat", "film", "dataset"])
+def test_what_a_disk_has_no_room_for_is_refused_before_the_work(
+    command: str, tmp_path: Path, inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=100))
+    assert WRITINGS[command].run(tmp_path / WRITINGS[command].out, inputs, monkeypatch) == 2
+    lines = said(capsys.readouterr().err)
+    assert len(lines) == 1 and "on disk" in lines[0] and "100 bytes free" in lines[0], lines
+    assert not tree(tmp_path)
 
 
 @pytest.mark.parametrize("command", [name for name in WRITINGS if name not in LONG_WORK])

@@ -15,6 +15,7 @@ import made_up
 import numpy as np
 from pytest import MonkeyPatch
 
+from scenes import VideoScene
 from scenes.catalogue import make_scene
 from spikecam_env.calibration import calibrate
 from spikecam_env.cli.main import run
@@ -97,6 +98,7 @@ def _streamed(**_: object) -> SimpleNamespace:
 
 
 SCENE: Work = {"scenes.catalogue:make_scene": make_scene}
+FILM: Work = {"scenes:VideoScene": VideoScene}
 MODEL = SensorModel.preset("scsim")
 DEMO: Work = {
     "spikecam_env.cli.showcase:stream": _streamed,
@@ -125,6 +127,9 @@ WRITINGS: dict[str, Writing] = {
     "record h5": Writing(f"record --out {{out}} --frames 320 {' '.join(SMALL)}", "disk.h5", {}),
     "record dat": Writing(f"record --out {{out}} --frames 320 {' '.join(SMALL)}", "disk.dat", {}),
     "record npz": Writing(f"record --out {{out}} --frames 320 {' '.join(SMALL)}", "disk.npz", {}),
+    "film": Writing(
+        f"film {{film}} --out {{out}} --film-rate 1000 --transfer linear {' '.join(SMALL)}", "film.h5", FILM
+    ),
     "denoise": Writing("denoise {recording} --out {out}", "denoised", {}),
     "demo": Writing("demo --out {out}", "demo", DEMO),
     "scenes mp4": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.mp4", SCENE),
@@ -155,10 +160,12 @@ def nothing_found(campaign, model, out, seed, exclude, threads) -> dict[str, obj
 
 
 def inputs_in(folder: Path) -> dict[str, Path]:
-    """A recording, the folder that it is in, and a campaign of flats."""
+    """A recording, the folder that it is in, a campaign of flats, and a film."""
     recordings = folder / "recordings"
     recordings.mkdir()
     made = {"recording": recordings / "disk.h5", "recordings": recordings, "campaign": folder / "campaign"}
+    made["film"] = folder / "film.npy"
+    np.save(made["film"], np.random.default_rng(0).integers(0, 255, (9, 24, 40), dtype=np.uint8))
     assert run(["record", "--out", str(made["recording"]), "--frames", "64", *SMALL]) == 0
     levels = [word for level in ("0.1", "0.2", "0.4") for word in ("--recording", f"flat:radiance={level}")]
     simulate = ["campaign", "simulate", str(made["campaign"]), "--shape", "16", "16", "--frames", "800"]
