@@ -77,7 +77,8 @@ def read_npy(
         taken = math.prod(array.shape) * array.dtype.itemsize
         checked_memory(taken, f"{source}, {array.dtype} of shape {shown(array.shape)},")
         choice = Choice(None, item, batch_axis, time_axis, flip, first, count)
-        return one_stream(np.asarray(array), choice, source, "the array")
+        spikes, how = one_stream(np.asarray(array), choice, source, "the array")
+        return np.array(spikes), how  # a copy: else it is the file, and changes with it
     except InputError:
         raise
     except Exception as error:  # struct, tokenize, mmap, ...: the many ways in which a damaged file fails

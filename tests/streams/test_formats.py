@@ -68,6 +68,7 @@ def test_an_array_comes_back_time_first(tmp_path: Path, ending: str, axis: int, 
     recording = read_recording(path)
     np.testing.assert_array_equal(recording.spikes, spikes)
     assert recording.spikes.dtype == np.uint8 and recording.spikes.flags.c_contiguous
+    assert recording.spikes.flags.writeable and not isinstance(recording.spikes.base, np.memmap)
     assert recording.attributes["time_axis"] == axis and f"time_axis {axis}" in str(recording)
     part = read_recording(path, first=3, count=5, flip=True, time_axis=axis)
     np.testing.assert_array_equal(part.spikes, spikes[3:8, ::-1])
