@@ -247,8 +247,8 @@ def open_recording(path: str | Path) -> Iterator[OpenRecording]:
 def _opened(file: h5py.File, path: Path) -> OpenRecording:
     where = str(path)
     attributes = hdf5_attributes(file, where)
-    if attributes.get("format") != FORMAT:
-        found = attributes.get("format", "no format attribute")
+    found = attributes.get("format", "no format attribute")
+    if not isinstance(found, str) or found != FORMAT:
         raise InputError(f"{where} is not a recording of this package: found {shown(found)}, need {FORMAT!r}")
     header = declared(_Header, attributes, where)
     shape = check_shape((header.height, header.width), f"{where}: (height, width)")
@@ -268,9 +268,13 @@ def _damage_named(path: str | Path) -> Iterator[None]:
 
 
 def is_recording(path: str | Path) -> bool:
-    """Whether an HDF5 file says it is a recording of this package; raises InputError where it is no HDF5 file."""
+    """Whether an HDF5 file says that this package wrote it, if not in words that it would use.
+
+    Raises InputError where it is no HDF5 file.
+    """
     with open_hdf5(path) as file:
-        return bool(hdf5_attributes(file, str(path)).get("format") == FORMAT)
+        found = hdf5_attributes(file, str(path)).get("format", "")
+    return not isinstance(found, str) or found.startswith("spikecam")
 
 
 def check_stored(dataset: h5py.Dataset, where: str) -> None:

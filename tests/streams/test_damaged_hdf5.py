@@ -38,7 +38,7 @@ def test_a_changed_byte_is_noticed_wherever_it_is(tmp_path: Path) -> None:
     recorded(path)
     whole, expected = path.read_bytes(), contents(path)
     rng = np.random.default_rng(1)
-    changed = rng.choice(len(whole), 250, replace=False)
+    changed = rng.choice(len(whole), 120, replace=False)
     refused = silent = 0
     for at in changed:
         path.write_bytes(whole[:at] + bytes([whole[at] ^ (1 << rng.integers(8))]) + whole[at + 1 :])
@@ -48,7 +48,7 @@ def test_a_changed_byte_is_noticed_wherever_it_is(tmp_path: Path) -> None:
             assert "a.h5" in str(error) and "\n" not in str(error)
             refused += 1
     print(f"{len(changed)} of {len(whole)} bytes changed: {refused} refused, {silent} read wrong, the others unused")
-    assert silent == 0 and refused > 150
+    assert silent == 0 and refused > 70
 
 
 def test_three_changed_bytes_of_the_spikes_are_an_input_error(tmp_path: Path) -> None:
@@ -122,8 +122,14 @@ SPOILT: dict[str, tuple[Callable[[h5py.File], Any], str]] = {
     "height is a reference": (lambda f: f.attrs.update(height=f["spikes"].ref), "height"),
     "height is missing": (lambda f: f.attrs.__delitem__("height"), "height is missing"),
     "width of other data": (lambda f: f.attrs.update(width=41), "need uint8"),
-    "format is a number": (lambda f: f.attrs.update(format=1), "found 1"),
-    "format is another": (lambda f: f.attrs.update(format="spikecam-maps/1"), "spikecam-maps"),
+    "format is a number": (lambda f: f.attrs.update(format=1), "not a recording of this package"),
+    "format is an array": (lambda f: f.attrs.update(format=["a", "b"]), "not a recording of this package"),
+    "format is an empty array": (lambda f: f.attrs.update(format=np.zeros(0)), "not a recording of this package"),
+    "format is a record": (
+        lambda f: f.attrs.update(format=np.zeros(1, [("a", "u1")])),
+        "not a recording of this package",
+    ),
+    "format is another": (lambda f: f.attrs.update(format="spikecam-maps/1"), "not a recording of this package"),
     "frame rate is text": (lambda f: f.attrs.update(frame_rate_hz="fast"), "frame_rate_hz"),
     "frame rate is NaN": (lambda f: f.attrs.update(frame_rate_hz=np.nan), "frame_rate_hz"),
     "frame rate is negative": (lambda f: f.attrs.update(frame_rate_hz=-1.0), "frame_rate_hz"),
