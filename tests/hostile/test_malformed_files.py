@@ -13,6 +13,7 @@ import pytest
 from mutations import damaged, json_files, npz, npz_files, toml_files
 from tally import reads_or_refuses
 
+from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.calibration import read_campaign, write_flats
 from spikecam_env.calibration.campaign_files import save_rates
 from spikecam_env.datasets import verify
@@ -372,3 +373,9 @@ def test_the_good_ones_are_good(campaign: Path, recordings: Path, tmp_path: Path
     assert imported(meets, "good files", recordings, tmp_path / "out", "maps.npz=relative") == 0
     (tmp_path / "dataset.json").write_text(json.dumps(DATASET))
     assert len(Manifest.read(tmp_path).files) == 2
+
+
+@pytest.mark.parametrize("data", cases(damaged(pretrained_path("paper").read_bytes())))
+def test_malformed_weights_are_refused(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "x.pt").write_bytes(data)
+    reads_or_refuses("weights .pt", lambda: load_weights(tmp_path / "x.pt"))
