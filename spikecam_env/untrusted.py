@@ -201,7 +201,7 @@ def open_hdf5(path: str | Path) -> h5py.File:
 
 
 def hdf5_attributes(item: h5py.HLObject, where: str) -> dict[str, Any]:
-    """Attributes by name: scalars as Python's own, text as str, anything else as h5py has it, for `declared` to refuse.
+    """Attributes by name, as Python's own numbers, text and lists; anything else as h5py has it.
 
     Raises InputError for an attribute that cannot be read.
     """
@@ -311,7 +311,7 @@ def _selected(shape: tuple[int, ...], part: Any) -> list[int]:
 def _plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode("utf-8")
-    return value.item() if isinstance(value, np.generic) and value.dtype.kind in "biufSU" else value
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
 
 
 def _no_constant(name: str) -> Any:

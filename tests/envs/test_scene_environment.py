@@ -122,7 +122,7 @@ def test_make_vec_gives_each_camera_its_own_world() -> None:
         ({"scene": "dise"}, "unknown scene 'dise'"),
         ({"scene": "disk", "target": "fly"}, "unknown target .*'fly'"),
         ({"start_offset_px": -1.0}, "start_offset_px is -1"),
-        ({"scene": "disk", "mean_interval": 0.5}, "mean_interval is 0.5"),
+        ({"scene": "disk", "mean_interval": 0.5}, "mean_interval = 0.5"),
     ],
 )
 def test_bad_options_are_named(options: dict[str, Any], message: str) -> None:

@@ -15,12 +15,13 @@ def count(target: str, outcome: str) -> None:
     TALLY.setdefault(target, Counter())[outcome] += 1
 
 
-def reads_or_refuses(target: str, read: Callable[[], object]) -> None:
-    """What is not read is refused by an InputError of one line; any other exception fails the test."""
+def reads_or_refuses(target: str, read: Callable[[], object]) -> bool:
+    """Whether it is read; what is not is refused by an InputError of one line; any other exception fails the test."""
     try:
         read()
     except InputError as error:
         assert len(str(error)) < 1000 and str(error).count("\n") == 0
         count(target, "refused")
-    else:
-        count(target, "taken")
+        return False
+    count(target, "taken")
+    return True

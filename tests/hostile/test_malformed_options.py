@@ -119,7 +119,6 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--height": (*COUNTS, 9),
             "--width": COUNTS,
             "--crop-width": (*COUNTS, 9),
-            "--time-axis": (10**30,),
             "--rows": ((-1, 3), (3, 1), (0, 10**30), (0, 9)),
             "--columns": ((-1, 3), (3, 3), (0, 100)),
             "--label": ("a.dat=nan", "a.dat=-1", "a.dat=1e400", "a.dat=", "=1", "a.dat", "../a.dat=1", "/etc/passwd=1",
