@@ -14,17 +14,30 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import TypeVar
 
+import torch
+
+from spikecam_env.forked import may_be_forked
+
 T = TypeVar("T")
 
-_IMPORTED_IN = os.getpid()
 _NAME = "denoiser-after-fork"
 
 
 def where_torch_can(work: Callable[[], T]) -> T:
-    """What `work` returns or raises; it is done here unless this process was forked."""
-    if os.getpid() == _IMPORTED_IN or threading.current_thread().name.startswith(_NAME):
+    """What `work` returns or raises; done here unless this process may be forked.
+
+    `torch.set_num_threads` of the caller holds.
+    """
+    if not may_be_forked() or threading.current_thread().name.startswith(_NAME):
         return work()
-    return _thread(os.getpid()).submit(work).result()
+    threads = torch.get_num_threads()
+
+    def there() -> T:
+        if torch.get_num_threads() != threads:
+            torch.set_num_threads(threads)
+        return work()
+
+    return _thread(os.getpid()).submit(there).result()
 
 
 @lru_cache(maxsize=1)

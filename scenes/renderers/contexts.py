@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from scenes.renderers.pyrender_import import import_pyrender
+from spikecam_env.forked import may_be_forked
 
 _PACKAGES = "install the system packages libegl1 and libgl1 (Debian, Ubuntu: apt-get install -y libegl1 libgl1)"
 
@@ -27,7 +28,6 @@ FIX = {
 """What to do where a back-end cannot be had."""
 
 _LIBRARIES = ("libEGL.so.1", "libOSMesa.so.8", "libOSMesa.so.6")
-_IMPORTED_IN = os.getpid()
 _begun_in: int | None = None
 
 EGL_EXTENSIONS = 0x3055
@@ -49,7 +49,7 @@ def may_begin() -> bool:
     """
     if _begun_in is not None:
         return _begun_in == os.getpid()
-    return os.getpid() == _IMPORTED_IN or not any(map(_is_loaded, _LIBRARIES))
+    return not (may_be_forked() and any(map(_is_loaded, _LIBRARIES)))
 
 
 def egl(software: bool) -> Context:

@@ -86,7 +86,7 @@ class SceneEnv(SpikeCameraEnv):
         """The scene of one episode: always the same number of draws, so that an option changes nothing else."""
         seed, starts = int(rng.integers(2**31)), rng.integers(LATEST_START, size=_STARTS)
         distance, direction = self.start_offset_px * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi)
-        known = ("start_frame", "offset", *(("seed",) if self._named is None else ()))
+        known = ("start_frame", "offset", *(("seed",) if self._unexposed is None else ()))
         for name in options:
             if name not in known:
                 raise unknown_name("option of reset", name, known)

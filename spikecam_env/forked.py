@@ -1,0 +1,16 @@
+"""Whether this process may be a fork of another: then what threads of the other one held is not to be relied on.
+
+A fork copies one thread.  Libraries with threads of their own (OpenMP, OpenGL) wait in it for threads that are not there.
+"""
+
+from __future__ import annotations
+
+import os
+from multiprocessing import parent_process
+
+_IMPORTED_IN = os.getpid()
+
+
+def may_be_forked() -> bool:
+    """True in a process forked after this module was imported, and in every process that multiprocessing has started."""
+    return os.getpid() != _IMPORTED_IN or parent_process() is not None

@@ -1,0 +1,121 @@
+"""`python -m tests.envs.vectors WHAT`: vector environments as users make them; run apart, so that a hang is a failure."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import gymnasium
+import numba
+import numpy as np
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+
+import spikecam_env.envs  # noqa: F401
+from denoiser import DenoiseObservation
+from spikecam_env.envs.registration import ENVIRONMENTS
+
+SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20}
+STEPS = 2
+"""The denoiser's frames come 27 late: they are seen from the first step on."""
+
+Makers = list[Callable[[], gymnasium.Env]]
+
+
+def of(name: str) -> Makers:
+    """One plain environment and one with the denoiser."""
+
+    def plain() -> gymnasium.Env:
+        return gymnasium.make(name, **SMALL)
+
+    return [plain, lambda: DenoiseObservation(plain())]
+
+
+def seen(vector: Any) -> dict[str, np.ndarray]:
+    """Observations, rewards and places of an episode's first steps; closes the environments."""
+    observation, info = vector.reset(seed=3)
+    found = {"observation": [observation.copy()], "reward": [], "gaze": []}
+    for action in np.random.default_rng(0).uniform(-0.2, 0.2, (STEPS, 2, 2)).astype(np.float32):
+        observation, reward, _, _, info = vector.step(action)
+        found["observation"].append(observation.copy())
+        found["reward"].append(reward.copy())
+        found["gaze"].append(info["gaze"].copy())
+    vector.close()
+    assert np.any(found["observation"], axis=(0, 2, 3, 4)).all(), f"{vector} sees nothing"
+    return {name: np.stack(arrays) for name, arrays in found.items()}
+
+
+def same(a: dict[str, np.ndarray], b: dict[str, np.ndarray], what: str) -> None:
+    for name in a:
+        assert np.array_equal(a[name], b[name]), f"{what}: {name} differs"
+
+
+@numba.njit(parallel=True)
+def _total(values):
+    total = 0.0
+    for i in numba.prange(len(values)):
+        total += values[i]
+    return total
+
+
+def use_every_pool() -> None:
+    """Threads of numba and of OpenCV; a synchronous run has used torch's, OpenGL's and ours."""
+    numba.set_num_threads(min(2, numba.config.NUMBA_NUM_THREADS))
+    _total(np.ones(100_000))
+    cv2.setNumThreads(2)
+    cv2.GaussianBlur(np.ones((1000, 1000), np.float32), (15, 15), 2.0)
+
+
+def every_id() -> None:
+    """Forked from a fresh process; then the same here; then forked again, from a process that has used every pool."""
+    names = list(ENVIRONMENTS)
+    fresh = {name: seen(AsyncVectorEnv(of(name))) for name in names}
+    for name in names:
+        same(fresh[name], seen(SyncVectorEnv(of(name))), f"{name}, synchronous")
+    keeps_opengl = gymnasium.make("spikecam_env/Fan-v0", **SMALL)
+    keeps_opengl.reset(seed=0)
+    use_every_pool()
+    for name in names[::4]:
+        same(fresh[name], seen(AsyncVectorEnv(of(name))), f"{name}, forked late")
+    vector = gymnasium.make_vec("spikecam_env/Fan-v0", num_envs=2, vectorization_mode="async", **SMALL)
+    vector.reset(seed=0)
+    vector.close()
+    print(f"{len(names)} ids")
+
+
+def contexts() -> None:
+    """Spawned and from a server, against a synchronous run."""
+    for name in ("spikecam_env/Fan-v0",):
+        expected = seen(SyncVectorEnv(of(name)))
+        for context in ("spawn", "forkserver"):
+            same(expected, seen(AsyncVectorEnv(of(name), context=context)), f"{name}, {context}")
+
+
+def held() -> tuple[int, int, int]:
+    """(resident memory [kB], open files, threads) of this process."""
+    with open("/proc/self/statm") as numbers:
+        resident = int(numbers.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1024
+    return resident, len(os.listdir("/proc/self/fd")), len(os.listdir("/proc/self/task"))
+
+
+def many() -> None:
+    """Fifty environments, one after another."""
+    figures = []
+    for number in range(50):
+        env = of("spikecam_env/Ball-v0")[1]()
+        env.reset(seed=number)
+        env.step(np.zeros(2, np.float32))
+        env.close()
+        figures.append(held())
+    print(f"after 10: {figures[9]}, after 50: {figures[-1]} (kB, files, threads)")
+    assert figures[-1][0] - figures[9][0] < 40_000, "memory grows"
+    assert figures[-1][1:] <= figures[9][1:], "files or threads grow"
+
+
+if __name__ == "__main__":
+    began = time.monotonic()
+    {"every_id": every_id, "contexts": contexts, "many": many}[sys.argv[1]]()
+    print(f"{time.monotonic() - began:.1f} s")
