@@ -12,7 +12,7 @@ in camera coordinates, Z < 0, is seen at
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import trimesh
@@ -33,6 +33,10 @@ class Surface:
     mesh: trimesh.Trimesh
     albedo: float | Array = 0.8
     emission: float = 0.0
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Surface:
+        """Itself: nothing changes a surface, and trimesh loses a mesh's given normals when it copies it."""
+        return self
 
 
 @dataclass(frozen=True, eq=False)
