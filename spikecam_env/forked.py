@@ -1,6 +1,6 @@
 """Whether this process may be a fork of another: then what threads of the other one held is not to be relied on.
 
-A fork copies one thread.  Libraries with threads of their own (OpenMP, OpenGL) wait in it for threads that are not there.
+A fork copies one thread.  In it, libraries with threads of their own (OpenMP, OpenGL) wait for threads that are gone.
 """
 
 from __future__ import annotations
@@ -12,5 +12,5 @@ _IMPORTED_IN = os.getpid()
 
 
 def may_be_forked() -> bool:
-    """True in a process forked after this module was imported, and in every process that multiprocessing has started."""
+    """True in a process forked after this module was imported, and in every process of multiprocessing."""
     return os.getpid() != _IMPORTED_IN or parent_process() is not None

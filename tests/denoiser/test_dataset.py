@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -83,3 +86,41 @@ def test_datasets_that_will_not_do_are_refused(folder: Path, tmp_path: Path) -> 
         SpikeWindows(folder, crop=None, reach=80)
     with pytest.raises(InputError, match="no dataset"):
         SpikeWindows(tmp_path)
+
+
+@pytest.mark.parametrize("context", ["fork", "spawn"])
+def test_persistent_workers_draw_other_crops_in_every_epoch(folder: Path, context: str) -> None:
+    """Those that a loader without workers draws."""
+    data = SpikeWindows(folder, "test", crop=(8, 8), stride=16)
+    loader = DataLoader(data, batch_size=None, num_workers=1, persistent_workers=True, multiprocessing_context=context)
+    plain = SpikeWindows(folder, "test", crop=(8, 8), stride=16)
+    epochs = []
+    for epoch in (0, 1, 5, 0):
+        data.epoch = plain.epoch = epoch
+        found = [(item["row"], item["column"]) for item in loader]
+        assert found == [(plain[i]["row"], plain[i]["column"]) for i in range(len(plain))]
+        epochs.append(found)
+    assert epochs[0] == epochs[3] and epochs[0] != epochs[1] != epochs[2] != epochs[0]
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda data: pickle.loads(pickle.dumps(data))])
+def test_a_copy_hands_its_epoch_to_persistent_workers_too(folder: Path, copied: Any) -> None:
+    data = copied(SpikeWindows(folder, "test", crop=(8, 8), stride=40))
+    loader = DataLoader(data, batch_size=None, num_workers=1, persistent_workers=True)
+    first = [(item["row"], item["column"]) for item in loader]
+    data.epoch = 1
+    assert first != [(item["row"], item["column"]) for item in loader]
+
+
+@pytest.mark.parametrize(
+    "bad", [{"reach": -1}, {"reach": 1.5}, {"stride": 0}, {"stride": np.nan}, {"seed": -1}, {"crop": (0, 8)}]
+)
+def test_options_out_of_range_are_named(folder: Path, bad: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=next(iter(bad)).replace("crop", "shape")):
+        SpikeWindows(folder, **{"crop": (8, 8), **bad})
+
+
+@pytest.mark.parametrize("epoch", [-1, 1.5, np.nan, None, 2**63])
+def test_an_epoch_that_is_none_is_refused(folder: Path, epoch: Any) -> None:
+    with pytest.raises(InputError, match="epoch"):
+        SpikeWindows(folder, crop=(8, 8)).epoch = epoch

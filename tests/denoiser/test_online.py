@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
-from denoiser.online import OnlineDnSS
+from denoiser import infer
+from denoiser.online import OnlineDnSS, denoise
 from denoiser.recipe import RECIPES
+from denoiser.window import RollingWindow
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.streams import isi_planes
 
@@ -176,3 +179,150 @@ def test_no_kernel_changes_torch_s_threads():
         assert torch.get_num_threads() == 1
     finally:
         torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_weights_converted_once_give_the_bits_of_converting_them_at_every_pass(mode):
+    """Against autocast over the float32 network, at sizes that four divides and does not, with both types."""
+    torch.manual_seed(1)
+    network = RECIPES[mode].network().to(memory_format=torch.channels_last)
+    for number_type in (torch.bfloat16, torch.float32):
+        once = infer.prepared(network, number_type)
+        assert {p.dtype for p in once.parameters()} == {number_type}
+        for shape in (SHAPE, (16, 32)):
+            spikes = (np.random.default_rng(0).random((60, *shape)) < 0.3).astype(np.uint8)
+            for window in RollingWindow(RECIPES[mode].layout, shape).push(spikes):
+                every = infer.rates(network, window, number_type)
+                assert every.any() and np.array_equal(infer.rates(once, window, number_type), every)
+
+
+def test_training_a_network_on_changes_no_denoiser_made_of_it():
+    torch.manual_seed(1)
+    network = RECIPES["best"].network()
+    online, same = OnlineDnSS(RECIPES["best"], network, output="rate"), denoiser("best", output="rate")
+    assert network.training
+    with torch.no_grad():
+        for weights in network.parameters():
+            weights += 1
+    assert np.array_equal(online.push(stream(40)), same.push(stream(40)))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_another_denoises_a_stream_of_its_own(mode):
+    first, whole = denoiser(mode), run(denoiser(mode), [stream(40)])
+    first.push(stream(30, seed=5))
+    assert all(np.array_equal(a, b) for a, b in zip(run(first.another(), [stream(40)]), whole, strict=True))
+    assert first.another("rate").output == "rate" and first.output == "both"
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_later_changes_of_what_went_in_and_came_out_change_nothing(mode):
+    spikes, online, pieces = stream(61), denoiser(mode), []
+    whole = run(denoiser(mode), [spikes])
+    for start in range(0, 61, 7):
+        block = spikes[start : start + 7].copy()
+        out = online.push(block)
+        pieces.append(tuple(part.copy() for part in out))
+        state = online.state()
+        for array in (block, *out, *state["window"].values(), *state["decoding"], state["held"]):
+            if isinstance(array, np.ndarray) and array.size:
+                array[...] = 1
+    pieces.append(online.flush())
+    for part, expected in zip(zip(*pieces, strict=True), whole, strict=True):
+        assert np.array_equal(np.concatenate(part), expected)
+
+
+def test_restoring_copies_the_state():
+    spikes, whole = stream(61), run(denoiser("best"), [stream(61)])
+    first = denoiser("best")
+    before = first.push(spikes[:40])
+    state = first.state()
+    second = denoiser("best")
+    second.restore(state)
+    for array in (*state["window"].values(), *state["decoding"], state["held"]):
+        if isinstance(array, np.ndarray):
+            array[...] = 0
+    after = run(second, [spikes[40:]])
+    assert np.array_equal(np.concatenate([before[1], after[1]]), whole[1])
+
+
+def of_other_weights() -> OnlineDnSS:
+    torch.manual_seed(2)
+    return OnlineDnSS(RECIPES["paper"], RECIPES["paper"].network())
+
+
+def of_another_decoder() -> OnlineDnSS:
+    torch.manual_seed(1)
+    recipe = replace(RECIPES["paper"], decoder="accumulate")
+    return OnlineDnSS(recipe, recipe.network())
+
+
+@pytest.mark.parametrize(
+    ("other", "named"),
+    [
+        (of_other_weights, "weights"),
+        (of_another_decoder, "recipe"),
+        (lambda: denoiser("paper", stride=2), "stride"),
+        (lambda: denoiser("best"), "weights"),
+        (lambda: denoiser("paper", precision="float32"), "precision"),
+    ],
+)
+@pytest.mark.parametrize("pushed", [0, 30])
+def test_a_state_that_would_go_on_differently_is_refused_and_leaves_no_trace(other, named, pushed):
+    first = denoiser("paper", precision="bfloat16")
+    first.push(stream(pushed))
+    mine = other()
+    mine.push(stream(25, seed=3))
+    twin = other()
+    twin.push(stream(25, seed=3))
+    with pytest.raises(InputError, match=named):
+        mine.restore(first.state())
+    assert np.array_equal(mine.push(stream(20))[-1], twin.push(stream(20))[-1])
+
+
+def test_a_state_goes_on_with_another_output():
+    whole = run(denoiser("best"), [stream(61)])
+    first = denoiser("best", output="spikes")
+    first.push(stream(61)[:40])
+    second = denoiser("best", output="rate")
+    second.restore(first.state())
+    rest = np.concatenate([second.push(stream(61)[40:]), second.flush()])
+    assert np.array_equal(rest, whole[1][61 - len(rest) :])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda state: None,
+        lambda state: [state],
+        lambda state: {},
+        lambda state: {**state, "of": None},
+        lambda state: {**state, "shape": (1, 2, 3)},
+        lambda state: {**state, "shape": (8, 14)},
+        lambda state: {**state, "decoding": None},
+        lambda state: {**state, "held": np.zeros((8, 1, 1), np.float32)},
+        lambda state: {**state, "window": {**state["window"], "frames": np.zeros((1, 2, 2), np.uint8)}},
+        lambda state: {**state, "window": {**state["window"], "last": None}},
+        lambda state: {name: state[name] for name in ("of", "shape")},
+    ],
+)
+def test_what_is_no_state_is_refused(change):
+    online = denoiser("best")
+    online.push(stream(40))
+    with pytest.raises(InputError, match="state"):
+        denoiser("best").restore(change(online.state()))
+
+
+@pytest.mark.parametrize("chunk", [0, -1, 1.5, None, float("nan"), "8"])
+def test_a_chunk_of_no_frames_is_refused(chunk):
+    with pytest.raises(InputError, match="chunk"):
+        denoise(stream(30), chunk=chunk)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"mode": None}, {"mode": ["best"]}, {"output": None}, {"precision": None}, {"stride": 1.5}],
+)
+def test_options_of_another_type_are_named(options):
+    with pytest.raises(InputError, match=next(iter(options))):
+        denoise(stream(30), **{"mode": "paper", **options})

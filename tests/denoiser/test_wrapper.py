@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import gymnasium
 import numpy as np
 import pytest
@@ -9,8 +12,9 @@ import torch
 
 from denoiser.online import OnlineDnSS
 from denoiser.recipe import RECIPES
+from denoiser.weights import save_weights
 from denoiser.wrapper import DenoiseObservation
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, NotReadyError
 
 K, SHAPE = 5, (6, 8)
 
@@ -78,3 +82,62 @@ def test_packed_observations_are_refused():
 def test_an_unknown_output_is_named():
     with pytest.raises(InputError, match="output"):
         DenoiseObservation(Noise(), denoiser("spikes"), "film")
+
+
+def test_one_denoiser_given_to_two_environments_gives_each_its_own_stream():
+    mine = denoiser("rate")
+    first, second = (DenoiseObservation(Noise(), mine) for _ in range(2))
+    expected = [episode(DenoiseObservation(Noise(), denoiser("spikes")), seed=seed) for seed in (3, 4)]
+    blocks = [[first.reset(seed=3)[0]], [second.reset(seed=4)[0]]]
+    for _ in range(12):
+        blocks[0].append(first.step(0)[0])
+        blocks[1].append(second.step(0)[0])
+    for seen, alone in zip(blocks, expected, strict=True):
+        assert np.array_equal(np.concatenate(seen), alone)
+
+
+def test_a_denoiser_that_is_given_stays_as_it_was():
+    mine, twin = denoiser("rate"), denoiser("rate")
+    stream = (np.random.default_rng(0).random((60, *SHAPE)) < 0.3).astype(np.uint8)
+    begun = [mine.push(stream[:30]), twin.push(stream[:30])]
+    env = DenoiseObservation(Noise(), mine, "spikes")
+    episode(env)
+    assert mine.output == "rate" and np.array_equal(*begun)
+    assert np.array_equal(mine.push(stream[30:]), twin.push(stream[30:]))
+
+
+@pytest.mark.parametrize("kind", [str, lambda path: path])
+def test_a_checkpoint_is_a_mode(tmp_path, kind):
+    torch.manual_seed(0)
+    path = tmp_path / "mine.pt"
+    save_weights(path, "best", RECIPES["best"], RECIPES["best"].network(), {})
+    seen = episode(DenoiseObservation(Noise(), kind(path)))
+    assert np.array_equal(seen, episode(DenoiseObservation(Noise(), denoiser("spikes"))))
+
+
+@pytest.mark.parametrize("mode", ["worst", None, 3, ["best"], b"best.pt", "nowhere.pt"])
+def test_an_unknown_mode_is_named(mode):
+    with pytest.raises(InputError, match=r"unknown denoiser mode|no file nowhere\.pt"):
+        DenoiseObservation(Noise(), mode)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_goes_on_as_the_original_does(copied):
+    env = DenoiseObservation(Noise(), denoiser("rate"), "rate")
+    episode(env)
+    other = copied(env)
+    for _ in range(6):
+        assert np.array_equal(env.step(0)[0], other.step(0)[0])
+
+
+def test_a_step_before_reset_or_after_close_is_refused():
+    env = DenoiseObservation(Noise(), denoiser("spikes"))
+    env.unwrapped.sent = []
+    with pytest.raises(NotReadyError, match="call reset first"):
+        env.step(0)
+    env.reset(seed=0)
+    env.close()
+    env.close()
+    for use in (lambda: env.step(0), env.reset):
+        with pytest.raises(NotReadyError, match="closed; make a new one"):
+            use()

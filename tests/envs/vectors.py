@@ -1,4 +1,4 @@
-"""`python -m tests.envs.vectors WHAT`: vector environments as users make them; run apart, so that a hang is a failure."""
+"""`python -m tests.envs.vectors WHAT`: vector environments as users make them, in a process that may hang."""
 
 from __future__ import annotations
 
