@@ -189,7 +189,7 @@ def _draw_with(recipe: Recipe, seed: int, number: int, weights: Path | None) -> 
 @lru_cache(maxsize=1)
 def _network_of(weights: Path) -> tuple[nn.Module, bool]:
     _, network, training = load_weights(weights)
-    return network.to(memory_format=torch.channels_last), bool(training["knows_gain"])  # type: ignore[call-overload]
+    return network.to(memory_format=torch.channels_last), training.get("knows_gain") is True  # type: ignore[call-overload]
 
 
 def _one_thread() -> None:

@@ -98,3 +98,74 @@ def test_a_network_learns_on_a_gpu(small, tmp_path):
     """To weights that load on a processor, past a validation and into clips with a gain."""
     weights = weights_after(tmp_path, 6, device="cuda")
     assert all(w.device.type == "cpu" and bool(torch.isfinite(w).all()) for w in weights.values())
+
+
+@pytest.mark.parametrize(
+    "name", ["steps", "batch", "seed", "threads", "patch", "steps_per_clip", "refresh_every", "workers"]
+)
+@pytest.mark.parametrize("value", [-1, 10**30, 1.5, float("nan"), None, True, "8"])
+def test_a_count_out_of_range_is_named(name, value):
+    with pytest.raises(InputError, match=name):
+        TrainConfig(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["lr", "minutes", "save_every_s"])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), 1e308, True, "0.1"])
+def test_an_amount_out_of_range_is_named(name, value):
+    with pytest.raises(InputError, match=name):
+        TrainConfig(**{name: value})
+
+
+@pytest.mark.parametrize("bad", [{"mode": None}, {"mode": "worst"}, {"out": 3}, {"resume": "no"}, {"device": 0}])
+def test_other_options_are_checked(bad):
+    with pytest.raises(InputError, match=next(iter(bad))):
+        TrainConfig(**bad)
+
+
+ODD_RUNS = {
+    "a list": lambda run: [run],
+    "no step": lambda run: run.pop("step") and None,
+    "a step of text": lambda run: run.update(step="4"),
+    "a negative step": lambda run: run.update(step=-1),
+    "NaN seconds": lambda run: run.update(seconds=float("nan")),
+    "a curve of text": lambda run: run.update(curve=[{"step": "1"}]),
+    "resumed at a list": lambda run: run.update(resumed_at=[[1]]),
+    "an unknown entry": lambda run: run.update(more=1),
+    "rng no JSON": lambda run: run.update(rng="{"),
+    "rng nested": lambda run: run.update(rng="[" * 100_000),
+    "rng of another kind": lambda run: run.update(rng=run["rng"].replace("PCG64", "MT19937")),
+    "rng out of range": lambda run: run.update(rng=run["rng"].replace('"state": ', '"state": -').replace("-{", "{")),
+    "rng a number": lambda run: run.update(rng=3),
+    "weights NaN": lambda run: next(iter(run["network"].values())).fill_(float("nan")),
+    "weights a list": lambda run: run.update(network=[1]),
+    "no groups": lambda run: run["optimiser"].pop("param_groups") and None,
+    "groups a number": lambda run: run["optimiser"].update(param_groups=3),
+    "other settings": lambda run: run["optimiser"]["param_groups"][0].update(betas=(2.0, 3.0)),
+    "rate NaN": lambda run: run["optimiser"]["param_groups"][0].update(lr=float("nan")),
+    "moments of others": lambda run: run["optimiser"]["state"].pop(0) and None,
+    "moments of another shape": lambda run: run["optimiser"]["state"][0].update(exp_avg=torch.zeros(3)),
+    "moments infinite": lambda run: run["optimiser"]["state"][0]["exp_avg"].fill_(float("inf")),
+}
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory):
+    """A run of one step."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(training, "ClipFeed", InlineFeed)
+    patch.setattr(training, "FIRST_CLIPS", 2)
+    out = tmp_path_factory.mktemp("run")
+    weights_after(out, 1)
+    patch.undo()
+    return out / "last.pt"
+
+
+@pytest.mark.parametrize("name", ODD_RUNS)
+def test_an_odd_run_to_resume_is_refused_in_one_line(begun, tmp_path, name):
+    run = torch.load(begun, weights_only=True)
+    changed = ODD_RUNS[name](run)
+    torch.save(changed if isinstance(changed, list) else run, tmp_path / "last.pt")
+    config = TrainConfig(out=tmp_path)
+    with pytest.raises(InputError, match=r"last\.pt") as caught:
+        training._Run.begin(config, RECIPES["best"]).load(tmp_path / "last.pt")
+    assert "\n" not in str(caught.value)

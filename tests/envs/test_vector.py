@@ -23,8 +23,8 @@ from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Lighting, Pinhole, Window
 from spikecam_env.errors import InputError, NotReadyError
 
-LONGEST_S = 400.0
-"""Ten times what the slowest takes on two idle cores: what is not done by then hangs."""
+LONGEST_S = 600.0
+"""Ten times what the slowest takes on two cores: what is not done by then hangs."""
 
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 8}
 
