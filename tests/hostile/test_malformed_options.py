@@ -56,6 +56,21 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
         },
     ),
+    "film": (
+        ("film", "{here}/film.npy", "--out", "{out}.h5", "--film-rate", 1000, "--transfer", "linear", *SIZE_8),
+        {
+            "--seed": SEEDS,
+            "--frames": (*COUNTS, 10**15),
+            "--seconds": (*FLOATS, "1e9"),
+            "--size": SIZES,
+            "--film-rate": (*FLOATS, "1e300", "1e-300"),
+            "--frame-rate": FLOATS,
+            "--slow": (*FLOATS, "2"),
+            "--mean-interval": (*FLOATS, "0.5"),
+            "--transfer": ("", "log", "gamma0", "gammanan", "gamma1e308"),
+            "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
+        },
+    ),
     "demo": (
         ("demo", "--out", "{out}", *SIZE_8),
         {"--seed": SEEDS, "--frames": (*COUNTS, 499), "--size": SIZES, "--rpm": ("nan", "inf", "1e308")},
@@ -205,6 +220,7 @@ def test_an_option_out_of_range_is_refused_by_name(
     name: str, line: tuple, option: str, words: tuple, tmp_path: Path, meets
 ) -> None:
     (tmp_path / "a.dat").write_bytes(bytes(range(256)) * 2)
+    np.save(tmp_path / "film.npy", np.full((5, 8, 8), 100, np.uint8))
     given = [*line]
     if option in given:
         at = given.index(option)
