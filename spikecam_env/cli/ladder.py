@@ -35,11 +35,12 @@ class Ladder:
         if self.jobs < 1:
             raise InputError(f"--jobs {self.jobs}: it must be 1 or more")
         SensorModel.load(self.model)
-        from spikecam_env.gap import ladder
+        from spikecam_env.gap.ladder import ladder
+        from spikecam_env.gap.ladder import table as rungs
 
         with out_folder(self.out) as folder:
-            made = ladder.ladder(self.campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
+            made = ladder(self.campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
             made.write(folder)
-            print(table(ladder.table(made)))
+            print(table(rungs(made)))
             print(f"\ngap: mean square of {made.statistics} statistics' held-out part, in noise; 1 is chance")
             print(f"the figure: {folder / 'ladder.png'}   the model: {folder / 'model.toml'}")
