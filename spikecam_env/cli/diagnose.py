@@ -86,6 +86,8 @@ def summary(diagnosis: Diagnosis) -> str:
     found = _found(diagnosis)
     if found:
         parts += ["", table(found)]
+    if diagnosis.not_bounded and diagnosis.verdict == "none":
+        parts += [f"not bounded by these data: {', '.join(name for name, _ in diagnosis.not_bounded)}"]
     if diagnosis.class_ and diagnosis.class_.get("experiment"):
         parts += ["", f"to tell them apart: {diagnosis.class_['experiment']}"]
     parts += [f"note: {line}" for line in diagnosis.data]
@@ -96,7 +98,7 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
-    from spikecam_env.gap.words import bare, quantity, unit_of
+    from spikecam_env.gap.words import at_most, bare, bounded_parameter, quantity, unit_of
 
     rows = [
         {
@@ -114,7 +116,7 @@ def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         return [{"parameter": name, **values} for name, values in diagnosis.parameters.items()]
     if diagnosis.verdict == "none":
         return [
-            {"effect": b.name, "parameter": bare(b.name, b.parameter), "at most (95 %)": quantity(b.below, b.unit)}
+            {"effect": b.name, "parameter": bounded_parameter(b), "at most (95 %)": at_most(b)}
             for b in diagnosis.bounds
         ]
     return []

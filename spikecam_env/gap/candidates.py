@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from spikecam_env.errors import unknown_name
+from spikecam_env.gap.observe import Observation
 from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 
@@ -23,6 +25,7 @@ class Candidate:
     wanders: its course in time is drawn anew every time, so that statistics scatter, each way alike.
     events: it is single events, few enough for one twin to have many more or less of them than another.
     strikes: it is in a few pixels, others in every twin: one takes where they lie for a sign of it.
+    share: the parameter that is a share of what can be counted, and of what: pixels, spikes, or frames of pixels.
     nudge: step of a shape's logarithm to take a derivative by: a time constant needs a long one, to show above what
     twins scatter; a level of light from which something begins leads elsewhere by it.
     needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
@@ -38,6 +41,7 @@ class Candidate:
     wanders: bool = False
     events: bool = False
     strikes: bool = False
+    share: tuple[str, str] | None = None
     nudge: float = -0.5
     experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 
@@ -115,6 +119,7 @@ CANDIDATES: dict[str, Candidate] = {
         {"dwell_ms": (0.5, 3.0, 20.0)},
         square=True,
         strikes=True,
+        share=("fraction", "pixels"),
         needs=_steady,
     ),
     "dark_current_drift": Candidate(
@@ -123,8 +128,10 @@ CANDIDATES: dict[str, Candidate] = {
     "dark_current": Candidate("dark", ("mean_pA",), needs=_dark),
     "dark_current_spread": Candidate("dark", ("sigma_pA",), needs=_dark),
     "dark_current_tail": Candidate("dark", ("sigma",), needs=_dark),
-    "hot_pixels": Candidate("dark", ("fraction", "mean_pA"), {"mean_pA": (3.0,)}, needs=_dark),
-    "dead_pixels": Candidate("defects", ("fraction",), needs=_even),
+    "hot_pixels": Candidate(
+        "dark", ("fraction", "mean_pA"), {"mean_pA": (3.0,)}, share=("fraction", "pixels"), needs=_dark
+    ),
+    "dead_pixels": Candidate("defects", ("fraction",), share=("fraction", "pixels"), needs=_even),
     "conversion_gain_spread": Candidate("pattern", ("sigma",), needs=_even),
     "capacitor_spread": Candidate("pattern", ("sigma_fF",), needs=_even, experiment=_SECOND),
     "bias_voltage_spread": Candidate("pattern", ("sigma_V",), needs=_even, experiment=_SECOND),
@@ -135,10 +142,19 @@ CANDIDATES: dict[str, Candidate] = {
     "crosstalk": Candidate("coupling", ("kick",), mixed=True, needs=_steady),
     "blooming": Candidate("coupling", ("share", "full"), {"full": (0.75, 0.85, 1.0)}, needs=_bright, nudge=-0.1),
     "readout_skew": Candidate("readout", ("span",), needs=_moving, only_contrast=True),
-    "missed_spikes": Candidate("readout", ("probability",), needs=_steady, events=True),
-    "spurious_spikes": Candidate("readout", ("probability",), needs=_steady, events=True),
+    "missed_spikes": Candidate(
+        "readout", ("probability",), share=("probability", "spikes"), needs=_steady, events=True
+    ),
+    "spurious_spikes": Candidate(
+        "readout", ("probability",), share=("probability", "frames"), needs=_steady, events=True
+    ),
     "afterpulsing": Candidate(
-        "readout", ("probability",), {"delay_frames": (1, 2, 3, 4, 6)}, needs=_steady, events=True
+        "readout",
+        ("probability",),
+        {"delay_frames": (1, 2, 3, 4, 6)},
+        share=("probability", "spikes"),
+        needs=_steady,
+        events=True,
     ),
 }
 
@@ -149,6 +165,21 @@ NOISE_OF_A_RESET = ("reset_noise", "excess_threshold_noise", "shot_noise")
 def candidate(name: str) -> Candidate:
     """What is known of an effect; one of a user's own is fitted by its strength alone."""
     return CANDIDATES.get(name) or Candidate("other", (CATALOGUE[name].strength,))
+
+
+def expected_events(
+    name: str, parameters: Mapping[str, float], shown: Sequence[Shown], seen: Sequence[Observation]
+) -> float:
+    """Pixels, spikes or frames of pixels that an effect is expected to change in the steady recordings to fit of a
+    campaign; infinite where it is no share of such."""
+    share = candidate(name).share
+    if share is None:
+        return math.inf
+    told = [o for c, o in zip(shown, seen, strict=True) if c.use == "fit" and not c.moves]
+    pixels = max((o.times.count.size for o in told), default=0)
+    spikes = float(sum(o.times.count.sum() for o in told))
+    of = {"pixels": pixels, "spikes": spikes, "frames": sum(pixels * o.frames for o in told) - spikes}
+    return parameters[share[0]] * of[share[1]]
 
 
 def is_pattern(name: str) -> bool:

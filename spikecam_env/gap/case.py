@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 class Case:
     """conditions, observations: of the measurement.  base: its free refit.  bank: its statistics.
 
-    effort: what was simulated for it, by all that was made of it.
+    effort: what was simulated for it, by all that was made of it.  nominal_per_label: nominal radiance of 1 of the
+    labels, by which the light of `conditions` was multiplied.
     """
 
     shape: tuple[int, int]
@@ -40,6 +41,7 @@ class Case:
     jobs: int = 1
     frame_rate_hz: float = 40_000.0
     effort: Effort = field(default_factory=Effort, compare=False)
+    nominal_per_label: float = 1.0
 
     @property
     def scenes_only(self) -> bool:

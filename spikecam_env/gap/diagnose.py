@@ -23,20 +23,21 @@ from spikecam_env.calibration.campaign import Campaign, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.audit import Contradiction, audit, upheld
+from spikecam_env.gap.bounds import bounds
 from spikecam_env.gap.candidates import chosen, is_pattern, testable
 from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves
+from spikecam_env.gap.label_unit import counted_anew, nominal_per_label, said_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import missing, with_all
-from spikecam_env.gap.null import model_null
+from spikecam_env.gap.null import model_null, unit_under
 from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.parameters import Off, off_nominal
 from spikecam_env.gap.refit import within
 from spikecam_env.gap.result import Diagnosis
-from spikecam_env.gap.screen import bounds
 from spikecam_env.gap.search import Round, of_fit, search
 from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.verdict import concluded, grounded, harmless
@@ -92,6 +93,7 @@ def diagnose(
         return replace(found, sentence=sentence(found))
     with timed("read"):
         case = read_case(measured, seed, jobs)
+        notes = said_of(case.nominal_per_label, case.base)
     with timed("audit"):
         contradictions = upheld(case, assumed, audit(case))
         case = trimmed(case, contradictions)
@@ -126,13 +128,16 @@ def diagnose(
         changed = after is not assumed or off.parameters
         evidence = evidence_of(case, assumed, base, *((after, unit) if changed else ()))
     if found.verdict in ("none", "parameter"):
-        found = replace(found, bounds=tuple(bounds(templates or load(), case.conditions, null, values, names)))
+        with timed("bounds"):
+            settled = replace(case, base=unit_under(case, start)) if case.scenes_only else case
+            below, open_ = bounds(settled, start, null, values, names, templates or load())
+        found = replace(found, bounds=tuple(below), not_bounded=tuple(open_))
     found = replace(
         found,
         gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
         evidence=evidence,
-        data=(*found.data, *unfinished(case.effort)),
+        data=(*found.data, *notes, *unfinished(case.effort)),
         simulated=case.effort.simulated,
         **asked,  # type: ignore[arg-type]
     )
@@ -158,7 +163,12 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
         replace(c, level=float(o.rate.mean())) if c.kind == "unknown" else c
         for c, o in zip(conditions, seen, strict=True)
     ]
-    return case_of(campaign.shape, conditions, seen, seed, jobs, campaign.frame_rate_hz)
+    case = case_of(campaign.shape, conditions, seen, seed, jobs, campaign.frame_rate_hz)
+    factor = nominal_per_label(case.base)
+    if factor == 1.0:
+        return case
+    case = case.of([counted_anew(c, factor) for c in conditions], seen)
+    return replace(case, nominal_per_label=factor)
 
 
 def refittable(conditions: Sequence[Shown]) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.case import Case, twins
 from spikecam_env.gap.compare import Null, null_of, values_of
 from spikecam_env.gap.fit import UNITS
-from spikecam_env.gap.refit import within
+from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.settle import settled
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.units import drawn_banks
@@ -25,9 +25,7 @@ Array = NDArray[np.float64]
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
     """The prediction of `count` twins, and of recordings in motion as many again: of their statistics there is one of
     a kind, and no other recording tells how much it varies (`moderate`)."""
-    base = within(model, case.base)
-    if case.scenes_only:  # too short for the closed law of jitter
-        base = settled(model, base, case.base, [t.base for t in twins(case, model, base, range(50, 54)) if t.base])
+    base = unit_under(case, model)
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
     made = twins(case, model, base, range(count))
     banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]
@@ -45,6 +43,14 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         twins=np.where(of_pattern, UNITS, null.twins),
         weight=np.where(of_pattern, 1.0 / told(null.keys, case.conditions), 1.0),
     )
+
+
+def unit_under(case: Case, model: SensorModel) -> BaseFit:
+    """The unit of a case within a model; of scenes alone, which are too short for the closed law of jitter, settled."""
+    base = within(model, case.base)
+    if case.scenes_only:
+        base = settled(model, base, case.base, [t.base for t in twins(case, model, base, range(50, 54)) if t.base])
+    return base
 
 
 def surer(null: Null, more: Sequence[Mapping[Key, float]]) -> Null:

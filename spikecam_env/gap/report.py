@@ -18,11 +18,13 @@ from spikecam_env.gap import plots
 from spikecam_env.gap.effort import CAMPAIGNS
 from spikecam_env.gap.evidence import Maps, shape_of
 from spikecam_env.gap.exhibits import LOUD, Exhibit, by_loudness, exhibits
-from spikecam_env.gap.result import Bound, Diagnosis, Estimate, NamedEffect
+from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect
 from spikecam_env.gap.words import (
     CONFIDENCE,
     VERDICTS,
+    at_most,
     bare,
+    bounded_parameter,
     gap_line,
     human,
     law,
@@ -91,7 +93,7 @@ def _opening_none(d: Diagnosis) -> Iterator[str]:
         "After this unit's own response, dark level and noise were fitted, no statistic of the bank differs from the "
         "model by more than chance explains. Effects may still be there, below what these recordings can show:",
     )
-    yield _bounds_table(d.bounds)
+    yield from _bounds_tables(d)
 
 
 def _opening_named(d: Diagnosis) -> Iterator[str]:
@@ -262,9 +264,14 @@ def _number(value: Any) -> str:
     return "–" if value is None else str(value)
 
 
-def _bounds_table(bounds: Sequence[Bound]) -> str:
-    rows = [(human(b.name), bare(b.name, b.parameter), f"< {quantity(b.below, b.unit)}") for b in bounds]
-    return table(("effect", "parameter", "at most (95 %)"), rows, numbers=(2,))
+def _bounds_tables(d: Diagnosis) -> Iterator[str]:
+    """Bounds of what shows too little to be found, and below them what these recordings put no bound to."""
+    rows = [(human(b.name), bounded_parameter(b), f"< {at_most(b)}") for b in d.bounds]
+    if rows:
+        yield table(("effect", "parameter", "at most (95 %)"), rows, numbers=(2,), stack=True)
+    if d.not_bounded:
+        yield element("p", "Not bounded by these data; the right column would bound it:")
+        yield table(("effect", "needs"), [(human(name), needs) for name, needs in d.not_bounded])
 
 
 # --- the gap
@@ -404,7 +411,7 @@ def _candidates(d: Diagnosis) -> Iterator[str]:
 def _bounds(d: Diagnosis) -> Iterator[str]:
     if d.bounds and d.verdict != "none":
         yield element("p", "Effects that were looked for and not found are smaller than:")
-        yield _bounds_table(d.bounds)
+        yield from _bounds_tables(d)
 
 
 def _untested(d: Diagnosis) -> Iterator[str]:

@@ -93,12 +93,13 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Bound:
-    """Upper bound (about 95 %, see `templates.bounds`) of an effect that was not found."""
+    """Upper bound (95 %, see `bounds`) of an effect that was not found.  at: its other parameters there, by name."""
 
     name: str
     parameter: str
     unit: str
     below: float
+    at: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -140,6 +141,7 @@ class Evidence:
 class Diagnosis:
     """The answer.  patched: the model with what was found, or with an empirical patch; loads back as a model.
 
+    not_bounded: (name, what is needed) of effects that were not found and that no bound can be stated of.
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
     candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
     simulated.  simulated: recordings that were, but for the page's own.
@@ -167,6 +169,7 @@ class Diagnosis:
     evidence: Evidence | None = field(default=None, repr=False)
     simulated: int = 0
     effort: float = CAMPAIGNS
+    not_bounded: tuple[tuple[str, str], ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
@@ -193,6 +196,7 @@ class Diagnosis:
             ],
             "not_testable": [{"name": n, "needs": w} for n, w in self.not_testable],
             "bounds": [asdict(b) for b in self.bounds],
+            "not_bounded": [{"name": n, "needs": w} for n, w in self.not_bounded],
             "ranking": [asdict(r) for r in self.ranking],
             "model": self.model_name,
             "campaign": self.campaign,

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates import candidate, is_pattern, of_motion
+from spikecam_env.gap.candidates import candidate, of_motion
 from spikecam_env.gap.compare import TOLERANCE, Null, misfit, of_a_pair, pooled, scale_of
-from spikecam_env.gap.result import Bound
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import bounded, may_be_negative
 from spikecam_env.gap.templates import Template, Templates
@@ -22,9 +21,6 @@ from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import CATALOGUE
 
 Array = NDArray[np.float64]
-
-SHOWS = 8.0
-"""Noises that a template has to show on the recordings at hand to bound its effect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,34 +98,6 @@ def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
     left, factor = min(tried)
     start = bounded(entry.name, {**entry.parameters, strength: entry.parameters[strength] * factor ** (1 / power)})
     return Screened(entry.name, start, left, np.sqrt(factor * size2) * null.noise)
-
-
-def bounds(
-    templates: Templates, conditions: Sequence[Shown], null: Null, measured: Array, names: Sequence[str]
-) -> list[Bound]:
-    """Upper bounds (about 95 %) of effects that were not found: the strength whose template would have been seen.
-
-    Statistics count as independent, but for the pattern's: every recording shows the same one.
-    """
-    at = _places(templates, conditions, null.keys)
-    d = np.nan_to_num((measured - null.mean) / null.noise)
-    one = np.ones_like(d)
-    found: dict[str, Bound] = {}
-    for entry in templates.weakest:
-        if entry.name not in names:
-            continue
-        shift = np.where(at >= 0, (entry.shift * templates.noise)[at] / null.noise, 0.0)
-        if float(np.abs(shift).max()) < SHOWS:
-            continue
-        scale, sd = scale_of(d, shift, one, 0.0 * one, 2 * TOLERANCE)
-        sd *= np.sqrt(len(conditions)) if is_pattern(entry.name) else 1.0
-        key = CATALOGUE[entry.name].strength
-        power = candidate(entry.name).power
-        below = abs(entry.parameters[key]) * (abs(scale) + 1.645 * sd) ** (1 / power)
-        if entry.name not in found or below > found[entry.name].below:
-            unit = CATALOGUE[entry.name].__dataclass_fields__[key].metadata["unit"]
-            found[entry.name] = Bound(entry.name, key, unit, float(below))
-    return [found[name] for name in sorted(found)]
 
 
 def _places(templates: Templates, conditions: Sequence[Shown], keys: Sequence[Key]) -> NDArray[np.int64]:

@@ -8,7 +8,7 @@ import math
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap.effort import Effort
-from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect
+from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Gap, NamedEffect
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.catalogue_page import Sheet
 
@@ -121,6 +121,20 @@ def gap_line(gap: Gap) -> str:
 def sizes(parameters: dict[str, Estimate], effect: str) -> str:
     """Parameters in a line."""
     return ", ".join(f"{bare(effect, p)} {quantity(e.value, unit_of(effect, p), e.sd)}" for p, e in parameters.items())
+
+
+def at_most(bound: Bound) -> str:
+    """A bound to two digits, rounded up: no less can be stated."""
+    scale, unit = _readable(bound.below, bound.unit)
+    value = bound.below * scale
+    digit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0 else 1.0
+    return f"{math.ceil(value / digit - 1e-9) * digit:.4g} {unit}".rstrip()
+
+
+def bounded_parameter(bound: Bound) -> str:
+    """The parameter that a bound is of, with the effect's others where it shows least."""
+    others = [f"{bare(bound.name, k)} {quantity(v, unit_of(bound.name, k))}" for k, v in bound.at.items()]
+    return bare(bound.name, bound.parameter) + (f" ({', '.join(others)})" if others else "")
 
 
 def bare(effect: str, parameter: str) -> str:

@@ -154,10 +154,11 @@ def named(effect: str = "photodiode_lag") -> Diagnosis:
 def none() -> Diagnosis:
     """Nothing found, with bounds."""
     bounds = (Bound("dead_time", "tau_us", "us", 0.04), Bound("photodiode_lag", "fraction", "relative", 0.002),
-              Bound("light_flicker", "modulation", "relative", 0.0007),
+              Bound("light_flicker", "modulation", "relative", 0.0007, {"frequency_hz": 2000.0}),
               Bound("crosstalk", "kick", "thresholds", 0.0011))  # fmt: skip
     return _plain(
         "none", "No gap: these recordings and the model scsim agree to within the noise.", bounds=bounds,
+        not_bounded=(("blooming", "longer recordings"),),
         gap=Gap(1.04, 1.04, 1.0, 0.0, {"flat-200": {"before": 1.02, "after": 1.02, "floor": 1.0},
                                        "bars-fast": {"before": 1.06, "after": 1.06, "floor": 1.0}}),
         evidence=evidence(None),

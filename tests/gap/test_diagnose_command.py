@@ -52,6 +52,12 @@ def test_a_terminal_is_told_the_verdict_and_what_was_found(verdict: str) -> None
     assert printed.startswith(f"{verdict}: {d.sentence}")
     for said in (*(e.name for e in d.effects), *d.parameters, *d.data):
         assert said in printed
+    if verdict == "none":
+        assert (
+            "modulation (frequency 2000 Hz)" in printed
+            and "0.07 %" in printed
+            and "not bounded by these data: blooming" in printed
+        )
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from spikecam_env.gap.exhibits.spectrum import averaged, panels
 from spikecam_env.gap.exhibits.step import free_window
 from spikecam_env.gap.report import command_of, report, write_report
 from spikecam_env.gap.result import VERDICTS
-from spikecam_env.gap.words import quantity
+from spikecam_env.gap.words import at_most
 from spikecam_env.sensor import SensorModel
 
 VOID = {"meta", "img", "br", "link"}
@@ -123,7 +123,10 @@ def test_the_page_says_what_the_diagnosis_says() -> None:
 def test_nothing_found_shows_its_upper_bounds_and_unknown_its_structure() -> None:
     none = Page(written("none")).text
     for b in made_up.none().bounds:
-        assert f"< {quantity(b.below, b.unit)}" in none
+        assert f"< {at_most(b)}" in none
+    assert (
+        "modulation (frequency 2000 Hz)" in none and "Not bounded by these data" in none and "longer recordings" in none
+    )
     unknown = Page(written("unknown")).text
     assert "Grows with the level to the power of 1.02" in unknown
     assert "Depends on earlier spikes not seen" in unknown
