@@ -1,0 +1,166 @@
+"""Whether upper bounds hold: of campaigns with an effect as strong as its bound, how many are told a bound below it.
+
+    python -m benchmarks.bound_coverage --trials 20 --jobs 2 --out table.json
+
+A campaign with nothing hidden states a bound of every candidate.  Then each effect is hidden at its bound in TRIALS
+campaigns of other cameras, and each states its own bound.  It covers where that is no smaller, where the effect has
+none there, or where the alarm rings: a diagnosis then goes on to look for what is wrong, and states no bound.
+
+What is in the file is not done again; it is written after every trial.  95 % is asked of the whole, 90 % of each effect
+(of 20 trials, 18).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from tqdm import tqdm
+
+from spikecam_env.cli.table import table
+from spikecam_env.gap import Bars, Dark, Flat, Step
+from spikecam_env.gap.alarm import rings
+from spikecam_env.gap.bounds import bounds
+from spikecam_env.gap.candidates import chosen, testable
+from spikecam_env.gap.case import Case, case_of
+from spikecam_env.gap.compare import Null, values_of
+from spikecam_env.gap.null import model_null
+from spikecam_env.gap.observe import observe
+from spikecam_env.gap.result import Bound
+from spikecam_env.gap.search import of_fit
+from spikecam_env.gap.strength import bounded, may_be_negative, with_effect
+from spikecam_env.gap.templates import Templates, load
+from spikecam_env.gap.twin import at_any_phase
+from spikecam_env.gap.world import planned
+from spikecam_env.sensor import SensorModel, SpikeSensor
+from spikecam_env.streams import pack_frames
+from spikecam_env.whole import write_text_whole
+
+SHAPE, FRAMES = (24, 32), 1000
+DESIGN = (Dark(), *(Flat(radiance=x) for x in (0.05, 0.1, 0.2, 0.4, 0.6)), Step(), Bars(high=1.4))
+MODEL = SensorModel.preset("scsim")
+TWINS = 12
+CAMERA = 1000
+"""Seed of the first camera with an effect; the one without is the camera before it."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One campaign with an effect hidden.  below: its bound, None where it has none; alarm: whether it rings."""
+
+    name: str
+    number: int
+    below: float | None
+    alarm: bool
+
+
+def recorded(model: SensorModel, camera: int) -> Case:
+    """A campaign of one camera, its waves at phases of their own."""
+    conditions = planned(DESIGN, SHAPE, FRAMES)
+    seen = []
+    for take, c in enumerate(conditions):
+        sensor = SpikeSensor(at_any_phase(model, camera, take), SHAPE, seed=camera, take=take, threads=1)
+        assert c.light is not None
+        spikes = sensor.step(c.light if c.moves else c.light.radiance[0], FRAMES)
+        seen.append(observe(pack_frames(spikes), SHAPE, film=c.moves))
+    return case_of(SHAPE, conditions, seen, seed=camera)
+
+
+def judged(case: Case) -> tuple[Null, np.ndarray]:
+    """What the model without the effect predicts, and the campaign's statistics."""
+    null = model_null(case, MODEL, TWINS)
+    return null, values_of(case.bank, null.keys)
+
+
+def stated() -> list[Bound]:
+    """The bounds of a campaign with nothing hidden."""
+    case = recorded(MODEL, CAMERA - 1)
+    null, values = judged(case)
+    names, _ = testable(chosen(MODEL, None, ()), case.conditions)
+    return bounds(case, MODEL, null, values, names, load())[0]
+
+
+def trial(bound: Bound, number: int) -> Trial:
+    """One campaign of a camera that has the effect at its bound; of either sign, in every second one the other."""
+    sign = -1 if number % 2 and may_be_negative(bound.name) else 1
+    hidden = bounded(bound.name, {**bound.at, bound.parameter: sign * bound.below})
+    case = recorded(with_effect(MODEL, bound.name, hidden), CAMERA + number)
+    null, values = judged(case)
+    alarm = rings(null, values) or rings(null, of_fit(case, null, values))
+    found, _ = bounds(case, MODEL, null, values, [bound.name], _of_shape(bound))
+    return Trial(bound.name, number, found[0].below if found else None, alarm)
+
+
+def _of_shape(bound: Bound) -> Templates:
+    """The templates, of the effect those of the bound's shape alone."""
+
+    shipped = load()
+    alike = [
+        e for e in shipped.weakest if e.name == bound.name and all(e.parameters[k] == v for k, v in bound.at.items())
+    ]
+    return replace(shipped, entries=tuple(alike))
+
+
+def rows(found: Sequence[Bound], done: Sequence[Trial]) -> Iterator[dict[str, Any]]:
+    """A row an effect: its bound, how many of its trials it covers, and how many ring the alarm."""
+    for b in found:
+        own = [t for t in done if t.name == b.name]
+        covered = sum(covers(b, t) for t in own)
+        low, high = wilson(covered, len(own))
+        yield {
+            "effect": b.name,
+            "parameter": b.parameter,
+            "unit": b.unit,
+            "bound": f"{b.below:.3g}",
+            "at": ", ".join(f"{k} {v:g}" for k, v in b.at.items()),
+            "covered": f"{covered} of {len(own)}",
+            "95 % interval": f"{100 * low:.0f} to {100 * high:.0f} %",
+            "alarm": f"{sum(t.alarm for t in own)} of {len(own)}",
+        }
+
+
+def covers(bound: Bound, told: Trial) -> bool:
+    """Whether a campaign does not exclude the effect that is hidden in it."""
+    return told.alarm or told.below is None or told.below >= bound.below * (1 - 1e-9)
+
+
+def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
+    """95 % interval of a share (Wilson 1927)."""
+    if not trials:
+        return 0.0, 1.0
+    p, n = successes / trials, trials
+    middle, half = p + z * z / (2 * n), z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return float((middle - half) / (1 + z * z / n)), float((middle + half) / (1 + z * z / n))
+
+
+def main(out: Path, trials: int = 20, jobs: int = 1, only: tuple[str, ...] = ()) -> None:
+    """Write and print the table.  out: file (.json) that holds what is done.  only: effects; default all."""
+    kept = json.loads(out.read_text(encoding="utf-8")) if out.exists() else {"bounds": [], "trials": []}
+    found = [Bound(**b) for b in kept["bounds"]] or stated()
+    done = [Trial(**t) for t in kept["trials"]]
+    have = {(t.name, t.number) for t in done}
+    left = [(b, n) for n in range(trials) for b in found if (b.name, n) not in have and (not only or b.name in only)]
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        running = [pool.submit(trial, *what) for what in left]
+        for one in tqdm(as_completed(running), "trials", len(running)):
+            done.append(one.result())
+            now = {"bounds": [asdict(b) for b in found], "trials": [asdict(t) for t in done]}
+            write_text_whole(out, json.dumps(now, indent=1))
+    print(table(list(rows(found, done))))
+    covered = [
+        t.alarm or t.below is None or t.below >= 0.999 * b.below for b in found for t in done if t.name == b.name
+    ]
+    if covered:
+        low, high = wilson(sum(covered), len(covered))
+        print(f"together {sum(covered)} of {len(covered)}: {100 * low:.1f} to {100 * high:.1f} %")
+
+
+if __name__ == "__main__":
+    tyro.cli(main)
