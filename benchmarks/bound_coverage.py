@@ -35,7 +35,7 @@ from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe import observe
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.search import of_fit
-from spikecam_env.gap.strength import bounded, with_effect
+from spikecam_env.gap.strength import bounded, may_be_negative, with_effect
 from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.twin import at_any_phase
 from spikecam_env.gap.world import planned
@@ -88,8 +88,9 @@ def stated() -> list[Bound]:
 
 
 def trial(bound: Bound, number: int) -> Trial:
-    """One campaign of a camera that has the effect at its bound."""
-    hidden = bounded(bound.name, {**bound.at, bound.parameter: bound.below})
+    """One campaign of a camera that has the effect at its bound; of either sign, in every second one the other."""
+    sign = -1 if number % 2 and may_be_negative(bound.name) else 1
+    hidden = bounded(bound.name, {**bound.at, bound.parameter: sign * bound.below})
     case = recorded(with_effect(MODEL, bound.name, hidden), CAMERA + number)
     null, values = judged(case)
     alarm = rings(null, values) or rings(null, of_fit(case, null, values))

@@ -60,7 +60,7 @@ what the score lets expect."""
 COST = 150
 """Campaigns that the bounds of all candidates take, by and large."""
 
-LONGER = "longer recordings, or more of them: in these the strongest would hardly show"
+LONGER = "longer recordings, or more of them: in these it would hardly show"
 MORE_EFFORT = "a larger --effort: enough had been simulated"
 """What is needed for a bound."""
 
@@ -191,7 +191,7 @@ def more_of(score: Score | None, measured: Array) -> float:
 def bound_of(measured: Array, look: Look) -> Bound | tuple[str, str]:
     """The least strength that was refuted and has none above it that was not; or the name, with what is needed."""
     probe, name, key = look.probe, look.probe.name, _key(look.probe.name)
-    if look.score is None or not np.isfinite(look.expected):
+    if look.score is None or not np.isfinite(look.expected) or probe.events(look.score.parameters) <= 0:
         return name, LONGER
     score = probe.surer(look.score)
     more = more_of(score, measured)
@@ -384,4 +384,4 @@ def _along(null: Null, weight: Array, values: Array) -> float:
 
 def _log_scatter(null: Null, weight: Array, values: Array) -> float:
     """Score of statistics (S,) that an effect scatters, each way alike: the logarithm of their mean square."""
-    return float(np.log(weight @ np.nan_to_num((values - null.mean) / null.noise) ** 2))
+    return float(np.log(max(weight @ np.nan_to_num((values - null.mean) / null.noise) ** 2, 1e-12)))

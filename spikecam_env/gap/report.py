@@ -271,7 +271,7 @@ def _bounds_tables(d: Diagnosis) -> Iterator[str]:
         yield table(("effect", "parameter", "at most (95 %)"), rows, numbers=(2,), stack=True)
     if d.not_bounded:
         yield element("p", "Not bounded by these data; the right column would bound it:")
-        yield table(("effect", "needs"), [(human(name), needs) for name, needs in d.not_bounded])
+        yield table(("effect", "needs"), [(human(name), needs) for name, needs in d.not_bounded], stack=True)
 
 
 # --- the gap

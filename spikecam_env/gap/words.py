@@ -128,7 +128,7 @@ def at_most(bound: Bound) -> str:
     scale, unit = _readable(bound.below, bound.unit)
     value = bound.below * scale
     digit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0 else 1.0
-    return f"{math.ceil(value / digit - 1e-9) * digit:.2g} {unit}".rstrip()
+    return f"{math.ceil(value / digit - 1e-9) * digit:.4g} {unit}".rstrip()
 
 
 def bounded_parameter(bound: Bound) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from spikecam_env.cli.main import run
 from spikecam_env.gap import Dark, Flat, Step, write_campaign
 from spikecam_env.gap.ladder import figure, ladder, table
 
@@ -36,3 +37,12 @@ def test_a_model_that_lacks_nothing_has_one_rung(tmp_path: Path) -> None:
     recordings = [Dark(), *(Flat(radiance=x) for x in (0.05, 0.2, 0.5))]
     campaign = write_campaign(tmp_path / "c", "physical", shape=(24, 24), frames=2000, recordings=recordings, seed=5)
     assert len(ladder(campaign, "physical").rungs) == 1
+
+
+def test_the_command_climbs_it_and_says_where_its_files_are(tmp_path: Path, capsys) -> None:
+    recordings = [Dark(), *(Flat(radiance=x) for x in (0.1, 0.3))]
+    write_campaign(tmp_path / "c", "physical", shape=(16, 16), frames=300, recordings=recordings, seed=5)
+    assert run(["ladder", str(tmp_path / "c"), "--model", "physical", "--out", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr().out
+    assert "gap" in printed and str(tmp_path / "out" / "ladder.png") in printed
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"ladder.json", "ladder.png", "model.toml"}
