@@ -41,6 +41,8 @@ def record_scene(
 ) -> int:
     """Write `frames` frames of spikes to a .h5, .dat or .npz file, which appears whole; returns how many spikes.
 
+    Beside a .dat file, its geometry and frame rate go to `<name>.dat.json`, so that it opens without options.
+
     what: for the progress bar.  attributes: of a .h5 file.
     """
     from tqdm import trange
@@ -61,6 +63,7 @@ def _appending(out: Path, sensor: SpikeSensor, attributes: dict[str, object]) ->
     import numpy as np
 
     from spikecam_env.streams import SpikeWriter, pack_frames, save_npz
+    from spikecam_env.streams.side_file import write_side_file
     from spikecam_env.whole import whole_file
 
     suffix = out.suffix.lower()
@@ -70,6 +73,8 @@ def _appending(out: Path, sensor: SpikeSensor, attributes: dict[str, object]) ->
     elif suffix == ".dat":
         with whole_file(out) as beside, beside.open("wb") as file:
             yield lambda block: file.write(pack_frames(block).tobytes())
+        rows, columns = sensor.shape
+        write_side_file(out, {"height": rows, "width": columns, "frame_rate_hz": sensor.model.frame_rate_hz})
     else:
         blocks: list[Any] = []
         yield blocks.append

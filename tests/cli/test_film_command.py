@@ -169,3 +169,10 @@ def test_what_is_wrong_ends_in_one_line_and_nothing_is_left(args, message, tmp_p
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error.startswith("spikecam: ") and message in error
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_dat_opens_without_options(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "p", [60, 200, 60])
+    assert spikecam("film", folder, "--film-rate", 800, "--out", tmp_path / "a.dat", "--frame-rate", 20000, *SMALL) == 0
+    recording = read_recording(tmp_path / "a.dat")
+    assert recording.spikes.shape[1:] == (16, 24) and recording.frame_rate_hz == 20000
