@@ -16,7 +16,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import av
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -202,6 +201,8 @@ def _opened(path: Path, how: Reading) -> Iterator[_Source]:
 @contextmanager
 def _video(path: Path) -> Iterator[_Source]:
     """A video file by FFmpeg, which opens nothing else that the file may name."""
+    import av  # half a second, for those alone who have films
+
     try:
         with (
             path.open("rb") as file,
@@ -240,6 +241,8 @@ def _video(path: Path) -> Iterator[_Source]:
 
 def _decoded(container: Any, stream: Any, source: _Source, path: Path) -> Iterator[tuple[Stored, Fraction | None]]:
     """Pictures in the order of their times, as far as the file is whole."""
+    import av
+
     try:
         for number, frame in enumerate(container.decode(stream), 1):
             if frame.is_corrupt:
@@ -256,6 +259,8 @@ def _duration(container: Any, stream: Any) -> float | None:
     """That the file states [s], of this stream."""
     if stream.duration:
         return float(stream.duration * stream.time_base)
+    import av
+
     return container.duration / av.time_base if container.duration and len(container.streams) == 1 else None
 
 

@@ -11,14 +11,16 @@ Source: ITU-T H.273 (matrices, ranges, and the numbers by which files name matri
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
-from av import VideoFrame
 
 from scenes.transfer import Array
 from spikecam_env.errors import InputError
+
+if TYPE_CHECKING:
+    from av import VideoFrame
 
 ALONE = {"protocol_whitelist": "none"}
 """Option of FFmpeg: nothing is opened but the file given, whatever it names."""

@@ -14,7 +14,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
@@ -155,6 +154,8 @@ def _values(image: Image.Image, source: Path) -> tuple[NDArray[np.float32], int]
 
 def _by_ffmpeg(source: Path) -> Stored:
     """A picture as it lies in the file; its orientation is not looked at."""
+    import av  # half a second, for those alone who have such pictures
+
     try:
         with source.open("rb") as file, av.open(file, "r", options=ALONE, metadata_errors="replace") as container:
             context = container.streams.video[0].codec_context
