@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from tally import TALLY, count
+from tally import MALFORMED, TALLY, count
 
 from spikecam_env.cli.main import run
 
@@ -55,10 +55,9 @@ def listing(folder: Path) -> set[str]:
     return {str(p.relative_to(folder)) for p in folder.rglob("*") if not p.is_dir() or any(p.iterdir())}
 
 
-def pytest_terminal_summary(terminalreporter) -> None:
-    if not TALLY:
-        return
-    total = sum(sum(outcomes.values()) for outcomes in TALLY.values())
-    terminalreporter.write_line(f"\nmalformed input: {total} cases, refused in one line or taken as good after all")
-    for target, outcomes in sorted(TALLY.items()):
-        terminalreporter.write_line(f"  {target:42} {outcomes['refused']:5} refused {outcomes['taken']:4} taken")
+@pytest.fixture(autouse=True)
+def counted(request) -> Iterator[None]:
+    """What a test counts goes to its report, so that it is known whichever process ran it."""
+    TALLY.clear()
+    yield
+    request.node.user_properties.append((MALFORMED, {target: dict(outcomes) for target, outcomes in TALLY.items()}))

@@ -7,6 +7,9 @@ from collections.abc import Callable
 
 from spikecam_env.errors import InputError
 
+MALFORMED = "malformed input"
+"""Under which a test's report has its counts (`tests/conftest.py` prints their sum)."""
+
 TALLY: dict[str, Counter[str]] = {}
 
 
