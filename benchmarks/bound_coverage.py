@@ -121,6 +121,7 @@ def rows(found: Sequence[Bound], done: Sequence[Trial]) -> Iterator[dict[str, An
             "bound": f"{b.below:.3g}",
             "at": ", ".join(f"{k} {v:g}" for k, v in b.at.items()),
             "covered": f"{covered} of {len(own)}",
+            "bounds alone": sum(covers(b, replace(t, alarm=False)) for t in own),
             "95 % interval": f"{100 * low:.0f} to {100 * high:.0f} %",
             "alarm": f"{sum(t.alarm for t in own)} of {len(own)}",
         }
@@ -159,7 +160,8 @@ def main(out: Path, trials: int = 20, jobs: int = 1, only: tuple[str, ...] = ())
     ]
     if covered:
         low, high = wilson(sum(covered), len(covered))
-        print(f"together {sum(covered)} of {len(covered)}: {100 * low:.1f} to {100 * high:.1f} %")
+        alone = sum(covers(b, replace(t, alarm=False)) for b in found for t in done if t.name == b.name)
+        print(f"together {sum(covered)} of {len(covered)}: {100 * low:.1f} to {100 * high:.1f} %; bounds alone {alone}")
 
 
 if __name__ == "__main__":

@@ -384,4 +384,5 @@ def _along(null: Null, weight: Array, values: Array) -> float:
 
 def _log_scatter(null: Null, weight: Array, values: Array) -> float:
     """Score of statistics (S,) that an effect scatters, each way alike: the logarithm of their mean square."""
-    return float(np.log(max(float(weight @ np.nan_to_num((values - null.mean) / null.noise) ** 2), 1e-12)))
+    square = float(weight @ np.nan_to_num((values - null.mean) / null.noise) ** 2)
+    return float(np.log(max(square, 1e-12)))
