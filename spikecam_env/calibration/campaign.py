@@ -26,8 +26,7 @@ from spikecam_env.checked import checked_count, checked_memory, checked_shape
 from spikecam_env.errors import InputError
 from spikecam_env.names import distinct, file_name, inside
 from spikecam_env.sensor import Keyframes
-from spikecam_env.streams import load_vidar_dat
-from spikecam_env.streams.packing import packed_bytes
+from spikecam_env.streams.packing import packed_bytes, unpack_frames
 from spikecam_env.untrusted import (
     Count,
     Declared,
@@ -93,7 +92,7 @@ class CampaignRecording:
 
     def load(self) -> NDArray[np.uint8]:
         """(frames, H, W) uint8 spikes; raises InputError for rates only."""
-        return load_vidar_dat(self._stream(), height=self.shape[0], width=self.shape[1])
+        return unpack_frames(np.asarray(self.packed()), self.shape)
 
     def rate(self) -> NDArray[np.float64]:
         """(H, W) measured rates of a recording that is rates only [spikes/frame]."""

@@ -33,7 +33,9 @@ def test_interval_is_the_longest_that_keeps_motion_within_bounds(speed: float, i
 
 
 @pytest.mark.parametrize("gaze", [None, Gaze((2.0, 1.0), (5.0, -3.0), (100.0, 140.0))])
-@pytest.mark.parametrize("scene", [RotatingDisk(SHAPE), Collage(SHAPE, 3), SlidingTexture(SHAPE)], ids=repr)
+@pytest.mark.parametrize(
+    "scene", [RotatingDisk(SHAPE), Collage(SHAPE, 3), SlidingTexture(SHAPE)], ids=lambda scene: type(scene).__name__
+)
 def test_later_is_the_same_light_from_another_moment_and_place(scene, gaze: Gaze | None) -> None:
     later = Later(scene, 1000, (3.0, -2.0))
     there = Gaze.fixed(3.0, -2.0) if gaze is None else Gaze((5.0, -1.0), (8.0, -5.0), (1100.0, 1140.0))

@@ -61,6 +61,22 @@ def bars(period: int) -> np.ndarray:
     return np.diff(np.floor(charge), axis=0).astype(np.uint8)
 
 
+def glare(dim_half: bool) -> np.ndarray:
+    """Bars of three levels that move fast, up to 0.8 spikes a frame: within a block of frames spikes come and go."""
+    rows, columns = SMALL
+
+    def line(speed: float, levels: tuple[float, ...]) -> np.ndarray:
+        at = (np.arange(columns) - speed * np.arange(600)[:, None]) % columns / columns * 30
+        return np.where(at % 1 < 0.4, np.asarray(levels)[at.astype(int) % 3], 0.06)
+
+    light = np.empty((600, *SMALL))
+    light[:] = line(0.25, (0.25, 0.6, 0.8))[:, None]
+    if dim_half:
+        light[:, rows // 2 :] = line(-0.15, (0.12, 0.2, 0.3))[:, None]
+    whole = np.floor(np.random.default_rng(0).random(SMALL) + np.cumsum(light, axis=0))
+    return np.diff(whole, axis=0).astype(np.uint8)
+
+
 def half_dark() -> np.ndarray:
     """Light in the upper or the lower half only, in turn."""
     light = np.zeros((96, *SMALL), np.float32)
@@ -93,6 +109,8 @@ RIGHT: dict[str, Callable[[], np.ndarray]] = {
     "scene: collage": lambda: scene("collage"),
     "in phase": in_phase,
     "flicker": flicker,
+    "bars of three levels": lambda: glare(dim_half=False),
+    "bars of three levels, half dim": lambda: glare(dim_half=True),
     "bars of 16 pixels": lambda: bars(16),
     "bars of 4 pixels": lambda: bars(4),
     "bars of 15 pixels": lambda: bars(15),
