@@ -13,6 +13,7 @@ from typing import Any, Literal
 import spikecam_env
 from spikecam_env.cli.options import Count, Workers
 from spikecam_env.errors import InputError
+from spikecam_env.stopping import without_interrupts
 from spikecam_env.whole import reason
 
 WORLD = Path(spikecam_env.__file__).resolve().parents[1] / "tests" / "hidden_world"
@@ -75,6 +76,7 @@ class BlindTrial:
                 jobs=self.jobs,
                 threads=self.threads,
                 keep=self.keep,
+                starting=without_interrupts,
             )
             with tqdm(total=len(picked), unit="case") as bar:
                 for done, _ in steps:

@@ -55,13 +55,12 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     Errors: InputError if the folder holds anything else, or another run is at work in it.
     """
     checked_count(jobs, "jobs")
-    frames = plan.frames * len(plan.entries)
-    checked_disk(frames * packed_bytes(plan.shape), folder, f"a dataset of {frames} frames")
     target = Path(os.path.realpath(folder))
     with made_folder(target, "a dataset"), _alone_in(target), when_stopped(partial(_clear_unfinished, target)):
         plan = _with_renderer(plan, target)
         manifest = _begun(plan, target)
         _clear_unfinished(target)
+        _check_room(plan, target, manifest)
         manifest.write(target)
         try:
             return _make_missing(plan, target, manifest, jobs, ray, progress)
@@ -92,14 +91,26 @@ def _begun(plan: Plan, folder: Path) -> Manifest:
     return found.without_lost(folder)
 
 
-def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: str | None, progress: bool) -> Built:
+def _missing(plan: Plan, manifest: Manifest) -> tuple[Entry, ...]:
     done = {file["path"] for file in manifest.files if file["sha256"] is not None}
-    missing = tuple(entry for entry in plan.entries if entry.path not in done)
+    return tuple(entry for entry in plan.entries if entry.path not in done)
+
+
+def _check_room(plan: Plan, folder: Path, manifest: Manifest) -> None:
+    """Errors: InputError where the disk has no room for what is to be made: two streams a scene, noisy and clean."""
+    scenes = len(_missing(plan, manifest))
+    size = 2 * plan.frames * scenes * packed_bytes(plan.shape)
+    checked_disk(size, folder, f"{scenes} scenes of {plan.frames} frames")
+
+
+def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: str | None, progress: bool) -> Built:
+    missing = _missing(plan, manifest)
+    there = len(plan.entries) - len(missing)
     seconds: Counter[str] = Counter()
     processor_s = 0.0
     frames = plan.frames * len(plan.entries)
     bar = tqdm(
-        total=frames, initial=plan.frames * len(done), desc=plan.kind, unit="frame", leave=False, disable=not progress
+        total=frames, initial=plan.frames * there, desc=plan.kind, unit="frame", leave=False, disable=not progress
     )
     with bar:
         for news in _at_work(plan, folder, missing, jobs, ray):
@@ -113,7 +124,7 @@ def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: 
     return Built(
         plan.renderer,
         len(missing),
-        len(done),
+        there,
         sum(file["bytes"] for file in manifest.files),
         dict(seconds),
         processor_s,

@@ -106,7 +106,7 @@ def test_a_command_stops_at_any_moment_within_two_seconds_and_leaves_nothing(tmp
     size = ["--size", "64", "96"]
     commands = {
         "record": (20, ["record", "--out", "x.h5", "--frames", "4000000", *size]),
-        "film": (2, ["scenes", "fan", "--film", "x.mp4", "--frames", "4000000", *size]),
+        "film": (2, ["scenes", "fan", "--film", "x.mp4", "--frames", "2800000", *size]),
         "dataset": (4, ["dataset", "phm-n", "--out", "x", "--jobs", "2", "--frames", "4000000", *size]),
         "denoise": (2, ["denoise", str(recording), "--mode", "paper", "--out", "x"]),
     }

@@ -18,13 +18,13 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from spikecam_env.stopping import without_interrupts
 from tests.hidden_world.cases import GROUPS, Case, cases
 from tests.hidden_world.keys import open_key, seal, write_whole
 from tests.hidden_world.score import Figure, Scored, by_effect, confusion, figures, score_case
@@ -58,10 +58,11 @@ def run_trial(
     jobs: int = 1,
     threads: int = 1,
     keep: bool = False,
+    starting: Callable[[], AbstractContextManager[object]] = nullcontext,
 ) -> Iterator[tuple[int, int]]:
     """Do what is not done yet; yields (done, all) as it goes on.  diagnose: `module:function`, see `Diagnose`.
 
-    jobs: cases at once.  threads: of each diagnosis.
+    jobs: cases at once.  threads: of each diagnosis.  starting: what is entered while their processes are started.
 
     Keys are sealed and their hashes published before the first diagnosis.  Cases go in the order of their ids, which is
     that of no group: what a trial has done when it is cut short is a fair sample of it.
@@ -78,7 +79,7 @@ def run_trial(
             yield done, len(picked)
         return
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        with without_interrupts():  # it starts the workers
+        with starting():
             futures = [pool.submit(run_case, case, out, diagnose, threads, keep) for case in waiting]
         try:
             for future in as_completed(futures):
