@@ -1,6 +1,7 @@
 # Every target sets itself up: a virtual environment in .venv, versions pinned by constraints.txt.
 PYTHON ?= python3
 VENV ?= .venv
+WORKERS ?= 2
 BIN := $(VENV)/bin
 
 .PHONY: install install-dev demo test test-oldest lint clean
@@ -22,7 +23,7 @@ demo: install
 	$(BIN)/spikecam demo
 
 test: install-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist loadfile
 
 # The oldest releases that pyproject.toml allows (constraints-oldest.txt), in an environment of their own; numba's
 # compiled code of one release is no use to another, so it goes to a folder of its own too.
@@ -31,11 +32,12 @@ OLDEST_TESTS := tests/test_requirements.py tests/test_untrusted.py tests/streams
 
 $(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv $(OLDEST)
-	$(OLDEST)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --editable . pytest hypothesis
+	$(OLDEST)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --editable . pytest pytest-xdist hypothesis
 	touch $@
 
 test-oldest: $(OLDEST)/.installed
-	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning $(OLDEST_TESTS)
+	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning \
+		--numprocesses $(WORKERS) --dist loadfile $(OLDEST_TESTS)
 
 lint: install-dev
 	$(BIN)/ruff check .

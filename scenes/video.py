@@ -160,17 +160,21 @@ class VideoScene:
     def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
         place = self._place(frame)
         if self._hold:
-            seen = self._light[min(int(place), self.pictures - 1)].astype(np.float32, copy=False)
+            seen = self._picture(min(int(place), self.pictures - 1))
         else:
             before = min(int(place), self.pictures - 2)
             share = np.float32(place - before)
-            seen = self._light[before] * (1 - share) + self._light[before + 1] * share
+            seen = self._picture(before) * (1 - share) + self._picture(before + 1) * share
         pan, tilt = gaze.at(frame) if gaze else (0.0, 0.0)
         if (pan, tilt) != (0.0, 0.0):
             shift = np.array([[1.0, 0.0, pan], [0.0, 1.0, tilt]])
             flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
             seen = cv2.warpAffine(seen, shift, self.shape[::-1], flags=flags, borderMode=cv2.BORDER_REFLECT)
         np.multiply(seen, self._gain, out=picture)
+
+    def _picture(self, number: int) -> NDArray[np.float32]:
+        """A picture's light; films are kept in half precision, in which nothing is to be computed."""
+        return self._light[number].astype(np.float32, copy=False)
 
     def _place(self, frame: float) -> float:
         """Where in the film a frame is, in pictures and shares of one; it turns round at either end."""
