@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path, PureWindowsPath
 
 from spikecam_env.errors import InputError, shown
@@ -58,6 +59,8 @@ def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -
     absolute = Path(text).is_absolute() or bool(PureWindowsPath(text).anchor)
     try:
         path.exists()
+        with suppress(FileNotFoundError):
+            path.stat()  # links in a circle, which `resolve` does not mind since Python 3.13
         leaves = absolute or ".." in PureWindowsPath(text).parts or not path.resolve().is_relative_to(root.resolve())
     except (OSError, RuntimeError) as error:  # names too long, links in a circle, folders that cannot be looked into
         why = getattr(error, "strerror", None) or "a circle of links"

@@ -312,7 +312,7 @@ def test_a_list_gives_every_picture_its_time(tmp_path: Path) -> None:
         ('name,time_s\n"a.png,0\n', "entries"),
         ("name,time_s\na.png,0\n" + "b" * 200_000 + ".png,1\n", "not a CSV file: field larger"),
         ("name,time_s\na.png,0\n" + "b" * 5000 + ".png,1\n", "cannot read"),
-        ("name,time_s\na.png,0\nb\x00.png,1\n", "line 3: the name is"),
+        ("name,time_s\na.png,0\nb\x00.png,1\n", "line 3: the name is|line contains NUL"),
     ],
 )
 def test_an_odd_list_is_named_by_its_line(text: str, message: str, tmp_path: Path) -> None:
