@@ -169,7 +169,8 @@ class VideoScene:
         if (pan, tilt) != (0.0, 0.0):
             shift = np.array([[1.0, 0.0, pan], [0.0, 1.0, tilt]])
             flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-            seen = cv2.warpAffine(seen, shift, self.shape[::-1], flags=flags, borderMode=cv2.BORDER_REFLECT)
+            turned = cv2.warpAffine(seen, shift, self.shape[::-1], flags=flags, borderMode=cv2.BORDER_REFLECT)
+            seen = np.asarray(turned, np.float32)
         np.multiply(seen, self._gain, out=picture)
 
     def _picture(self, number: int) -> NDArray[np.float32]:
