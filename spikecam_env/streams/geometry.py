@@ -61,7 +61,7 @@ MANY_CHANCES = 500.0
 COINCIDES = 0.5
 """c above: read wrong.  Read right 0.00 to 0.04, wrong 0.5 to 1.7."""
 LIKE_CHANCE = 1.15
-"""Largest ratio of c to 1, either way, at every distance and place, of events that nothing orders.  Bright textures
+"""Largest ratio of c to 1, either way and beyond three standard errors, of events that nothing orders.  Bright textures
 that move fast reach 1.2 to 1.4 in a file read right."""
 SURE = 8.0
 """Standard errors of D beyond which it is no chance; the search sees some million lengths."""
@@ -137,11 +137,11 @@ def looks_right(packed: NDArray[np.uint8], bit_order: BitOrder = "little") -> bo
 @dataclass(frozen=True)
 class Coincidences:
     """chance: coincidences in successive frames that chance would give.  c: (LAGS,) seen by chance's, 1 .. LAGS frames
-    apart.  by_part: the first of c in each stretch of the frame that has enough of them."""
+    apart.  by_part: the same two, of successive frames, for each stretch of the frame that has enough of them."""
 
     chance: float
     c: NDArray[np.float64]
-    by_part: tuple[float, ...] = ()
+    by_part: tuple[tuple[float, float], ...] = ()
 
     @property
     def next_frame(self) -> float:
@@ -153,8 +153,8 @@ class Coincidences:
 
         In light that moves and is above one spike a frame they come in runs in some places, and apart in others.
         """
-        every = np.array([*self.c, *self.by_part])
-        return bool(np.all(np.abs(np.log(np.maximum(every, 1e-9))) < math.log(LIKE_CHANCE)))
+        found = [*((self.chance, c) for c in self.c), *self.by_part]
+        return all(abs(math.log(max(c, 1e-9))) < math.log(LIKE_CHANCE) + 3 / math.sqrt(n) for n, c in found)
 
 
 def coincidences(bits: NDArray[np.uint8], lag: int) -> Coincidences:
@@ -175,7 +175,7 @@ def coincidences(bits: NDArray[np.uint8], lag: int) -> Coincidences:
         here = float((n * (n - 1)).sum()) / (block * (block - 1))
         chance += here
         if here * (block - 1) > 5 * FEWEST_CHANCES:
-            by_part.append(found[0] / here)
+            by_part.append((here * (block - 1), found[0] / here))
     return Coincidences(chance * (block - 1), seen / chance if chance else np.zeros(LAGS), tuple(by_part))
 
 

@@ -131,7 +131,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--frame-rate-hz": FLOATS,
             "--radiance-per-unit": FLOATS,
             "--holdout-share": ("nan", "inf", "-1", "1"),
-            "--height": (*COUNTS, 9),
+            "--height": COUNTS,
             "--width": COUNTS,
             "--crop-width": (*COUNTS, 9),
             "--rows": ((-1, 3), (3, 1), (0, 10**30), (0, 9)),
@@ -176,7 +176,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         ("denoise", "{here}/a.dat", "--out", "{out}", "--height", 8, "--width", 8),
         {
             "--window": (*COUNTS, 4, 101),
-            "--height": (*COUNTS, 9),
+            "--height": COUNTS,
             "--width": (*COUNTS, 10**9),
             "--crop-width": (*COUNTS, 9),
         },
