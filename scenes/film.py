@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from scenes.frames import ALONE, Stored, stored
-from scenes.pictures import MOST_PIXELS, pictures_in, pictures_timed, read_picture
+from scenes.pictures import check_size, pictures_in, pictures_timed, read_picture
 from scenes.transfer import Array, grey, light_of
 from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file
@@ -216,8 +216,7 @@ def _video(path: Path) -> Iterator[_Source]:
             if not streams or set(container.format.name.split(",")) & set(NOT_VIDEO):
                 raise InputError(f"{path} is not a film, or is damaged: it holds 0 pictures that FFmpeg can read")
             stream = streams[0]
-            if stream.codec_context.width * stream.codec_context.height > MOST_PIXELS:
-                raise InputError(f"{path} has pictures of more than {MOST_PIXELS} pixels; make them smaller first")
+            check_size(stream.codec_context.width, stream.codec_context.height, path)
             if (stream.sample_aspect_ratio or 1) != 1:
                 warnings.warn(
                     f"{path}: its pixels are not square ({stream.sample_aspect_ratio}); they are taken as if they were",

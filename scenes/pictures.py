@@ -22,7 +22,7 @@ from scenes.frames import ALONE, Stored, stated_primaries, stated_transfer, stor
 from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file, read_text
 
-MOST_PIXELS = 1 << 27
+MOST_PICTURE_PIXELS = 1 << 27
 """Pixels of the largest picture that is decoded: 16 384 x 8192, some 1.6 GB as linear colour."""
 SUFFIXES = (
     *(".bmp", ".dpx", ".exr", ".hdr", ".jp2", ".jpeg", ".jpg", ".pbm", ".pfm", ".pgm", ".png", ".pnm", ".ppm", ".tga"),
@@ -40,7 +40,7 @@ SRGB_GAMMA = 2.2
 def read_picture(path: str | PathLike[str]) -> Stored:
     """A picture file, upright.
 
-    Errors: InputError where there is none, it is damaged, not a picture, larger than MOST_PIXELS, holds several
+    Errors: InputError where there is none, it is damaged, not a picture, larger than MOST_PICTURE_PIXELS, holds several
     pictures or transparent pixels.
     """
     source = existing_file(Path(path))
@@ -159,7 +159,7 @@ def _by_ffmpeg(source: Path) -> Stored:
     try:
         with source.open("rb") as file, av.open(file, "r", options=ALONE, metadata_errors="replace") as container:
             context = container.streams.video[0].codec_context
-            context.options = {"max_pixels": str(MOST_PIXELS)}
+            context.options = {"max_pixels": str(MOST_PICTURE_PIXELS)}
             check_size(context.width, context.height, source)
             for frame in container.decode(video=0):
                 return stored(frame, str(source), turned=False)
@@ -171,10 +171,10 @@ def _by_ffmpeg(source: Path) -> Stored:
 
 
 def check_size(width: int, height: int, source: Path | str) -> None:
-    """Errors: InputError for more than MOST_PIXELS."""
-    if width * height > MOST_PIXELS:
+    """Errors: InputError for more than MOST_PICTURE_PIXELS."""
+    if width * height > MOST_PICTURE_PIXELS:
         raise InputError(
-            f"{source} has {height} x {width} pixels; at most {MOST_PIXELS} are read, make it smaller first"
+            f"{source} has {height} x {width} pixels; at most {MOST_PICTURE_PIXELS} are read, make it smaller first"
         )
 
 

@@ -225,9 +225,9 @@ def _hush(name: str, module: Any) -> None:
     """After a signal no hook prints a traceback: exceptions then follow from it.  One that nobody caught leaves."""
     before = getattr(module, name)
 
-    def hook(*told: Any) -> None:
+    def hook(*what: Any) -> None:
         if _State.code is None:
-            before(*told)
+            before(*what)
         elif threading.current_thread() is threading.main_thread():
             leave(_State.code)
 

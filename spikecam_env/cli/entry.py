@@ -47,7 +47,7 @@ def _with_streams(args: list[str] | None) -> int:
 
 
 def say(text: str) -> None:
-    """A line on standard error, if anybody can be told, and while nothing else is to be said."""
+    """Write a line on standard error.  Nothing is written to a closed stream, or once a signal has come."""
     if stopping.is_stopping():
         return
     with suppress(OSError):

@@ -44,7 +44,7 @@ def load_npz(
     frame upside down.  bit_order: of packed `seq` only; "big" is NumPy's own.
     Warns (UserWarning) where the spikes say another time axis.
     Raises InputError if the file is absent or not an .npz, no or several arrays can be the stream, values are
-    not 0 and 1, or the time axis cannot be told.
+    not 0 and 1, or a time axis that the spikes and the shape leave open.
     """
     arrays = read_arrays(path)
     choice = Choice(key, item, batch_axis, time_axis, flip, first, count)

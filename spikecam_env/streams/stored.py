@@ -83,7 +83,7 @@ def one_stream(
     """(T, H, W) uint8 spikes out of an array of a file, and how they were read: key, time_axis, time_axis_from, item.
 
     stated: the axis of time that the file names, if it does.
-    Raises InputError for other axes or dtypes, values that are not 0 and 1, and what cannot be told.
+    Raises InputError for other axes or dtypes, values that are not 0 and 1, and a time axis that nothing decides.
     """
     stored = as_bytes(one_item(array, choice, path, key), path, key)
     axis, source = time_axis(stored, choice.time_axis, stated, path)
