@@ -18,8 +18,9 @@ from scenes.protocol import Gaze, Scene
 from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Lighting, Pinhole, Window
 from scenes.textures import blobs, dead_leaves
-from scenes.trajectories import Ballistic, Shake, Spinning, Still, Trajectory, Vibrating
-from scenes.world import AT_REST, BLOCK, Body, World
+from scenes.trajectories import AT_REST, Ballistic, Shake, Spinning, Still, Trajectory, Vibrating
+from scenes.world import Body, World
+from scenes.world.plan import BLOCK
 from spikecam_env.errors import InputError
 
 SHAPE = (60, 96)
@@ -214,12 +215,12 @@ def test_depth_halves_what_a_polynomial_misplaces_on_a_box(renderer: Embree, mon
     def off() -> float:
         box_alone = Body("box", assemble(*box((1, 1, 1), faces)), turning)
         world = World((100, 160), (box_alone,), Camera((0, 0, 3)), background=0.3, renderer=renderer)
-        step = world._plan(0).steps[0]
+        step = world.plan(0).steps[0]
         at, truth = step // 2, world.truth(step / 2)
         return rms((world.radiance(at, at + 1).radiance[0] - truth.radiance)[truth.object_id > 0])
 
     by_depth = off()
-    monkeypatch.setattr("scenes.world.FLAT", np.inf)
+    monkeypatch.setattr("scenes.world.plan.FLAT", np.inf)
     by_polynomial = off()
     print(f"{100 * by_depth:.2f} % rms; by a polynomial alone {100 * by_polynomial:.2f} %")
     assert by_depth < 0.5 * by_polynomial

@@ -1,0 +1,93 @@
+"""What a world keeps for its next call.
+
+Everything in it follows from the world: an entry that is dropped is made again, bit for bit.  Each kind has a limit of
+its own, in entries; the entry asked for least recently goes first.  A copied or unpickled world begins with nothing.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.layers import Key
+from scenes.renderers.protocol import Sprite
+from scenes.world.extent import Probe, probe_of
+from scenes.world.plan import Plan
+from scenes.world.spec import WorldSpec
+
+PLANS = 64
+"""Blocks whose plans are kept: 0.4 s of the camera's time."""
+
+KEYS_A_BODY = 4
+"""Keys that a body gets in a piece of 64 frames at most (`paint.PIECE` / `plan.SHORTEST_KEY_STEP`): the last of them is
+the first of the next piece, and the other bodies' keys come between."""
+
+KEYS_MORE = 8
+"""Keys beside those: room for calls that cut the stream elsewhere than at pieces."""
+
+BACKDROPS_A_BODY = 2
+"""Of each body, as if all were backdrops: the picture without gaze, and that under one gaze."""
+
+T = TypeVar("T")
+
+
+class Recent(Generic[T]):
+    """The results asked for most recently, by name: at most `most` of them, and at least one."""
+
+    def __init__(self, most: int) -> None:
+        self.most = max(most, 1)
+        self._kept: OrderedDict[Hashable, T] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def get(self, name: Hashable, make: Callable[[], T]) -> T:
+        """What is kept by this name, or what `make` returns, which is kept from now on."""
+        if name not in self._kept:
+            self._kept[name] = make()
+            while len(self._kept) > self.most:
+                self._kept.popitem(last=False)
+        self._kept.move_to_end(name)
+        return self._kept[name]
+
+
+@dataclass(frozen=True, eq=False)
+class WorldCache:
+    """One world's.  For B bodies at most:
+
+    plans       64 plans of blocks
+    probes      B, one a body
+    keys        4 B + 8 bodies rendered at key times: what takes the memory, 72 bytes a pixel of each key's window,
+                up to 37 MB at 250 x 400 of a body that fills the picture and its surroundings
+    backdrops   2 B backdrops rendered at an instant, 12 bytes a pixel
+    tile        1 background picture at one texel a pixel
+    base        1 picture of all that stands still behind the bodies
+    """
+
+    plans: Recent[Plan]
+    probes: Recent[Probe]
+    keys: Recent[Key]
+    backdrops: Recent[Sprite]
+    tile: Recent[NDArray[np.float32]]
+    base: Recent[NDArray[np.float32]]
+
+    @classmethod
+    def of(cls, bodies: int) -> WorldCache:
+        """An empty one for a world of so many bodies."""
+        return cls(
+            plans=Recent(PLANS),
+            probes=Recent(bodies),
+            keys=Recent(KEYS_A_BODY * bodies + KEYS_MORE),
+            backdrops=Recent(BACKDROPS_A_BODY * bodies),
+            tile=Recent(1),
+            base=Recent(1),
+        )
+
+    def probe(self, spec: WorldSpec, body: int) -> Probe:
+        """The points that stand for a body of the world."""
+        return self.probes.get(body, lambda: probe_of(spec.bodies[body].surface.mesh))

@@ -1,0 +1,112 @@
+"""What a world is made of, and where its camera sees it at a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.camera import Camera
+from scenes.protocol import Gaze
+from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Surface
+from scenes.renderers.shared import shared_renderer
+from scenes.trajectories import AT_REST, Trajectory
+from spikecam_env.errors import InputError
+
+Array = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A surface that moves.
+
+    backdrop   laid first, in the order given; nothing ever goes behind it (a floor, a wall)
+    """
+
+    name: str
+    surface: Surface
+    trajectory: Trajectory = AT_REST
+    backdrop: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class WorldSpec:
+    """What a world is made of; see `scenes.world.World`, which is one.  Bodies are named by their place in `bodies`."""
+
+    shape: tuple[int, int]
+    bodies: tuple[Body, ...]
+    camera: Camera = field(default_factory=Camera)
+    lighting: Lighting = field(default_factory=Lighting)
+    background: float | Array = 0.1
+    light: float = 1.0
+    frame_rate_hz: float = 40_000.0
+    motion_per_key: float = 1.0
+    renderer: Renderer | None = None
+
+    def __post_init__(self) -> None:
+        names = [body.name for body in self.bodies]
+        ranges: dict[str, tuple[Any, bool, str]] = {
+            "shape": (self.shape, len(self.shape) == 2 and min(self.shape) >= 1, "(rows, columns), both at least 1"),
+            "bodies": (names, len({*names, "camera"}) == len(names) + 1, "of different names, none of them 'camera'"),
+            "frame_rate_hz": (self.frame_rate_hz, 0 < self.frame_rate_hz < np.inf, "positive"),
+            "light": (self.light, 0 < self.light < np.inf, "positive"),
+            "motion_per_key": (self.motion_per_key, self.motion_per_key > 0, "positive"),
+            "background": (
+                np.shape(self.background),
+                np.ndim(self.background) in (0, 2) and _is_light(self.background),
+                "a radiance or (h, w) of it, finite and 0 or more",
+            ),
+        }
+        for name, (value, allowed, rule) in ranges.items():
+            if not allowed:
+                raise InputError(f"{name} is {value}; it must be {rule}")
+
+    @property
+    def drawing(self) -> Renderer:
+        """The renderer of this world, or the one that this thread shares."""
+        return self.renderer if self.renderer is not None else shared_renderer()
+
+    @property
+    def focal(self) -> float:
+        """[pixels]"""
+        return self.camera.focal(self.shape[0])
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """(x, y) of the picture's middle [pixels]."""
+        return (self.shape[1] - 1) / 2, (self.shape[0] - 1) / 2
+
+    @property
+    def backdrops(self) -> list[int]:
+        return [number for number, body in enumerate(self.bodies) if body.backdrop]
+
+    def pinhole(self, frame: float) -> Pinhole:
+        """The camera at a frame, without gaze."""
+        return Pinhole(self.focal, self.centre, self.camera.pose(np.array(float(frame)) / self.frame_rate_hz))
+
+    def pose(self, body: int, frames: float | Floats) -> Floats:
+        """Body to world (..., 4, 4) at frames."""
+        return self.bodies[body].trajectory.pose(np.asarray(frames, np.float64) / self.frame_rate_hz)
+
+    def view(self, body: int, frames: Floats) -> Floats:
+        """Body to camera (n, 4, 4) at frames."""
+        return np.linalg.inv(self.camera.pose(frames / self.frame_rate_hz)) @ self.pose(body, frames)
+
+    def gaze_centres(self, gaze: Gaze | None, frames: Floats) -> Floats:
+        """(n, 2): where the camera's axis is seen at frames [pixels], which a gaze shifts."""
+        return np.asarray(self.centre) - gaze_offsets(gaze, frames)
+
+
+def gaze_offsets(gaze: Gaze | None, frames: Floats) -> Floats:
+    """(n, 2) pan and tilt at frames [pixels]; 0 without gaze."""
+    if gaze is None:
+        return np.zeros((len(frames), 2))
+    return np.array([gaze.at(float(frame)) for frame in frames])
+
+
+def _is_light(radiance: float | Array) -> bool:
+    values = np.asarray(radiance)
+    return values.size > 0 and values.dtype.kind in "fiu" and bool(values.min() >= 0 and values.max() < np.inf)
