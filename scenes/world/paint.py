@@ -71,15 +71,17 @@ def _skies(spec: WorldSpec, cache: WorldCache, frames: Floats, gaze: Gaze | None
 
 
 def _still_base(spec: WorldSpec, cache: WorldCache, frame: float) -> Array:
-    """(H, W): the sky and the backdrops over it, where nothing of it moves."""
+    """(H, W): the sky and the backdrops over it, where nothing of it moves in a block."""
+    backdrops = spec.backdrops
+    name = (spec.pinhole(frame).pose.tobytes(), *(spec.pose(body, frame).tobytes() for body in backdrops))
 
     def drawn() -> Array:
         picture = sky(spec, cache, frame, np.zeros(2))
-        for body in spec.backdrops:
+        for body in backdrops:
             lay_over(picture, body_sprite(spec, cache, body, frame, None, TRUTH_RAYS), np.full_like(picture, np.inf))
         return picture
 
-    return cache.base.get("", drawn)
+    return cache.base.get(name, drawn)
 
 
 # -- the layer of a body ---------------------------------------------------------------------------------------

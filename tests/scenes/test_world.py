@@ -18,7 +18,7 @@ from scenes.protocol import Gaze, Scene
 from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Lighting, Pinhole, Window
 from scenes.textures import blobs, dead_leaves
-from scenes.trajectories import AT_REST, Ballistic, Shake, Spinning, Still, Trajectory, Vibrating
+from scenes.trajectories import AT_REST, Ballistic, Path, Shake, Spinning, Still, Trajectory, Vibrating
 from scenes.world import Body, World
 from scenes.world.plan import BLOCK
 from spikecam_env.errors import InputError
@@ -78,6 +78,21 @@ def test_keys_do_not_depend_on_the_cut_or_on_what_was_asked_before(renderer: Emb
         assert part.frame[0] <= start and part.frame[-1] >= stop
         for frame, radiance in zip(part.frame, part.radiance, strict=True):
             np.testing.assert_array_equal(radiance, light[frame])
+
+
+def test_a_backdrop_that_rests_in_two_places_is_painted_where_it_is(renderer: Embree) -> None:
+    """It stands still in both blocks, so each is painted over one picture of it: of this block, not of the other."""
+    moved = Path((0.01, 0.02), ((0, 0, 0), (0.5, 0, 0)))
+
+    def wall() -> World:
+        bodies = (Body("wall", assemble(rectangle(0.5, 0.5, 0.9)), moved, backdrop=True),)
+        return World(SHAPE, bodies, Camera((0, 0, 3)), renderer=renderer)
+
+    world, later = wall(), 10 * BLOCK
+    before = world.radiance(0, 4).radiance
+    after = world.radiance(later, later + 4).radiance
+    assert np.abs(after - before).max() > 0.3
+    np.testing.assert_array_equal(after, wall().radiance(later, later + 4).radiance)
 
 
 def test_carried_light_is_the_rendered_light_to_1_5_percent(renderer: Embree) -> None:
