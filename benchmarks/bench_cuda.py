@@ -1,6 +1,6 @@
 """Batches of cameras on a GPU against the fast engine on this machine's processor, measured in the same run.
 
-python benchmarks/bench_cuda.py            # the GPU; without one it says so and times the torch fallback, small
+python -m benchmarks.bench_cuda            # the GPU; without one it says so and times the torch fallback, small
 
 Columns: scene, engine or kernel, cameras, frames (in one call), Gpx-steps/s, x fast (one camera, NUMBA_NUM_THREADS
 threads), x real time (Vidar).  Light lies on the device already; spikes stay there, one byte a pixel.
@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from spikecam_env.bench.machine import SHAPE, machine
+from spikecam_env.bench.sensor import BLOCK, REAL_TIME
 from spikecam_env.cli.table import table
 from spikecam_env.sensor import SpikeSensorBatch
-from spikecam_env.sensor.bench import BLOCK, REAL_TIME, SHAPE, machine
 from spikecam_env.sensor.kernels import cuda, fast
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import SensorModel, generator

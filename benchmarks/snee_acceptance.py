@@ -1,6 +1,6 @@
 """SNEE on simulated units it does not know: errors beside the best possible, N, V_S, coverage, time.
 
-python benchmarks/snee_acceptance.py            25 levels, 64 x 64, 20 000 frames each; about three minutes
+python -m benchmarks.snee_acceptance            25 levels, 64 x 64, 20 000 frames each; about three minutes
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Cells of long intervals take fewer pixels for longer, so that each costs the reference, which is slow, about the same
 (--pixel-frames).  The mean rate in dim light is then compared with the light itself, on the fast engine alone.
 
-python benchmarks/validate_engines.py --pixels 200000 --seed 1
+python -m benchmarks.validate_engines --pixels 200000 --seed 1
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 from scipy import stats
 from tqdm import tqdm
 
+from benchmarks.agreement import compare, neighbours, observe
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
-from spikecam_env.sensor.agreement import compare, neighbours, observe
 from spikecam_env.sensor.effects.reset_noise import ResetNoise
 from spikecam_env.sensor.effects.shot_noise import ShotNoise
 

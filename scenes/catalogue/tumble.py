@@ -1,4 +1,4 @@
-"""Tumble: six bodies of 17 000 triangles that pass before each other, one a disk at 2000 rpm: what `bench` times."""
+"""Tumble: six bodies of 17 000 triangles that pass before each other, one a disk at 2000 rpm; `bench` times it."""
 
 from __future__ import annotations
 

@@ -12,26 +12,29 @@ import tyro
 
 @dataclass
 class Bench:
-    """Measure speed on this machine: the sensor's engines, its effects, the online denoiser, scenes or datasets.
+    """Measure speed on this machine: the sensor's engines, effects, the online denoiser, scenes, renderers, datasets.
 
     example:  spikecam bench sensor
     """
 
-    what: tyro.conf.Positional[Literal["sensor", "effects", "online", "scenes", "dataset"]]
+    what: tyro.conf.Positional[Literal["sensor", "effects", "online", "scenes", "renderers", "dataset"]]
     """sensor: pixel-steps a second of numpy, reference and fast.  effects: what each costs, over the base model.
     online: denoised frames a second.  scenes: frames of light a second, how far they are from the truth, renderers,
-    scene to spikes, and whether the flow is right (some minutes).  dataset: frames a second into files."""
+    scene to spikes, and whether the flow is right (some minutes).  renderers: how fast and how exact each back-end of
+    this machine is.  dataset: frames a second into files."""
     out: Path | None = None
     """Where to write the figures as JSON."""
 
     def run(self) -> None:
-        from denoiser.bench import bench_online
-        from scenes.bench import bench_scenes
+        from spikecam_env.bench.dataset import bench_dataset
+        from spikecam_env.bench.effects import bench_effects
+        from spikecam_env.bench.machine import machine
+        from spikecam_env.bench.online import bench_online
+        from spikecam_env.bench.renderers import bench_renderers
+        from spikecam_env.bench.scenes import bench_scenes
+        from spikecam_env.bench.sensor import bench_sensor
         from spikecam_env.cli.files import write_json
         from spikecam_env.cli.table import table
-        from spikecam_env.datasets.bench import bench_dataset
-        from spikecam_env.sensor.bench import bench_sensor, machine
-        from spikecam_env.sensor.effect_costs import bench_effects
         from spikecam_env.whole import check_file
 
         if self.out is not None:
@@ -42,6 +45,7 @@ class Bench:
             "effects": bench_effects,
             "online": bench_online,
             "scenes": bench_scenes,
+            "renderers": bench_renderers,
             "dataset": bench_dataset,
         }
         rows = benches[self.what]()

@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spikecam_env.calibration.check_measured import flat_quantiles, simulated_wall
-from spikecam_env.calibration.clock_locking import clock_locking
-from spikecam_env.calibration.fit_measured import (
-    PRESET,
-    fit_bowl,
-    hot_population,
-    log_normal_through_quantiles,
-)
+from benchmarks.check_measured import flat_quantiles, simulated_wall
+from benchmarks.clock_locking import clock_locking
+from benchmarks.paper_figure import grey_patches
 from spikecam_env.calibration.flat_maps import FRAMES, FlatMaps, read_flat_maps
-from spikecam_env.calibration.paper_figure import grey_patches
 from spikecam_env.calibration.real import MAPS, read_response_and_dark, read_wall, wall_statistics
 from spikecam_env.calibration.two_levels import split_shading, two_levels
 from spikecam_env.calibration.wall_noise import simulate_wall
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
+from tools.fit_measured import (
+    PRESET,
+    fit_bowl,
+    hot_population,
+    log_normal_through_quantiles,
+)
 
 REAL = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "real"
 needs_real = pytest.mark.skipif(

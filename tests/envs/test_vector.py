@@ -17,10 +17,10 @@ import pytest
 import spikecam_env.envs  # noqa: F401
 from scenes.renderers import contexts, shared
 from scenes.renderers.choose import make as make_renderer
-from scenes.renderers.compare import objects
 from scenes.renderers.elsewhere import Elsewhere
 from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Lighting, Pinhole, Window
+from spikecam_env.bench.renderers import objects
 from spikecam_env.errors import InputError, NotReadyError
 
 LONGEST_S = 600.0

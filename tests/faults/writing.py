@@ -121,7 +121,7 @@ LADDER: Work = {
         "camera", 0, 3, (Rung(MODEL, None, 0.0, (), 3.0, {"rates": 2.0}, 1), Rung(MODEL, None, 0.0, (), 1.0, {}, 0))
     )
 }
-BENCH: Work = {"spikecam_env.sensor.bench:bench_sensor": lambda: [{"engine": "fast", "note": "x" * 9000}]}
+BENCH: Work = {"spikecam_env.bench.sensor:bench_sensor": lambda: [{"engine": "fast", "note": "x" * 9000}]}
 
 WRITINGS: dict[str, Writing] = {
     "record h5": Writing(f"record --out {{out}} --frames 320 {' '.join(SMALL)}", "disk.h5", {}),

@@ -6,7 +6,7 @@ import pytest
 
 from scenes import Gaze, RotatingDisk, Scene
 from scenes.disk import disk_texture
-from scenes.exact import supersampled
+from spikecam_env.bench.exact_disk import supersampled
 from spikecam_env.errors import InputError
 
 BACKGROUND = 0.2

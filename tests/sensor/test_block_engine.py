@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from laws import jittered, with_effects
 
+from benchmarks.agreement import compare, observe
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, decay
-from spikecam_env.sensor.agreement import compare, observe
 from spikecam_env.sensor.effects.base import Array, Charge, Exposure, Spikes, parameter
 from spikecam_env.sensor.kernels import block, block_loop, draws, loop
 from spikecam_env.sensor.kernels.field import octave_field, white_field, words

@@ -13,8 +13,8 @@ from laws import jittered
 from numpy.typing import NDArray
 from scipy import stats
 
+from benchmarks.agreement import compare, independent, neighbours, observe, same_law
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
-from spikecam_env.sensor.agreement import compare, independent, neighbours, observe, same_law
 
 PIXELS = 12_000
 SHAPE = (PIXELS // 400, 400)

@@ -14,10 +14,11 @@ import pytest
 from laws import camera, population, with_effects
 
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor, catalogue_page
-from spikecam_env.sensor.catalogue_page import SECTIONS, Sheet
+from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effects.base import Charge, Exposure, Few
 from spikecam_env.sensor.kernels import block
+from spikecam_env.sensor.sheet import SECTIONS, Sheet
+from tools import effects_page
 
 SHAPE = (10, 12)
 EVERY = sorted(CATALOGUE)
@@ -224,12 +225,12 @@ def test_every_effect_has_a_test_of_its_own() -> None:
 
 def test_page_of_effects_is_up_to_date() -> None:
     shipped = (Path(__file__).parents[3] / "docs" / "effects.md").read_text(encoding="utf-8")
-    assert shipped == catalogue_page.page(), "run: python -m spikecam_env.sensor.catalogue_page docs/effects.md"
+    assert shipped == effects_page.page(), "run: python -m tools.effects_page docs/effects.md"
 
 
 def test_effect_of_the_page_on_adding_one_works(tmp_path, monkeypatch) -> None:
     """The example of docs/effects.md, run as a file: from frame 0 the light comes on as 1 - exp(-t/tau)."""
-    code = re.findall(r"```python\n(.*?)```", catalogue_page.page(), flags=re.DOTALL)[-1]
+    code = re.findall(r"```python\n(.*?)```", effects_page.page(), flags=re.DOTALL)[-1]
     (tmp_path / "slow_shutter.py").write_text(code, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     slow_shutter = importlib.import_module("slow_shutter").SlowShutter

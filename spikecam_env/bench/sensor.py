@@ -5,8 +5,6 @@ spikecam bench sensor
 
 from __future__ import annotations
 
-import os
-import platform
 import time
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -16,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.kernels import ahead, fast
@@ -25,24 +24,12 @@ from spikecam_env.sensor.unit import Unit
 
 Array = NDArray[np.float64]
 
-SHAPE = (250, 400)
-REAL_TIME = SHAPE[0] * SHAPE[1] * 40_000
+REAL_TIME = SHAPE[0] * SHAPE[1] * FRAME_RATE_HZ
 """Pixel-steps a second of a Vidar camera."""
 
 BLOCK = 64
 SMOOTH = "smooth, moving"
 SCENES: tuple[float | str, ...] = (5.0, 20.0, 100.0, SMOOTH)
-
-
-def machine() -> str:
-    """Processor and number of cores, for the record."""
-    name = platform.processor() or platform.machine()
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        pass
-    return f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
 
 
 def bench_sensor(

@@ -1,6 +1,6 @@
 """Fit the preset `measured` to real recordings and write it with its provenance.
 
-    python -m spikecam_env.calibration.fit_measured ../shared/data/real
+    python -m tools.fit_measured ../shared/data/real
 
 From the flat maps: smooth shading, pixel-to-pixel response, log-normal dark level, hot pixels.  From the wall: white
 and slow temporal noise, told apart by A_k.  Prior: the published circuit, and with it N = C V_d / q and sqrt(kT/C).
@@ -147,10 +147,10 @@ def preset_text(c: MeasuredConstants, circuit: Circuit | None = None) -> str:
     n = c.noise
     octave_mV = 1e3 * float(np.sqrt(n.octave)) * circuit.swing_V
     return f"""\
-# Fitted to real recordings by: python -m spikecam_env.calibration.fit_measured FOLDER
+# Fitted to real recordings by: python -m tools.fit_measured FOLDER
 # wall.npz: 500 frames of a wall; flat_335lux_maps.npz: spikes of 100 000 pixels in light and in
 # the dark, 4000 frames each, another unit perhaps.
-# How well it does: python -m spikecam_env.calibration.check_measured FOLDER, and docs/calibration.md.
+# How well it does: python -m benchmarks.check_measured FOLDER, and docs/calibration.md.
 #
 # Prior, not fitted: the circuit (published SCSim constants), hence N = C V_d / q; 20 kHz for the maps, which do not say
 # their frame rate (at it the dark level is the published 0.44 pA).  335 lux on the maps is radiance {c.response_at_flat:.4f}.

@@ -1,4 +1,4 @@
-"""What a picture of a disk should be: many samples a pixel, straight from the texture.  Slow; for tests and `bench`."""
+"""What a picture of a disk should be: many samples a pixel, straight from the texture.  Slow."""
 
 from __future__ import annotations
 

@@ -16,17 +16,17 @@ from tqdm import tqdm
 from scenes.catalogue import SCENES, make_scene
 from scenes.collage import Collage
 from scenes.disk import RotatingDisk, disk_texture
-from scenes.exact import supersampled
 from scenes.flow import check_flow
 from scenes.keys import side_by_side
 from scenes.protocol import Scene
-from scenes.renderers.compare import compare_backends
 from scenes.sliding import SlidingTexture
 from scenes.world import World
+from spikecam_env.bench.exact_disk import supersampled
+from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
+from spikecam_env.bench.renderers import bench_renderers
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SpikeSensor
 
-SHAPE = (250, 400)
 BLOCK = 64
 """Frames asked for at a time."""
 
@@ -35,9 +35,6 @@ SPACE = "tumble"
 
 EXACT_RAYS = 16
 """A pixel and side, of the truth that light in space is compared with."""
-
-REAL_TIME = 40_000
-"""Frames a second."""
 
 Rows = list[dict[str, Any]]
 Array = NDArray[np.floating]
@@ -55,7 +52,7 @@ def bench_scenes(names: Iterable[str] = (), seconds: float = 2.0) -> dict[str, R
     steps = {
         "planar scenes": lambda: bench_planar(seconds),
         f"space: {SPACE}": lambda: bench_space(seconds),
-        "renderer back-ends": _backends,
+        "renderer back-ends": bench_renderers,
         "end to end: light to noisy spikes": lambda: bench_end_to_end(seconds),
         "flow: frame 100 moved along it, against frame 140": lambda: flow_table(list(names) or list(SCENES)),
     }
@@ -136,7 +133,7 @@ def bench_end_to_end(seconds: float = 2.0) -> Rows:
             {
                 "scene": name,
                 "frames/s": frames / total,
-                "x real time": frames / total / REAL_TIME,
+                "x real time": frames / total / FRAME_RATE_HZ,
                 "light, %": 100 * light_s / total,
                 "camera, %": 100 * camera_s / total,
                 "keys a frame": keys / frames,
@@ -161,20 +158,6 @@ def flow_table(names: Iterable[str]) -> Rows:
             }
         )
     return rows
-
-
-def _backends() -> Rows:
-    """`scenes.renderers.compare` as a table; rms in per cent."""
-    return [
-        {
-            "back-end": row.backend,
-            "key, ms": row.key_ms,
-            "rms, %": 100 * row.error,
-            "to embree, %": 100 * row.to_embree,
-            "name": row.name,
-        }
-        for row in compare_backends(SHAPE)
-    ]
 
 
 def _speed(name: str, scene: Scene, pixels_a_frame: float | None, seconds: float) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """How fast and how exact each back-end is on this machine, on one picture of six textured objects, 17 000 triangles.
 
-`python -m scenes.renderers.compare` prints the table.
+spikecam bench renderers
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -19,6 +20,7 @@ from scenes.renderers.choose import BACKENDS, make, problem
 from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
 from scenes.textures import TEXTURES
+from spikecam_env.bench.machine import SHAPE
 
 TRUTH_RAYS = 16
 """Rays a pixel and axis of the picture that the back-ends are held against."""
@@ -44,7 +46,7 @@ class Comparison:
     to_embree: float
 
 
-def compare_backends(shape: tuple[int, int] = (250, 400), supersample: int = 2, repeats: int = 20) -> list[Comparison]:
+def compare_backends(shape: tuple[int, int] = SHAPE, supersample: int = 2, repeats: int = 20) -> list[Comparison]:
     """One row for each of `BACKENDS`, each measured in a process of its own, one after the other."""
     truth = [sprite.radiance for sprite in _key(Embree(), shape, TRUTH_RAYS)]
     embree = [sprite.radiance for sprite in _key(Embree(), shape, supersample)]
@@ -58,6 +60,20 @@ def compare_backends(shape: tuple[int, int] = (250, 400), supersample: int = 2, 
             name, seconds, key = process.submit(_measured, backend, shape, supersample, repeats).result()
         rows.append(Comparison(backend, name, 1e3 * seconds, _rms(key, truth, truth), _rms(key, embree, truth)))
     return rows
+
+
+def bench_renderers() -> list[dict[str, Any]]:
+    """`compare_backends` at 250 x 400 as a table; times in ms, rms in per cent."""
+    return [
+        {
+            "back-end": row.backend,
+            "key, ms": row.key_ms,
+            "rms, %": 100 * row.error,
+            "to embree, %": 100 * row.to_embree,
+            "name": row.name,
+        }
+        for row in compare_backends(SHAPE)
+    ]
 
 
 def objects(seed: int = 0) -> Objects:
@@ -116,17 +132,3 @@ def _rms(key: list[NDArray[np.float32]], other: list[NDArray[np.float32]], cover
     """Over the pixels of all objects where there is light."""
     squares = [np.square(a - b, dtype=np.float64)[c > 0] for a, b, c in zip(key, other, covered, strict=True)]
     return float(np.sqrt(np.mean(np.concatenate(squares))))
-
-
-def table(rows: list[Comparison]) -> str:
-    """The rows for reading."""
-    lines = [f"{'back-end':<14}{'key [ms]':>9}{'error':>9}{'to embree':>11}  name"]
-    for row in rows:
-        lines.append(
-            f"{row.backend:<14}{row.key_ms:9.1f}{100 * row.error:8.2f}%{100 * row.to_embree:10.3f}%  {row.name}"
-        )
-    return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(table(compare_backends()))

@@ -1,6 +1,6 @@
 """How true presets are to the real recordings: static wall pixels, and the flat maps' distributions.
 
-python -m spikecam_env.calibration.check_measured ../shared/data/real
+python -m benchmarks.check_measured ../shared/data/real
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.clock_locking import Locking, clock_locking
+from benchmarks.clock_locking import Locking, clock_locking
 from spikecam_env.calibration.flat_maps import counted, read_flat_maps, spread_counts
 from spikecam_env.calibration.real import (
     MAPS,

@@ -1,0 +1,1 @@
+"""Measurements behind the figures of the docs; run from a checkout, `python -m benchmarks.NAME`.  Not installed."""

@@ -1,0 +1,30 @@
+"""Programs of a checkout take minutes and are run by hand; these tests say that they still find what they import."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("benchmarks", "tools")
+PROGRAMS = sorted(f"{room}.{path.stem}" for room in ROOMS for path in (ROOT / room).glob("*.py"))
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_program_imports(name: str) -> None:
+    assert import_module(name)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_library_imports_a_program(room: str) -> None:
+    """They are not installed."""
+    said = [
+        path
+        for package in ("spikecam_env", "scenes", "denoiser")
+        for path in (ROOT / package).rglob("*.py")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if line.strip().startswith((f"from {room}", f"import {room}"))
+    ]
+    assert not said

@@ -1,0 +1,168 @@
+"""The catalogue of effects as a page, made from the effects' own declarations.
+
+python -m tools.effects_page docs/effects.md
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from dataclasses import MISSING, Field, fields
+from typing import Any
+
+from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
+from spikecam_env.sensor.model import SensorModel
+from spikecam_env.sensor.ranges import range_text
+from spikecam_env.sensor.sheet import Sheet
+from spikecam_env.sensor.unit import LEAST_SHARE, MOST_KAPPA, MOST_SPREAD, SWING_V, Circuit
+from spikecam_env.whole import write_text_whole
+
+
+def page() -> str:
+    """The whole page, Markdown."""
+    stages = {stage: [e for e in CATALOGUE.values() if e.stage is stage] for stage in Stage}
+    chapters = (_chapter(stage, of) for stage, of in stages.items())
+    return "\n".join([_HEAD, _contents(stages), _camera(), *chapters, _TAIL])
+
+
+def main() -> None:
+    """Write the page to the file named on the command line; it appears whole."""
+    if len(sys.argv) != 2:
+        raise SystemExit("usage: python -m tools.effects_page docs/effects.md")
+    write_text_whole(sys.argv[1], page())
+
+
+def _contents(stages: dict[Stage, list[type[Effect]]]) -> str:
+    rows = [f"| {_title(stage)} | {', '.join(f'[{e.name}](#{e.name})' for e in of)} |" for stage, of in stages.items()]
+    return "\n".join(["| stage | effects |", "|---|---|", *rows, ""])
+
+
+def _camera() -> str:
+    declared = [*fields(Circuit), *(f for f in fields(SensorModel) if "bounds" in f.metadata)]
+    return "\n".join([_CAMERA, *_PARAMETERS, *map(_row, declared), ""])
+
+
+def _chapter(stage: Stage, effects: list[type[Effect]]) -> str:
+    return "\n".join([f"## {_title(stage).capitalize()}", "", *map(_entry, effects)])
+
+
+def _entry(effect: type[Effect]) -> str:
+    sheet = Sheet.of(effect)
+    said = [f"- {name}: {text}" for name, text in sheet.sections.items() if name != "Stage"]
+    return "\n".join(
+        [
+            f"### {effect.name}",
+            "",
+            sheet.summary,
+            "",
+            "```",
+            inspect.cleandoc(sheet.law),
+            "```",
+            "",
+            *_PARAMETERS,
+            *(_row(f, effect) for f in fields(effect)),
+            "",
+            *said,
+            f"- Engines: {engines(effect)}",
+            "",
+        ]
+    )
+
+
+def engines(effect: type[Effect]) -> str:
+    """Which engines carry an effect, in words."""
+    if effect.is_fixed():
+        return "all"
+    return "reference, fast" if effect.is_compiled() else "reference"
+
+
+def _row(f: Field[Any], effect: type[Effect] | None = None) -> str:
+    is_strength = effect is not None and f.name == effect.strength
+    strength = f"; **strength**, {effect.neutral:g} changes nothing" if effect is not None and is_strength else ""
+    default = f"{f.default:.5g}" if isinstance(f.default, float) else str(f.default).lower()
+    if f.default is MISSING:
+        default = ""
+    return f"| `{f.name}` | {default} | {f.metadata['unit']} | {range_text(f)} | {f.metadata['doc']}{strength} |"
+
+
+def _title(stage: Stage) -> str:
+    return {Stage.READOUT: "read-out"}.get(stage, stage.name.lower())
+
+
+_PARAMETERS = ("| parameter | default | unit | bounds | meaning |", "|---|---|---|---|---|")
+
+_CAMERA = f"""## Circuit and frame rate
+
+Every value is checked against its bounds when a circuit, an effect or a model is made, and so is what they do together.
+The swing reset_V - reference_V + bias_V is {SWING_V[0]:g} to {SWING_V[1]:g} V. The spread of swings over pixels is at
+most {MOST_SPREAD:g} of the swing, that of capacitances {MOST_SPREAD:g} of the capacitance, the noise of a reset
+{MOST_KAPPA:g} of the swing. A single pixel of a spread keeps {LEAST_SHARE:g} of the nominal swing and capacitance.
+Why: [decisions.md](decisions.md).
+"""
+
+_HEAD = """# Effects
+
+Made by `python -m tools.effects_page docs/effects.md` from the effects' own files, one a file in
+`spikecam_env/sensor/effects`; a test keeps it up to date. Do not edit it.
+
+Effects act in physical order, whatever order a model lists them in. x is the charge of a frame over the threshold phi,
+T the mean interval in frames, N the electrons to a threshold, kappa the relative noise of a spike's threshold; A_k is
+E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of spike times t. At the strength said to change nothing, no bit changes.
+"""
+
+_TAIL = '''## Adding an effect
+
+One new file. `spikecam_env/sensor/effects/slow_shutter.py`:
+
+```python
+"""Slow shutter: the light comes on over the first frames.
+
+    x <- x (1 - exp(-t/tau))
+
+Stage: optics.  Seen in: the first frames of a recording.  Twins: lamp_drift.  Source: a shutter's data sheet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+
+
+@dataclass(frozen=True)
+class SlowShutter(Effect):
+    tau_us: float = parameter(500.0, unit="us", bounds=(0.0, 1e6), doc="time to open")
+
+    stage = Stage.OPTICS
+    strength = "tau_us"
+
+    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+        open_by_now = -np.expm1(-1e6 * now.middle_s / self.tau_us) if self.tau_us else 1.0
+        return light.scaled(open_by_now), dark, memory
+```
+
+That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))` and `[[effect]]`
+in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
+anew. The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
+changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
+cut, saved and restored; docs, bounds, twins that exist; and a test of your own, `test_slow_shutter_...`, of its law.
+
+Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
+carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames,
+arrays of (frames, rows, columns), which the fast engine runs as they stand. A `Charge` keeps a picture and a number a
+frame apart: `light.scaled(numbers)` costs nothing a pixel, `dark.plus(Few(pixels, charge))` only in these few, and
+`Charge(f(light.values))` an array. What depends on the spikes is written frame by frame, `react`, `after_reset`,
+`spiked`, for the reference, and declared in `feedback` for the fast engine; without a declaration that engine refuses
+the effect by name and `engine="auto"` takes the reference.
+
+What must be remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator
+of the effect's own, so that no other effect's draws change. What belongs to the unit (which pixels have a trap) `begin`
+draws from `pattern`, the same in all recordings by one unit. Time is `now.number`, absolute, never a count of calls.
+'''
+
+
+if __name__ == "__main__":
+    main()
