@@ -143,6 +143,35 @@ def reason(error: OSError) -> str:
     return words.get(error.errno or 0) or error.strerror or (str(error).splitlines() or [type(error).__name__])[0]
 
 
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """A lock on a folder, for a run of several processes; the system lifts it when this process ends, however it ends.
+
+    Whatever is half written in the folder within the block is by this run, or left by one that was killed.
+    Errors: InputError where another run has the lock, or the file system has none.
+    """
+    try:
+        handle = _lock(folder)
+    except OSError as error:
+        raise InputError(f"another run is at work in {folder}; wait for it, or choose another folder") from error
+    try:
+        yield
+    finally:
+        os.close(handle)
+
+
+def is_unfinished(path: Path) -> bool:
+    """Whether a file or folder is half written, by its name."""
+    return PARTIAL.fullmatch(path.name) is not None
+
+
+def clear_unfinished(folder: Path) -> None:
+    """Remove what is half written in a folder and below, whoever is at it: for a run that is `alone_in` it."""
+    for path in folder.rglob(".*"):
+        if is_unfinished(path):
+            _remove(path)
+
+
 def clear_abandoned(folder: Path) -> None:
     """Remove what killed processes left half written in a folder."""
     if fcntl is None:

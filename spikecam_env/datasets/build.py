@@ -6,11 +6,9 @@ is made again from its first frame: a scene is seconds.
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -28,10 +26,7 @@ from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import when_stopped
 from spikecam_env.streams.packing import packed_bytes
-from spikecam_env.whole import made_folder
-
-UNFINISHED = ".*.partial.*"
-"""Files that a killed run leaves behind (`spikecam_env.whole`)."""
+from spikecam_env.whole import alone_in, clear_unfinished, is_unfinished, made_folder
 
 
 @dataclass(frozen=True)
@@ -56,16 +51,16 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     """
     checked_count(jobs, "jobs")
     target = Path(os.path.realpath(folder))
-    with made_folder(target, "a dataset"), _alone_in(target), when_stopped(partial(_clear_unfinished, target)):
+    with made_folder(target, "a dataset"), alone_in(target), when_stopped(partial(clear_unfinished, target)):
         plan = _with_renderer(plan, target)
         manifest = _begun(plan, target)
-        _clear_unfinished(target)
+        clear_unfinished(target)
         _check_room(plan, target, manifest)
         manifest.write(target)
         try:
             return _make_missing(plan, target, manifest, jobs, ray, progress)
         finally:
-            _clear_unfinished(target)
+            clear_unfinished(target)
 
 
 def _with_renderer(plan: Plan, folder: Path) -> Plan:
@@ -79,7 +74,7 @@ def _with_renderer(plan: Plan, folder: Path) -> Plan:
 def _begun(plan: Plan, folder: Path) -> Manifest:
     asked = Manifest.of(plan)
     if not (folder / NAME).exists():
-        if any(not path.match(UNFINISHED) for path in folder.iterdir()):
+        if any(not is_unfinished(path) for path in folder.iterdir()):
             raise InputError(f"{folder} is not empty and holds no dataset; choose a new folder")
         return asked
     found = Manifest.read(folder)
@@ -140,22 +135,3 @@ def _at_work(
     if jobs > 1:
         return on_processes(plan, folder, entries, jobs)
     return chain.from_iterable(write_scene(plan, entry, folder) for entry in entries)
-
-
-def _clear_unfinished(folder: Path) -> None:
-    for path in folder.rglob(UNFINISHED):
-        path.unlink(missing_ok=True)
-
-
-@contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """A lock on the folder; the system lifts it when the process ends, however it ends."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise InputError(f"another run is at work in {folder}; wait for it, or choose another folder") from error
-        yield
-    finally:
-        os.close(handle)

@@ -10,9 +10,9 @@ from typing import Any
 from tqdm import tqdm
 
 from spikecam_env.checked import checked_count
-from spikecam_env.datasets.build import UNFINISHED
 from spikecam_env.datasets.manifest import NAME, Manifest
 from spikecam_env.datasets.write import sha256_of
+from spikecam_env.whole import is_unfinished
 
 
 def verify(folder: str | Path, *, jobs: int = 1, outside: bool = False, progress: bool = False) -> list[str]:
@@ -50,7 +50,7 @@ def _foreign(folder: Path, expected: set[str]) -> list[str]:
     lines = []
     for path in sorted(p for p in folder.rglob("*") if not p.is_dir()):
         name = path.relative_to(folder).as_posix()
-        if path.match(UNFINISHED):
+        if is_unfinished(path):
             lines.append(f"{name}: left by a run that was killed, or of one at work; run the dataset command again")
         elif name not in expected and name != NAME:
             lines.append(f"{name}: does not belong to this dataset")

@@ -17,8 +17,8 @@ import pytest
 from small_dataset import LONG, bytes_in, small_plan
 
 from spikecam_env.datasets import build, verify
-from spikecam_env.datasets.build import UNFINISHED
 from spikecam_env.errors import InputError
+from spikecam_env.whole import alone_in, is_unfinished
 
 
 def test_the_same_call_writes_the_same_bytes_later(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_killed_twice_and_resumed_gives_the_same_bytes(tmp_path: Path, whole: di
 
 def writers(folder: Path) -> set[int]:
     """Processes that have a file in the making; its name says which."""
-    return {int(path.name.split(".")[2]) for path in folder.glob(f"*/{UNFINISHED}")}
+    return {int(path.name.split(".")[2]) for path in folder.glob("*/.*") if is_unfinished(path)}
 
 
 def start_in_another_process(plan, folder: Path) -> subprocess.Popen:
@@ -132,7 +132,7 @@ def test_lost_and_truncated_files_are_made_again(tmp_path: Path) -> None:
     before = bytes_in(tmp_path)
     (tmp_path / "test/disk.h5").unlink()
     (tmp_path / "train/000.h5").write_bytes(before["train/000.h5"][:-1])
-    (tmp_path / "train/.000.1.partial.h5").write_bytes(b"left over")
+    (tmp_path / "train/.000.1.0badcafe-0badcafe.partial.h5").write_bytes(b"left over")
     built = build(small_plan(), tmp_path)
     assert (built.made, built.kept) == (2, 1)
     assert bytes_in(tmp_path) == before
@@ -163,9 +163,7 @@ def test_a_folder_with_other_things_is_refused(tmp_path: Path) -> None:
 
 
 def test_two_runs_at_once_in_a_folder_are_refused(tmp_path: Path) -> None:
-    from spikecam_env.datasets.build import _alone_in
-
-    with _alone_in(tmp_path), pytest.raises(InputError, match="another run is at work"):
+    with alone_in(tmp_path), pytest.raises(InputError, match="another run is at work"):
         build(small_plan(), tmp_path)
 
 

@@ -36,7 +36,7 @@ def test_every_fault_is_one_line(folder: Path) -> None:
         (folder / name).write_bytes(change((folder / name).read_bytes()))
     (folder / "test/disk.h5").unlink()
     (folder / "test/notes.txt").write_text("x")
-    (folder / "train/.000.77.partial.h5").write_text("x")
+    (folder / "train/.000.77.0badcafe-0badcafe.partial.h5").write_text("x")
     lines = verify(folder)
     print("\n".join(lines))
     assert [line.split(",")[0].split(";")[0] for line in lines] == [
@@ -44,7 +44,7 @@ def test_every_fault_is_one_line(folder: Path) -> None:
         "train/001.h5: too long",
         "test/disk.h5: missing",
         "test/notes.txt: does not belong to this dataset",
-        "train/.000.77.partial.h5: left by a run that was killed",
+        "train/.000.77.0badcafe-0badcafe.partial.h5: left by a run that was killed",
     ]
     build(small_plan(64), folder)
     assert verify(folder) == ["test/notes.txt: does not belong to this dataset"]

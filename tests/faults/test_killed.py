@@ -10,9 +10,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 from spikecam_env.cli.main import run
-from spikecam_env.errors import WriteError
-from spikecam_env.whole import ABANDONED_S, PARTIAL, whole_file, whole_folder, write_text_whole
+from spikecam_env.errors import InputError, WriteError
+from spikecam_env.whole import (
+    ABANDONED_S,
+    PARTIAL,
+    alone_in,
+    clear_unfinished,
+    is_unfinished,
+    whole_file,
+    whole_folder,
+    write_text_whole,
+)
 from tests.faults.writing import SMALL, python, tree
 
 LONG_S = 60.0
@@ -109,3 +120,18 @@ def test_an_error_about_another_file_is_not_said_to_be_of_this_one(tmp_path: Pat
     except OSError as error:
         assert not isinstance(error, WriteError) and str(error.filename).endswith("absent")
     assert not tree(tmp_path)
+
+
+def test_one_who_is_alone_in_a_folder_clears_all_below_it_and_nothing_else(tmp_path: Path) -> None:
+    below = tmp_path / "train"
+    below.mkdir()
+    kept = below / ".x.partial.h5"
+    kept.write_bytes(b"of somebody who names files so")
+    with alone_in(tmp_path), whole_file(below / "a") as beside:
+        assert is_unfinished(beside) and not is_unfinished(kept)
+        with pytest.raises(InputError, match="another run is at work"), alone_in(tmp_path):
+            pass
+        clear_unfinished(tmp_path)
+        assert not beside.exists() and kept.exists()
+        beside.write_bytes(b"whole")
+    assert {path.name for path in below.iterdir()} == {"a", kept.name}
