@@ -6,7 +6,6 @@ EXIF states holds.  Colour profiles (ICC) are not read.
 
 from __future__ import annotations
 
-import csv
 import re
 import warnings
 from itertools import pairwise
@@ -20,7 +19,7 @@ from PIL import Image, UnidentifiedImageError
 
 from scenes.frames import ALONE, Stored, stated_primaries, stated_transfer, stored
 from spikecam_env.errors import InputError
-from spikecam_env.untrusted import existing_file, read_text
+from spikecam_env.untrusted import existing_file, read_table
 
 MOST_PICTURE_PIXELS = 1 << 27
 """Pixels of the largest picture that is decoded: 16 384 x 8192, some 1.6 GB as linear colour."""
@@ -31,6 +30,8 @@ SUFFIXES = (
 """Of the files in a folder of pictures."""
 NO_PICTURES = ("Thumbs.db", "desktop.ini")
 """That Windows leaves in folders."""
+LISTED = ("name", "time_s")
+"""Columns of a list of pictures."""
 BY_FFMPEG = (".dpx", ".exr", ".hdr", ".pfm", ".tif", ".tiff")
 """Files that Pillow may not know."""
 SRGB_GAMMA = 2.2
@@ -84,36 +85,26 @@ def pictures_in(folder: Path) -> list[Path]:
 
 
 def pictures_timed(listing: Path) -> tuple[list[Path], NDArray[np.float64]]:
-    """The pictures that a CSV file of `name,time_s` lists, in its folder, and the time of each [s].
+    """The pictures that a CSV file with the columns name and time_s lists, in its folder, and the time of each [s].
 
     Errors: InputError, with the line, where it has other columns, a time is no number or not after the one before, or
     a name leads out of the folder or to no file.
     """
-    try:
-        lines = list(csv.reader(read_text(listing).splitlines()))
-    except csv.Error as error:
-        raise InputError(f"{listing} is not a CSV file: {error}") from error
-    if not lines or [word.strip() for word in lines[0]] != ["name", "time_s"]:
-        raise InputError(
-            f"{listing} begins with {lines[0] if lines else 'nothing'}; its first line must be name,time_s"
-        )
     folder = listing.parent.resolve()
     files: list[Path] = []
     times: list[float] = []
-    for number, line in enumerate(lines[1:], 2):
-        if not line:
-            continue
-        where = f"{listing}, line {number}"
-        if len(line) != 2:
-            raise InputError(f"{where} has {len(line)} entries; it must have a name and a time in seconds")
-        name = line[0].strip()
+    for line, row in read_table(listing, LISTED, needed=LISTED):
+        where = f"{listing}, line {line}"
+        if len(row) != len(LISTED):
+            raise InputError(f"{where} has {len(row)} entries; it must have a name and a time in seconds")
+        name = row["name"]
         if not name.isprintable():
             raise InputError(f"{where}: the name is {name!r}; it must be printable")
         file = (folder / name).resolve()
         if not file.is_relative_to(folder):
             raise InputError(f"{where}: {name!r} leads out of the list's folder; put the pictures beside the list")
         files.append(existing_file(file))
-        times.append(_time(line[1], times, where))
+        times.append(_time(row["time_s"], times, where))
     if len(files) < 2:
         raise InputError(f"{listing} lists {len(files)} pictures; a film needs 2 or more")
     return files, np.array(times)
@@ -240,5 +231,5 @@ def _time(text: str, before: list[float], where: str) -> float:
     except ValueError as error:
         raise InputError(f"{where}: the time is {text!r}; it must be a number of seconds") from error
     if not np.isfinite(time) or (before and time <= before[-1]):
-        raise InputError(f"{where}: the time is {text.strip()} s; it must be finite and after the one before")
+        raise InputError(f"{where}: the time is {text} s; it must be finite and after the one before")
     return time

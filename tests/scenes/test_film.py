@@ -290,7 +290,7 @@ def test_a_folder_is_in_the_order_of_its_numbers(tmp_path: Path) -> None:
 
 def test_a_list_gives_every_picture_its_time(tmp_path: Path) -> None:
     folder = numbered(tmp_path / "clip", ["a.png", "b.png", "c.png"])
-    (folder / "times.csv").write_text("name,time_s\nb.png,1.0\na.png,1.1\nc.png,1.5\n")
+    (folder / "times.csv").write_text("time_s, name\n1.0, b.png\n1.1,a.png\n1.5,c.png\n")
     scene = quiet(folder / "times.csv", **FULL)
     seen = [scene.truth(f).radiance.mean() for f in (0, 4000, 20_000)]
     np.testing.assert_allclose(seen, curve("srgb")(np.float32([101 / 255, 100 / 255, 102 / 255])), rtol=1e-3)
@@ -299,8 +299,9 @@ def test_a_list_gives_every_picture_its_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a.png,0\nb.png,1\n", "first line must be name,time_s"),
-        ("", "begins with nothing"),
+        ("a.png,0\nb.png,1\n", r"unknown column of .*times\.csv 'a\.png'.*name, time_s"),
+        ("", "first line must name the columns: name,time_s"),
+        ("name\na.png\n", "no column 'time_s'"),
         ("name,time_s\na.png,0\nb.png,0\n", "line 3: the time is 0 s; it must be finite and after"),
         ("name,time_s\na.png,0\nb.png,nan\n", "line 3: the time is nan s"),
         ("name,time_s\na.png,0\nb.png,soon\n", "line 3: the time is 'soon'"),
@@ -310,7 +311,7 @@ def test_a_list_gives_every_picture_its_time(tmp_path: Path) -> None:
         ("name,time_s\na.png,0\nmissing.png,1\n", "there is no file"),
         ("name,time_s\na.png,0\n", "lists 1 pictures"),
         ('name,time_s\n"a.png,0\n', "entries"),
-        ("name,time_s\na.png,0\n" + "b" * 200_000 + ".png,1\n", "not a CSV file: field larger"),
+        ("name,time_s\na.png,0\n" + "b" * 200_000 + ".png,1\n", "line 3 is no line of a table: field larger"),
         ("name,time_s\na.png,0\n" + "b" * 5000 + ".png,1\n", "cannot read"),
         ("name,time_s\na.png,0\nb\x00.png,1\n", "line 3: the name is|line contains NUL"),
     ],
