@@ -43,7 +43,7 @@ class Part:
         """By a positive factor, or one for each axis."""
         factors = np.broadcast_to(np.asarray(factor, np.float64), 3)
         normals = self.normals / factors
-        return replace(self, vertices=self.vertices * factors, normals=unit(normals))
+        return replace(self, vertices=self.vertices * factors, normals=unit_vectors(normals))
 
 
 def assemble(*parts: Part) -> Surface:
@@ -120,6 +120,6 @@ _MARGIN = 8
 """Texels around a tile of an atlas, so that coarse readings do not see the next one."""
 
 
-def unit(vectors: Points) -> Points:
+def unit_vectors(vectors: Points) -> Points:
     """Vectors (..., 3) of length 1; zero stays zero."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

@@ -11,6 +11,12 @@ from scenes.trajectories import AT_REST, Pose, Trajectory, Vector
 from spikecam_env.errors import InputError
 
 
+def intrinsic(focal: float, centre: ArrayLike) -> NDArray[np.float64]:
+    """(3, 3): directions (right, down, 1) to places (x, y, 1) of a picture [pixels]."""
+    x, y = np.asarray(centre, np.float64)
+    return np.array([[focal, 0, x], [0, focal, y], [0, 0, 1]])
+
+
 @dataclass(frozen=True)
 class Camera:
     """A pinhole at `position` that looks at `target`.

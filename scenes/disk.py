@@ -26,7 +26,14 @@ from scipy.ndimage import gaussian_filter
 from scenes.keys import interval_for, painted
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
-from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_memory, checked_number, checked_seed, checked_shape
+from spikecam_env.checked import (
+    LARGEST_DERIVED_SEED,
+    MOST_RPM,
+    checked_memory,
+    checked_number,
+    checked_seed,
+    checked_shape,
+)
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
@@ -35,8 +42,6 @@ TEXELS_PER_PIXEL = 5
 """Of the prefiltered texture.  At a key the default disk is 0.75 % rms of full scale off 16 x 16 supersampling at 5,
 0.86 % at 3, 0.72 % at 8; the rest is the pixel's square, which turns over the texture and is taken as round."""
 
-MOST_RPM = 1e9
-"""Turns a minute: 1000 times the fastest motors."""
 MOST_RADIUS = 6000.0
 """[pixels] Texels are counted in 32 bits, TEXELS_PER_PIXEL^2 of them to a pixel of the disk's square."""
 

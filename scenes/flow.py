@@ -25,7 +25,7 @@ NEAR = 5
 FINER = 2
 """Pictures a pixel, along either side.  A pixel's area lets next to nothing through that these do not hold."""
 
-SHADE = 8.0
+SHADE_BLUR = 8.0
 """Pixels, standard deviation: wide beside what a texture shows, narrow beside how shade falls on a body."""
 
 Places = NDArray[np.floating]
@@ -34,8 +34,8 @@ Places = NDArray[np.floating]
 @dataclass(frozen=True)
 class FlowCheck:
     """error: rms of what came along the flow against what is there, share of full scale (the brightest light).
-    shade_aside: the same once what turned in the light is given its new shade, taken as smooth over `SHADE` within an
-    object.  from_pixels: had the light been interpolated from one later picture.  unmoved: had nothing been moved.
+    shade_aside: the same once what turned in the light is given its new shade, taken as smooth over `SHADE_BLUR` within
+    an object.  from_pixels: had the light been interpolated from one later picture.  unmoved: had nothing been moved.
     compared: share of the picture that was: the rest left the picture, was covered, or lies beside an object's edge.
     """
 
@@ -95,7 +95,7 @@ def _shade(
     ratio = np.ones_like(before)
     for number in np.unique(owner[compared]):
         mine = (compared & (owner == number)).astype(np.float32)
-        then, now = (cv2.GaussianBlur(mine * light, (0, 0), SHADE) for light in (after, before))
+        then, now = (cv2.GaussianBlur(mine * light, (0, 0), SHADE_BLUR) for light in (after, before))
         ratio = np.where((mine > 0) & (now > 0), then / np.maximum(now, 1e-9), ratio)
     return ratio
 

@@ -12,7 +12,7 @@ from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory, checked_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
-from spikecam_env.sensor.kernels.threads import as_many, together
+from spikecam_env.threads import as_many, together
 
 LONGEST_INTERVAL = 64
 """Frames between two keys, at most."""

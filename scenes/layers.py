@@ -26,6 +26,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.camera import intrinsic
 from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
 from spikecam_env.compiled import njit
 
@@ -93,7 +94,7 @@ def render_key(
     texels = np.stack([columns, rows], -1).astype(np.float64)
     brightest = max(float(light.max()), 1e-30)
     tints = _tints(light / brightest, cover)
-    lens = _lens(dense.focal, (dense.centre[0] - left, dense.centre[1] - top))
+    lens = intrinsic(dense.focal, (dense.centre[0] - left, dense.centre[1] - top))
     return Key(tints, brightest * gain, _filled(sprite), points, texels, lens)
 
 
@@ -107,10 +108,6 @@ def _tints(light: Array, cover: Array) -> NDArray[np.uint32]:
     """Both in 0..1, in 16 bits each."""
     lower, upper = (np.minimum(share * 65535 + 0.5, 65535).astype(np.uint32) for share in (light, cover))
     return np.bitwise_or(lower, upper << np.uint32(16))
-
-
-def _lens(focal: float, centre: tuple[float, float]) -> Floats:
-    return np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])
 
 
 def _filled(sprite: Sprite) -> Array:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.assembly import Albedo, Part, Points, assemble, joined, unit
+from scenes.assembly import Albedo, Part, Points, assemble, joined, unit_vectors
 from scenes.mesh_files import from_file, from_mesh, picture
 from scenes.transfer import linear_from_srgb as linear
 from spikecam_env.errors import InputError
@@ -70,7 +70,7 @@ def sheet(points: Callable[[Points, Points], Sequence[Points]], shape: tuple[int
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
     faces = faces[area > 1e-9 * area.max()]
     uv = np.stack([u, v], -1).reshape(-1, 2)
-    return Part(vertices, unit(normals.reshape(-1, 3)), uv, faces, albedo)
+    return Part(vertices, unit_vectors(normals.reshape(-1, 3)), uv, faces, albedo)
 
 
 def lathe(

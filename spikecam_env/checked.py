@@ -23,6 +23,8 @@ LARGEST_DERIVED_SEED = 2**128 - 1
 """Largest seed of a sensor, which may be made from a user's by arithmetic."""
 LARGEST_COUNT = 2**53
 """Whole numbers beyond are not exact as float64, in which JSON tools hold them."""
+MOST_RPM = 1e9
+"""Fastest disk [turns a minute]: 1000 times the fastest motors."""
 
 
 def checked_shape(shape: Any, name: str = "shape") -> tuple[int, int]:

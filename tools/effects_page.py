@@ -10,10 +10,10 @@ import sys
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
+from spikecam_env.sensor.effect_sheet import Sheet
 from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
 from spikecam_env.sensor.model import SensorModel
 from spikecam_env.sensor.ranges import range_text
-from spikecam_env.sensor.sheet import Sheet
 from spikecam_env.sensor.unit import LEAST_SHARE, MOST_KAPPA, MOST_SPREAD, SWING_V, Circuit
 from spikecam_env.whole import write_text_whole
 

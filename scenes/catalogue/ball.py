@@ -15,7 +15,7 @@ from scenes.world import Body, World
 
 def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Renderer | None = None) -> Scene:
     rng = np.random.default_rng(seed)
-    football = Ballistic((-1.1, 0.0, 0.2), (55, 28, 0), stage.GRAVITY)
+    football = Ballistic((-1.1, 0.0, 0.2), (55, 28, 0), stage.GRAVITY_CM)
     small = Ballistic((1.3, -0.66, 0.9), (-42, 0, 0))
     return World(
         shape,

@@ -12,8 +12,8 @@ from scenes.textures import Texture, fractal_noise
 from scenes.trajectories import AT_REST, Still, Trajectory
 from scenes.world import Body
 
-GRAVITY = (0.0, -981.0, 0.0)
-"""A unit is a centimetre."""
+GRAVITY_CM = (0.0, -981.0, 0.0)
+"""[cm/s^2] A unit is a centimetre."""
 
 UNITS_SEEN = 2.0
 """Height of what the camera sees at the origin; 3.2 across at 250 x 400."""

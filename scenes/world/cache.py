@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scenes.layers import Key
 from scenes.renderers.protocol import Sprite
 from scenes.world.extent import Probe, probe_of
-from scenes.world.plan import Plan
+from scenes.world.plan import BlockPlan
 from scenes.world.spec import WorldSpec
 
 PLANS = 64
@@ -69,7 +69,7 @@ class WorldCache:
     base        1 picture of all that stands still behind the bodies
     """
 
-    plans: Recent[Plan]
+    plans: Recent[BlockPlan]
     probes: Recent[Probe]
     keys: Recent[Key]
     backdrops: Recent[Sprite]

@@ -4,11 +4,9 @@ each other from the back to the front."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
-from os import getpid
 
 import numba
 import numpy as np
@@ -18,10 +16,11 @@ from scenes.layers import Carried, Key, carry, lay, render_key
 from scenes.protocol import Gaze
 from scenes.world.cache import WorldCache
 from scenes.world.extent import extent, window_around
-from scenes.world.plan import BLOCK, Plan
+from scenes.world.plan import BLOCK, BlockPlan
 from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets
 from scenes.world.sprites import TRUTH_RAYS, body_sprite, lay_over
+from spikecam_env.threads import pool
 
 PIECE = 64
 """Frames that are painted together; while threads paint some, the next bodies are rendered."""
@@ -44,7 +43,7 @@ def pieces_of(frames: Floats) -> Iterator[tuple[int, slice]]:
 
 
 def paint(
-    spec: WorldSpec, cache: WorldCache, plan: Plan, frames: Floats, gaze: Gaze | None, pictures: Array
+    spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frames: Floats, gaze: Gaze | None, pictures: Array
 ) -> list[Future[None]]:
     """Start to paint pictures (n, H, W) at frames (n,) of the block that is planned; they are done when the futures
     are."""
@@ -57,8 +56,7 @@ def paint(
     base = _still_base(spec, cache, float(frames[0]))[None] if still else _skies(spec, cache, frames, gaze)
     count = min(numba.get_num_threads(), len(frames))
     cuts = np.linspace(0, len(frames), count + 1).astype(int)
-    pool = _pool(getpid())
-    return [pool.submit(_compose, pictures, base, layers, int(a), int(b)) for a, b in pairwise(cuts)]
+    return [pool().submit(_compose, pictures, base, layers, int(a), int(b)) for a, b in pairwise(cuts)]
 
 
 # -- what lies behind all layers -------------------------------------------------------------------------------
@@ -100,7 +98,7 @@ class _Part:
 
 @dataclass(frozen=True, eq=False)
 class _Layer:
-    """A body's keys carried to the pictures; boxes (n, 4): where it may be seen.  The rest: see `Plan`."""
+    """A body's keys carried to the pictures; boxes (n, 4): where it may be seen.  The rest: see `BlockPlan`."""
 
     parts: list[_Part]
     boxes: NDArray[np.int64]
@@ -109,7 +107,7 @@ class _Layer:
     marked: bool
 
 
-def _layer(spec: WorldSpec, cache: WorldCache, plan: Plan, body: int, frames: Floats, gaze: Gaze | None) -> _Layer:
+def _layer(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, body: int, frames: Floats, gaze: Gaze | None) -> _Layer:
     """A body's keys around the frames, carried to each of them."""
     step = plan.steps[body]
     before = np.floor(frames / step).astype(int)
@@ -181,9 +179,3 @@ def _compose(pictures: Array, base: Array, layers: list[_Layer], start: int, sto
                 layer.tested,
                 layer.marked,
             )
-
-
-@lru_cache(maxsize=1)
-def _pool(process: int) -> ThreadPoolExecutor:
-    """Threads do not survive a fork, hence one pool a process; it starts them as they are needed."""
-    return ThreadPoolExecutor(max_workers=64, thread_name_prefix="scenes-world")

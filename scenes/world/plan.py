@@ -47,7 +47,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Plan:
+class BlockPlan:
     """What follows from the motion in a block.
 
     steps    frames between the keys of each body
@@ -98,7 +98,7 @@ def key_frames(light_steps: Mapping[int, int], start: int, stop: int, with_ends:
 class _Motion:
     """A body in a block.
 
-    step, solid   see `Plan`
+    step, solid   see `BlockPlan`
     depths        nearest and farthest that it comes to the camera's plane
     box           of pixels, all that it is seen in: top, left, bottom, right
     speed         fastest in the picture [pixels/frame]
@@ -113,8 +113,8 @@ class _Motion:
     rests: bool
 
 
-def plan_block(spec: WorldSpec, probes: Sequence[Probe], block: int) -> Plan:
-    """Plan frames block * BLOCK .. (block + 1) * BLOCK; probes: one a body."""
+def plan_block(spec: WorldSpec, probes: Sequence[Probe], block: int) -> BlockPlan:
+    """BlockPlan frames block * BLOCK .. (block + 1) * BLOCK; probes: one a body."""
     frames: Floats = block * BLOCK + np.linspace(0.0, BLOCK, NODES + 1, dtype=np.float64)
     sky_speed = _sky_speed(spec, frames)
     motions = [_motion(spec, body, probe, frames) for body, probe in enumerate(probes)]
@@ -126,7 +126,7 @@ def plan_block(spec: WorldSpec, probes: Sequence[Probe], block: int) -> Plan:
         for back in bodies[:place]
         if _may_cross(motions[back], motions[front])
     ]
-    return Plan(
+    return BlockPlan(
         steps=tuple(motion.step for motion in motions),
         solid=frozenset(body for body, motion in enumerate(motions) if motion.solid),
         speed=max([sky_speed, *(motion.speed for motion in motions)]),

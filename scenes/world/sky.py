@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.camera import intrinsic
 from scenes.world.cache import WorldCache
 from scenes.world.spec import WorldSpec
 
@@ -20,8 +21,8 @@ def sky(spec: WorldSpec, cache: WorldCache, frame: float, offset: Floats) -> Arr
     tile = cache.tile.get("", lambda: _tile(spec))
     rest, now = spec.camera.rest()[:3, :3], spec.pinhole(frame).pose[:3, :3]
     flip = np.diag([1.0, -1.0, -1.0])
-    to_ray = np.linalg.inv(_intrinsic(spec.focal, np.asarray(spec.centre) - offset))
-    to_tile = _intrinsic(spec.focal, np.asarray(spec.centre))
+    to_ray = np.linalg.inv(intrinsic(spec.focal, np.asarray(spec.centre) - offset))
+    to_tile = intrinsic(spec.focal, np.asarray(spec.centre))
     seen = to_tile @ flip @ rest.T @ now @ flip @ to_ray
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(
@@ -34,7 +35,3 @@ def _tile(spec: WorldSpec) -> Array:
     picture = np.asarray(spec.background, np.float32) * np.float32(spec.light)
     columns = max(1, round(picture.shape[1] * spec.shape[0] / picture.shape[0]))
     return np.asarray(cv2.resize(picture, (columns, spec.shape[0]), interpolation=cv2.INTER_AREA), np.float32)
-
-
-def _intrinsic(focal: float, centre: Floats) -> Floats:
-    return np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from scenes.protocol import Gaze, Truth
 from scenes.trajectories import Still
 from scenes.world.cache import WorldCache
-from scenes.world.plan import Plan
+from scenes.world.plan import BlockPlan
 from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets
 from scenes.world.sprites import TRUTH_RAYS, body_sprite, lay_over, place_of
@@ -31,7 +31,7 @@ class Seen:
     owner: NDArray[np.int32]
 
 
-def truth_at(spec: WorldSpec, cache: WorldCache, plan: Plan, frame: float, gaze: Gaze | None) -> Truth:
+def truth_at(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, gaze: Gaze | None) -> Truth:
     """See `scenes.world.World.truth`; plan: of the frame's block."""
     seen = seen_at(spec, cache, plan, frame, gaze, TRUTH_RAYS)
     ahead, behind = (_displaced(spec, seen, frame, by, gaze) for by in (0.5, -0.5))
@@ -41,7 +41,7 @@ def truth_at(spec: WorldSpec, cache: WorldCache, plan: Plan, frame: float, gaze:
     return Truth(seen.radiance, flow, seen.owner, seen.depth, poses | {"camera": camera})
 
 
-def seen_at(spec: WorldSpec, cache: WorldCache, plan: Plan, frame: float, gaze: Gaze | None, rays: int) -> Seen:
+def seen_at(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, gaze: Gaze | None, rays: int) -> Seen:
     """What the camera sees at a frame, by rays x rays a pixel; plan: of the frame's block."""
     picture = sky(spec, cache, frame, gaze_offsets(gaze, np.array([frame]))[0])
     depth = np.full(spec.shape, np.inf, np.float32)

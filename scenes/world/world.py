@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scenes.protocol import Gaze, Truth
 from scenes.world.cache import WorldCache
 from scenes.world.paint import paint, pieces_of
-from scenes.world.plan import BLOCK, Plan, blocks_of, key_frames, plan_block
+from scenes.world.plan import BLOCK, BlockPlan, blocks_of, key_frames, plan_block
 from scenes.world.spec import WorldSpec
 from scenes.world.sprites import TRUTH_RAYS
 from scenes.world.truth import places_at, seen_at, truth_at
@@ -97,10 +97,10 @@ class World(WorldSpec):
         """The same world with `gain` times its light."""
         return dataclasses.replace(self, light=self.light * gain)
 
-    def plan(self, block: int) -> Plan:
+    def plan(self, block: int) -> BlockPlan:
         """What follows from the motion in frames block * BLOCK .. (block + 1) * BLOCK."""
 
-        def made() -> Plan:
+        def made() -> BlockPlan:
             return plan_block(self, [self.cache.probe(self, body) for body in range(len(self.bodies))], block)
 
         return self.cache.plans.get(block, made)

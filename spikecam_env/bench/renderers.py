@@ -22,8 +22,8 @@ from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surfa
 from scenes.textures import TEXTURES
 from spikecam_env.bench.machine import SHAPE
 
-TRUTH_RAYS = 16
-"""Rays a pixel and axis of the picture that the back-ends are held against."""
+EXACT_RAYS = 16
+"""A pixel and axis, of the picture that back-ends, and light in space, are compared with."""
 
 Objects = list[tuple[Surface, NDArray[np.float64]]]
 
@@ -35,7 +35,7 @@ class Comparison:
     backend    as `choose_renderer` takes it
     name       as the back-end calls itself; what is wrong where it does not work
     key_ms     all objects of the picture once, best of the repeats [ms]; nan where it does not work
-    error      rms of radiance against `TRUTH_RAYS`^2 rays a pixel where there is an object, share of full scale
+    error      rms of radiance against `EXACT_RAYS`^2 rays a pixel where there is an object, share of full scale
     to_embree  rms of radiance against embree at the same supersampling, likewise
     """
 
@@ -48,7 +48,7 @@ class Comparison:
 
 def compare_backends(shape: tuple[int, int] = SHAPE, supersample: int = 2, repeats: int = 20) -> list[Comparison]:
     """One row for each of `BACKENDS`, each measured in a process of its own, one after the other."""
-    truth = [sprite.radiance for sprite in _key(Embree(), shape, TRUTH_RAYS)]
+    truth = [sprite.radiance for sprite in _key(Embree(), shape, EXACT_RAYS)]
     embree = [sprite.radiance for sprite in _key(Embree(), shape, supersample)]
     rows = []
     for backend in BACKENDS:

@@ -23,7 +23,7 @@ from scenes.sliding import SlidingTexture
 from scenes.world import World
 from spikecam_env.bench.exact_disk import supersampled
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
-from spikecam_env.bench.renderers import bench_renderers
+from spikecam_env.bench.renderers import EXACT_RAYS, bench_renderers
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SpikeSensor
 
@@ -32,9 +32,6 @@ BLOCK = 64
 
 SPACE = "tumble"
 """The scene that is timed in space: six objects of 17 000 triangles, one a disk at 2000 rpm, one before the other."""
-
-EXACT_RAYS = 16
-"""A pixel and side, of the truth that light in space is compared with."""
 
 Rows = list[dict[str, Any]]
 Array = NDArray[np.floating]

@@ -29,11 +29,11 @@ REAL_TIME = SHAPE[0] * SHAPE[1] * FRAME_RATE_HZ
 
 BLOCK = 64
 SMOOTH = "smooth, moving"
-SCENES: tuple[float | str, ...] = (5.0, 20.0, 100.0, SMOOTH)
+LIGHTS: tuple[float | str, ...] = (5.0, 20.0, 100.0, SMOOTH)
 
 
 def bench_sensor(
-    scenes: Iterable[float | str] = SCENES, threads: Iterable[int] = (1, 2), seconds: float = 0.6, seed: int = 0
+    scenes: Iterable[float | str] = LIGHTS, threads: Iterable[int] = (1, 2), seconds: float = 0.6, seed: int = 0
 ) -> list[dict[str, Any]]:
     """Measure every engine; returns one row a measurement, numpy with exact Poisson first in each scene.
 

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Charge:
+class ChargeScale:
     """electrons: N a nominal threshold.  reset_noise_mV: sigma of a reset.  prior: which of them was assumed.
 
     sd: standard errors, 0 for what is prior.  electrons is inf where the noise is below the reset noise assumed.
@@ -34,17 +34,19 @@ class Charge:
     prior: str | None
 
 
-def charge_at_one_v_d(jitter: Jitter | None, swing_V: float, reset_noise_mV: float) -> Charge | None:
+def charge_at_one_v_d(jitter: Jitter | None, swing_V: float, reset_noise_mV: float) -> ChargeScale | None:
     """N given the reset noise; None without spike times."""
     if jitter is None:
         return None
     inverse = jitter.white - (1e-3 * reset_noise_mV / swing_V) ** 2
     if inverse <= 0:
-        return Charge(np.inf, np.inf, reset_noise_mV, 0.0, "reset_noise_mV")
-    return Charge(1 / inverse, jitter.white_sd / inverse**2, reset_noise_mV, 0.0, "reset_noise_mV")
+        return ChargeScale(np.inf, np.inf, reset_noise_mV, 0.0, "reset_noise_mV")
+    return ChargeScale(1 / inverse, jitter.white_sd / inverse**2, reset_noise_mV, 0.0, "reset_noise_mV")
 
 
-def charge_at_two_v_d(one: Jitter | None, other: Jitter | None, swing_V: Array, other_swing_V: Array) -> Charge | None:
+def charge_at_two_v_d(
+    one: Jitter | None, other: Jitter | None, swing_V: Array, other_swing_V: Array
+) -> ChargeScale | None:
     """N of the mean threshold and the reset noise, given each pixel's swing (P,) at both settings [V], NaN if unknown.
 
     Both are scaled pixel by pixel, with the weights that the jitter was pooled with: at 0.6 V a spread of V_S of 50 mV
@@ -61,7 +63,7 @@ def charge_at_two_v_d(one: Jitter | None, other: Jitter | None, swing_V: Array, 
         return None
     kappa = float(np.sqrt(max(kappa2, 0.0)))
     sd_kappa = float(sd_kappa2 / (2 * kappa) if kappa2 > sd_kappa2 else np.sqrt(sd_kappa2))
-    return Charge(
+    return ChargeScale(
         float(1 / per_electron),
         float(sd_electron / per_electron**2),
         1e3 * kappa * typical,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.calibration.campaign import Campaign, CampaignRecording, read_campaign
-from spikecam_env.calibration.charge import Charge, charge_at_one_v_d, charge_at_two_v_d
+from spikecam_env.calibration.charge import ChargeScale, charge_at_one_v_d, charge_at_two_v_d
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
 from spikecam_env.calibration.population import FLAGS, pixel_flags
 from spikecam_env.calibration.response import Lines, Rates, fit_lines, rates_from_counts, rates_from_times, together
@@ -86,7 +86,7 @@ class Calibration:
     frame_rate_hz: float
     settings: tuple[Setting, ...]
     flags: NDArray[np.uint8]
-    charge: Charge | None
+    charge: ChargeScale | None
     swing_V: Array | None
     swing_sd_V: Array | None
     circuit: Circuit

@@ -13,7 +13,7 @@ from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
 from spikecam_env.cli.reading import Reading
 
 if TYPE_CHECKING:
-    from spikecam_env.calibration import Campaign as Folder
+    from spikecam_env.calibration import Campaign
 
 Repeated = tyro.conf.UseAppendAction[tuple[str, ...]]
 
@@ -118,7 +118,7 @@ class Import:
 
 
 @dataclass
-class Campaign:
+class Campaigns:
     """Measured-data campaigns (format spikecam-campaign/1): simulate one, or import a real camera's recordings.
 
     example:  spikecam campaign simulate late --effect dead_time:tau_us=0.2
@@ -133,7 +133,7 @@ class Campaign:
         self.action.run()
 
 
-def report(campaign: Folder) -> None:
+def report(campaign: Campaign) -> None:
     """Print what is in a campaign."""
     from spikecam_env.cli.table import table
 

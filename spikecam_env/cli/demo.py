@@ -35,7 +35,7 @@ class Demo:
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder, write_json
-        from spikecam_env.cli.film import write_film, write_picture
+        from spikecam_env.cli.panels import write_film, write_picture
         from spikecam_env.cli.showcase import comparison, film_frames, stream
         from spikecam_env.cli.table import table
 

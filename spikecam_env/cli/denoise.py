@@ -38,7 +38,7 @@ class Denoise:
 
         from denoiser.niqe import niqe
         from spikecam_env.cli.files import out_folder, write_json
-        from spikecam_env.cli.film import Panel, compose, display, write_film, write_picture
+        from spikecam_env.cli.panels import Panel, compose, display, write_film, write_picture
         from spikecam_env.cli.restore import picture_frames, restore
         from spikecam_env.cli.table import table
         from spikecam_env.errors import InputError

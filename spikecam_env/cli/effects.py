@@ -25,7 +25,7 @@ class Effects:
         from spikecam_env.cli.table import table
         from spikecam_env.errors import unknown_name
         from spikecam_env.sensor import CATALOGUE
-        from spikecam_env.sensor.sheet import Sheet
+        from spikecam_env.sensor.effect_sheet import Sheet
 
         if not self.name:
             print(table([_line(effect) for effect in CATALOGUE.values()]))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Film:
+class FilmToSpikes:
     """Record a film of yours: a video, a folder of pictures, or a list of pictures with the time of each.
 
     Light is linear, averaged over area to the sensor's size, and scaled to the mean interval.  The recording lasts as

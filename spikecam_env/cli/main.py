@@ -9,7 +9,7 @@ import tyro
 from spikecam_env.cli.bench import Bench
 from spikecam_env.cli.blind_trial import BlindTrial
 from spikecam_env.cli.calibrate import Calibrate
-from spikecam_env.cli.campaign import Campaign
+from spikecam_env.cli.campaign import Campaigns
 from spikecam_env.cli.dataset import Dataset
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
@@ -17,7 +17,7 @@ from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.entry import say
 from spikecam_env.cli.evaluate import Evaluate
-from spikecam_env.cli.film_to_spikes import Film
+from spikecam_env.cli.film_to_spikes import FilmToSpikes
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.options import check_options
 from spikecam_env.cli.record import Record
@@ -40,14 +40,14 @@ examples:
 COMMANDS: dict[str, Any] = {
     "demo": Demo,
     "record": Record,
-    "film": Film,
+    "film": FilmToSpikes,
     "scenes": Scenes,
     "dataset": Dataset,
     "denoise": Denoise,
     "train": Train,
     "evaluate": Evaluate,
     "calibrate": Calibrate,
-    "campaign": Campaign,
+    "campaign": Campaigns,
     "diagnose": Diagnose,
     "ladder": Ladder,
     "blind-trial": BlindTrial,

@@ -14,6 +14,7 @@ from dataclasses import fields, is_dataclass
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from spikecam_env.checked import (
+    MOST_RPM,
     checked_above_zero,
     checked_count,
     checked_number,
@@ -24,8 +25,6 @@ from spikecam_env.checked import (
 
 MOST_WORKERS = 1024
 """Threads or processes of a command; the largest machines have some hundreds of cores."""
-MOST_RPM = 1e9
-"""Fastest disk: 1000 times the fastest motors."""
 
 
 class Checked:

@@ -32,8 +32,8 @@ class Record:
     """Seed of the camera unit, its noise and the scene."""
 
     def run(self) -> None:
+        from spikecam_env.cli.named_scene import scene_named
         from spikecam_env.cli.recording import check_out, record_scene
-        from spikecam_env.cli.scene import scene_named
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
 

@@ -59,7 +59,7 @@ class Scenes:
                 print(f"{name:10} {about(name)}")
 
     def _write_film(self, path: Path) -> None:
-        from spikecam_env.cli.film import write_film, write_gif
+        from spikecam_env.cli.panels import write_film, write_gif
 
         if path.suffix.lower() not in (".mp4", ".gif"):
             raise InputError(f"--film {path}: unknown file type {path.suffix!r}; use .mp4 or .gif")
@@ -79,7 +79,7 @@ class Scenes:
         """The light that the sensor gets at these frames, white the brightest hundredth of the first picture's."""
         import numpy as np
 
-        from spikecam_env.cli.film import display
+        from spikecam_env.cli.panels import display
 
         scene, white = self._scene(self.name), None
         for frame in at:
@@ -92,7 +92,7 @@ class Scenes:
         from tqdm import tqdm
 
         from scenes.catalogue import SCENES
-        from spikecam_env.cli.film import Panel, sheet, write_picture
+        from spikecam_env.cli.panels import Panel, sheet, write_picture
         from spikecam_env.whole import check_file
 
         if path.suffix.lower() != ".png":

@@ -15,7 +15,7 @@ from denoiser import OnlineDnSS
 from denoiser.metrics import psnr_db
 from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory
-from spikecam_env.cli.film import Panel, compose
+from spikecam_env.cli.panels import Panel, compose
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import middleTFI, middleTFP

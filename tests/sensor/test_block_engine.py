@@ -16,12 +16,12 @@ from laws import jittered, with_effects
 
 from benchmarks.agreement import compare, observe
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, decay
+from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, decay, random_fields
 from spikecam_env.sensor.effects.base import Array, Charge, Exposure, Spikes, parameter
 from spikecam_env.sensor.kernels import block, block_loop, draws, loop
-from spikecam_env.sensor.kernels.field import octave_field, white_field, words
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
+from spikecam_env.sensor.random_fields import octave_field, white_field, words
 
 SHAPE = (30, 400)
 FRAME_EFFECTS = sorted(name for name, effect in CATALOGUE.items() if not effect.is_fixed())
@@ -70,7 +70,7 @@ def started(model: SensorModel, engine: str, phase: Array) -> SpikeSensor:
     "name", ["dead_time", "crosstalk", "ir_drop", "row_temporal_noise", "random_telegraph_noise", "readout_skew"]
 )
 def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spikecam_env.sensor.kernels.fast._WORTH_A_THREAD", 1)
+    monkeypatch.setattr("spikecam_env.threads.PIXEL_STEPS_A_THREAD", 1)
     monkeypatch.setattr(block, "_FEWEST", 1)
     model = with_effects("scsim", CATALOGUE[name]())
     unit = model.draw_unit((33, 50), 0)
@@ -96,7 +96,7 @@ def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.
 def test_rows_wider_than_a_band_and_bands_of_rows_have_the_bits_of_the_reference(
     name: str, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("spikecam_env.sensor.kernels.fast._WORTH_A_THREAD", 1)
+    monkeypatch.setattr("spikecam_env.threads.PIXEL_STEPS_A_THREAD", 1)
     model = with_effects("ideal", CATALOGUE[name](**MODERATE.get(name, {})))
     light = np.random.default_rng(0).uniform(0.0, 2.5, shape).astype(np.float32)
     expected = SpikeSensor(model, shape, 1, "reference").step(light, 60)
@@ -275,7 +275,5 @@ def test_kernels_name_the_draws_that_they_are_compiled_with() -> None:
     of_draws = (loop.scramble, loop.first_key, loop.second_key, loop.byte_sum, loop.bell, loop.bell_of, draws.standard)
     source = "".join(inspect.getsource(function.py_func) for function in of_draws)
     now = zlib.crc32(source.encode())
-    from spikecam_env.sensor.kernels import field
-
-    for kernel in (block_loop, field):
+    for kernel in (block_loop, random_fields):
         assert now == kernel.DRAWS, f"the draws have changed: write DRAWS = {now:#x} in {kernel.__file__}"

@@ -14,7 +14,7 @@ import pytest
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Circuit, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.kernels import block, fast
-from spikecam_env.sensor.kernels.threads import together
+from spikecam_env.threads import together
 
 ENGINES = ("reference", "fast")
 SHAPE = (9, 13)

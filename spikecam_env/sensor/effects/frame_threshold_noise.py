@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
-from spikecam_env.sensor.kernels.field import Words, white_field, words
+from spikecam_env.sensor.random_fields import Words, white_field, words
 
 
 @dataclass(frozen=True)

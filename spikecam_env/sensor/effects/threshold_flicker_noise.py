@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
-from spikecam_env.sensor.kernels.field import Words, octave_field, words
+from spikecam_env.sensor.random_fields import Words, octave_field, words
 
 
 class Octaves(NamedTuple):

@@ -24,9 +24,9 @@ from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, Few, having
 from spikecam_env.sensor.kernels import block_loop, fast, loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
-from spikecam_env.sensor.kernels.threads import together
 from spikecam_env.sensor.light import GRAINS, Ramp, Segment
 from spikecam_env.sensor.unit import Unit
+from spikecam_env.threads import as_many_as_pay, together
 
 _BLOCK = 1 << 22
 """Pixel-steps of a block, at most: what differs from pixel to pixel and frame to frame then takes 32 megabytes."""
@@ -224,7 +224,7 @@ def _block(
         spikes,
     )
     rows = 1 if feedback.kick else now.shape[0]
-    parts = fast._worth(threads, rows, spikes.size)
+    parts = as_many_as_pay(threads, rows, spikes.size)
     cuts = [now.shape[0] * part // parts for part in range(parts + 1)]
     together([partial(block_loop.advance, top, bottom, *work) for top, bottom in pairwise(cuts)])
     if having("read_out", effects):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.kernels.loop import _GOLDEN as GOLDEN
-from spikecam_env.sensor.kernels.loop import bell, first_key, second_key
+from spikecam_env.sensor.kernels.loop import GOLDEN, bell, first_key, second_key
 
 __all__ = ["GOLDEN", "first_key", "second_key", "standard"]
 

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.kernels import loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS, fitted_polynomial
-from spikecam_env.sensor.kernels.threads import as_many, together
 from spikecam_env.sensor.light import GRAINS, Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
+from spikecam_env.threads import as_many_as_pay, together
 
 CARRIES: frozenset[str] = frozenset(name for name, effect in CATALOGUE.items() if effect.is_fixed())
 """Every effect that does nothing from frame to frame: fixed patterns, static optics, noise drawn at a reset."""
@@ -37,9 +37,6 @@ DENSE = 0.7
 FEWEST = MIN_ELECTRONS / 2
 """Electrons to a threshold, at least, of which a spike's noise is drawn.  The law's shape is that of the median pixel:
 with the noise of fewer electrons, in the tail of a spread, it would reach below zero charge."""
-
-_WORTH_A_THREAD = 400_000
-"""Pixel-steps below which handing work to another thread costs more than it saves (0.1 ms)."""
 
 
 def missing(effects: Sequence[Effect]) -> list[str]:
@@ -138,7 +135,7 @@ def _advance(
     state: FastState, segment: Segment, packed: NDArray[np.uint8], spikes: NDArray[np.uint64], threads: int | None
 ) -> None:
     bands = -(-state.remaining.size // loop.WIDTH)
-    threads = _worth(threads, bands, segment.radiance0.size * segment.count)
+    threads = as_many_as_pay(threads, bands, segment.radiance0.size * segment.count)
     tickets = np.zeros((threads, 8), dtype=np.int64)
     tickets[:, 0] = bands * np.arange(threads) // threads
     work = (
@@ -172,11 +169,6 @@ def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None
     if spikes is not out:
         out[:] = spikes[:, :pixels]
     return out
-
-
-def _worth(threads: int | None, most: int, pixel_steps: int) -> int:
-    """How many threads to share work among: as many as asked for (default NUMBA_NUM_THREADS) and as pay."""
-    return as_many(threads, min(most, pixel_steps // _WORTH_A_THREAD))
 
 
 def _shape_of_law(unit: Unit) -> tuple[np.float32, ...]:

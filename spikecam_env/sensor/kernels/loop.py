@@ -50,7 +50,7 @@ _LEAST = _F(1.0)  # grain to the next spike: no draw takes a pixel back in time
 _CAP = _F(MAX_GRAINS_PER_FRAME)
 _LONGEST = _F(MAX_SEGMENT)
 _GOLDEN_SIGNED = _I(0x9E3779B9 - (1 << 32))
-_GOLDEN = _U(0x9E3779B9)  # 2^32 / golden ratio: the counter's step from spike to spike
+GOLDEN = _U(0x9E3779B9)  # 2^32 / golden ratio: the counter's step from spike to spike
 
 # Rows of a tile's scratch array: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
 _LEVEL, _CURVE, _REST, _X, _END, _COUNTER, _KEY, _SPREAD = (r * TILE for r in range(8))
@@ -214,7 +214,7 @@ def wake(s: Any, f: Any, live: Any, groups: Any, p0: Any, number: Any, spread: A
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
             key = first_key(p0 + j, low)
-            s[_COUNTER + j] = _I(_U(key + _U(number[j] * _GOLDEN)))
+            s[_COUNTER + j] = _I(_U(key + _U(number[j] * GOLDEN)))
             s[_KEY + j] = _I(second_key(key, high))
             f[_SPREAD + j] = spread[j]
 

@@ -15,9 +15,9 @@ from laws import camera, population, with_effects
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
+from spikecam_env.sensor.effect_sheet import SECTIONS, Sheet
 from spikecam_env.sensor.effects.base import Charge, Exposure, Few
 from spikecam_env.sensor.kernels import block
-from spikecam_env.sensor.sheet import SECTIONS, Sheet
 from tools import effects_page
 
 SHAPE = (10, 12)

@@ -15,6 +15,9 @@ from functools import lru_cache
 
 from numba import config
 
+PIXEL_STEPS_A_THREAD = 400_000
+"""Of the sensor's kernels, below which handing work to another thread costs more than it saves (0.1 ms)."""
+
 _LIBC = ctypes.PyDLL(None) if sys.platform == "linux" else None
 
 
@@ -22,6 +25,11 @@ def as_many(threads: int | None, most: int) -> int:
     """How many threads to share work among: as many as asked for (default NUMBA_NUM_THREADS), at most `most`."""
     asked = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
     return max(1, min(asked, most))
+
+
+def as_many_as_pay(threads: int | None, most: int, pixel_steps: int) -> int:
+    """The same for so many pixel-steps of the sensor: as many as asked for and as pay."""
+    return as_many(threads, min(most, pixel_steps // PIXEL_STEPS_A_THREAD))
 
 
 def together(parts: list[Callable[[], None]], *, shared: bool = False) -> None:
@@ -32,7 +40,7 @@ def together(parts: list[Callable[[], None]], *, shared: bool = False) -> None:
     others = []
     if len(parts) > 1:
         here = _processor()
-        others = [_pool(os.getpid()).submit(_elsewhere, here, part) for part in parts[1:]]
+        others = [pool().submit(_elsewhere, here, part) for part in parts[1:]]
     parts[0]()
     for other in others:
         if not (shared and other.cancel()):
@@ -54,7 +62,14 @@ def _processor() -> int:
     return _LIBC.sched_getcpu() if _LIBC is not None else -1
 
 
+def pool() -> ThreadPoolExecutor:
+    """This process's threads: they do not survive a fork.  They are started as they are needed.
+
+    A task must not wait for another task of the pool.
+    """
+    return _pool_of(os.getpid())
+
+
 @lru_cache(maxsize=1)
-def _pool(process: int) -> ThreadPoolExecutor:
-    """Threads do not survive a fork, hence one pool a process; it starts them as they are needed."""
+def _pool_of(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(max_workers=64, thread_name_prefix="spikecam")
