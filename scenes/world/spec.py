@@ -81,6 +81,7 @@ class WorldSpec:
 
     @property
     def backdrops(self) -> list[int]:
+        """Numbers of the bodies that are backdrops, in their order."""
         return [number for number, body in enumerate(self.bodies) if body.backdrop]
 
     def pinhole(self, frame: float) -> Pinhole:
