@@ -4,7 +4,7 @@
 that the package's attribute is the function whichever is imported first.
 """
 
-from spikecam_env.calibration import Campaign, CampaignRecording, read_campaign
+from spikecam_env.campaign import Campaign, CampaignRecording, read_campaign
 from spikecam_env.gap.campaign import second_voltage, standard_design, write_campaign
 from spikecam_env.gap.diagnose import diagnose
 from spikecam_env.gap.imports import import_campaign

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from spikecam_env.calibration import Campaign, Take, record_takes
+from spikecam_env.campaign import Campaign, Take, record_takes
 from spikecam_env.checked import checked_count, checked_disk, checked_shape
 from spikecam_env.gap.recordings import Bars, Dark, Disk, Flat, Planned, Step
 from spikecam_env.sensor import SensorModel

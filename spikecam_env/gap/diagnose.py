@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.campaign import Campaign, read_campaign
+from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.audit import Contradiction, audit, upheld

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from spikecam_env.calibration.campaign import CampaignRecording
+from spikecam_env.campaign.reading import CampaignRecording
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.observe import Observation, observe

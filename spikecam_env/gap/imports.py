@@ -23,10 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration import Campaign, flat_maps, read_campaign
-from spikecam_env.calibration.campaign import USES, read_light, read_rates
-from spikecam_env.calibration.campaign_files import finish_campaign, save_light, save_rates, save_spikes
+from spikecam_env.calibration import flat_maps
 from spikecam_env.calibration.flats import even_light
+from spikecam_env.campaign import Campaign, read_campaign
+from spikecam_env.campaign.reading import USES, read_light, read_rates
+from spikecam_env.campaign.writing import finish_campaign, save_light, save_rates, save_spikes
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.gap.labels import READING, RELATIVE, UNKNOWN, Label

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.campaign import Campaign, read_campaign
+from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.gap import plots
 from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.candidates import chosen, testable

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.campaign import Campaign, CampaignRecording
+from spikecam_env.campaign.reading import Campaign, CampaignRecording
 from spikecam_env.gap.observe import Observation, observe
 from spikecam_env.gap.recordings import Planned
 from spikecam_env.sensor import Keyframes

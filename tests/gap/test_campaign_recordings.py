@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from spikecam_env.calibration.takes import shown
+from spikecam_env.campaign.takes import shown
 from spikecam_env.errors import InputError
 from spikecam_env.gap import KINDS, Bars, Disk, Flat, MaskedRows, Step, second_voltage, standard_design
 from spikecam_env.sensor import SpikeSensor

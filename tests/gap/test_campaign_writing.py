@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spikecam_env.calibration import takes as takes_module
+from spikecam_env.campaign import takes as takes_module
 from spikecam_env.errors import InputError
 from spikecam_env.gap import Bars, Dark, Disk, Flat, MaskedRows, Step, read_campaign, write_campaign
 from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.calibration.campaign import Campaign
+from spikecam_env.campaign.reading import Campaign
 from spikecam_env.gap.candidates import candidate, chosen, is_pattern
 from spikecam_env.gap.compare import Null, adjusted, alarmed, deviates, null_of, residual, values_of
 from spikecam_env.gap.maps.bank import Maps, bank, dark_of, of_use, read_maps, unit_levels, unit_maps

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.campaign import USES, Campaign, read_campaign
-from spikecam_env.calibration.campaign_files import campaign_folder, finish_campaign, save_light, save_spikes
+from spikecam_env.campaign.reading import USES, Campaign, read_campaign
+from spikecam_env.campaign.writing import campaign_folder, finish_campaign, save_light, save_spikes
 from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.names import distinct, file_name

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.calibration.campaign import FORMAT, Campaign, read_campaign
+from spikecam_env.campaign.reading import FORMAT, Campaign, read_campaign
 from spikecam_env.errors import InputError, WriteError
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import pack_frames
