@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.campaign import standard_design
+from spikecam_env.gap.campaign.design import standard_design
 from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.fit import with_pattern
 from spikecam_env.gap.parameters import USUAL_NOISE

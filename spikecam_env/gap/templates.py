@@ -22,7 +22,7 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.gap.campaign import standard_design
+from spikecam_env.gap.campaign.design import standard_design
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.case import Case, case_of, twins
 from spikecam_env.gap.compare import Null, values_of

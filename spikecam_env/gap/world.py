@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, CampaignRecording
+from spikecam_env.gap.campaign.recording_kinds import Planned
 from spikecam_env.gap.observe import Observation, observe
-from spikecam_env.gap.recordings import Planned
 from spikecam_env.sensor import Keyframes
 
 KNOWN = ("dark", "flat", "picture")

@@ -12,7 +12,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.gap import Dark, Flat, Label, Step, import_campaign, labels_from_table, write_campaign
 from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
 
-REAL = Path(__file__).parents[2].parent / "shared" / "data" / "real"
+REAL = Path(__file__).parents[3].parent / "shared" / "data" / "real"
 real = pytest.mark.skipif(not REAL.is_dir(), reason=f"the real recordings are not at {REAL}")
 
 SHAPE = (10, 16)
