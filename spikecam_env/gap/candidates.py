@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from spikecam_env.errors import unknown_name
-from spikecam_env.gap.observe import Observation
-from spikecam_env.gap.world import KNOWN, Shown
+from spikecam_env.gap.observe.conditions import KNOWN, Shown
+from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 
 Needs = Callable[[Sequence[Shown]], "str | None"]

@@ -34,6 +34,7 @@ from spikecam_env.gap.label_unit import counted_anew, nominal_per_label, said_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import missing, with_all
 from spikecam_env.gap.null import model_null, unit_under
+from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
 from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.parameters import Off, off_nominal
 from spikecam_env.gap.refit import within
@@ -43,7 +44,6 @@ from spikecam_env.gap.templates import Templates, load
 from spikecam_env.gap.verdict import concluded, grounded, harmless
 from spikecam_env.gap.words import sentence, unfinished
 from spikecam_env.gap.workers import sums_in_one_order
-from spikecam_env.gap.world import KNOWN, Shown, observed, shown
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.observe import BLOCKS
+from spikecam_env.gap.observe.observation import BLOCKS
 from spikecam_env.gap.statistics.spectrum import spectrum, strongest_line
 
 Array = NDArray[np.float64]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.calibration.jitter import fit_jitter
 from spikecam_env.calibration.response import fit_lines, rates_from_times, together
-from spikecam_env.gap.observe import STEPS, Observation
+from spikecam_env.gap.observe.conditions import KNOWN, Shown
+from spikecam_env.gap.observe.observation import STEPS, Observation
 from spikecam_env.gap.traps import less_traps
-from spikecam_env.gap.world import KNOWN, Shown
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.unit import PixelArray, Unit, firing_law
 

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import plausible_rates
-from spikecam_env.gap.observe import Observation
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.twin import simulate
 from spikecam_env.gap.workers import at_once
-from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import Keyframes, SensorModel
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, of_motion
 from spikecam_env.gap.compare import TOLERANCE, Null, misfit, of_a_pair, pooled, scale_of
+from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import bounded, may_be_negative
 from spikecam_env.gap.templates import Template, Templates
-from spikecam_env.gap.world import Shown
 from spikecam_env.sensor import CATALOGUE
 
 Array = NDArray[np.float64]

@@ -163,7 +163,7 @@ def standard_case(
     jobs: int = 1, seed: int = SEED, count: int = 12, preset: str = MODEL
 ) -> tuple[Case, SensorModel, Null]:
     """A unit of a preset in the standard design, as a measurement, and what its model predicts."""
-    from spikecam_env.gap.world import planned
+    from spikecam_env.gap.observe.conditions import planned
 
     model = SensorModel.preset(preset)
     conditions = planned(standard_design(), SHAPE, FRAMES)

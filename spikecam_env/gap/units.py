@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.false_spikes import read_with_false_spikes
+from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.refit import BaseFit, responds
 from spikecam_env.gap.statistics import Key, pattern
 from spikecam_env.gap.traps import drawn_traps, level_of
-from spikecam_env.gap.world import Shown
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
 

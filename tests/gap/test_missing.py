@@ -11,10 +11,10 @@ from small import SHAPE, effect, recorded, unit
 from spikecam_env.gap import Dark, Flat
 from spikecam_env.gap.case import case_of
 from spikecam_env.gap.missing import LEAST_JITTER, missing
-from spikecam_env.gap.observe import observe
+from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.refit import unit_of
 from spikecam_env.gap.twin import expose
-from spikecam_env.gap.world import planned
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 NAMES = tuple(CATALOGUE)

@@ -58,7 +58,7 @@ def test_a_few_false_spikes_are_no_jitter(monkeypatch):
     case, without = recorded(model=model), recorded().base.white
     print(f"s^2 {case.base.white:.3e}, without {without:.3e}: {case.base.white / without - 1:+.2%}")
     assert case.base.white == pytest.approx(without, rel=0.032)
-    monkeypatch.setattr("spikecam_env.gap.observe.FEW", 0.0)
+    monkeypatch.setattr("spikecam_env.gap.observe.observation.FEW", 0.0)
     with_struck = measured_base(list(case.observations), list(case.conditions)).white
     print(f"with them {with_struck / without - 1:+.2%}")
     assert with_struck > 1.1 * without

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small import CLEAR, check_reveals, effect, recorded, seen
 
-from spikecam_env.gap.observe import observe
+from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.statistics.drift import EVEN, PARTS, lateness
 from spikecam_env.streams import pack_frames

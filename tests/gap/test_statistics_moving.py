@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small import FRAMES, SHAPE, check_reveals, conditions, effect
 
-from spikecam_env.gap.observe import BIN
+from spikecam_env.gap.observe.observation import BIN
 from spikecam_env.gap.statistics.moving import FEATURES, features, light_film
 
 CASES = [

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from small import SHAPE, check_reveals, effect, null
 
-from spikecam_env.gap.observe import observe
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics.timing import statistics
-from spikecam_env.gap.world import Shown
 from spikecam_env.streams import pack_frames
 
 CASES = [

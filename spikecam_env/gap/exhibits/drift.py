@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.evidence import Panel, loudest, over_pixels, takes
+from spikecam_env.gap.observe.conditions import STATIC
 from spikecam_env.gap.result import Evidence
-from spikecam_env.gap.world import STATIC
 
 TITLE = "Through the recording"
 CAPTION = "The array's rate in sixteen parts of a recording, less the model's."

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.evidence import Panel, against_before, by_recording, error_known, mean_known, takes
+from spikecam_env.gap.observe.conditions import STATIC
 from spikecam_env.gap.result import Evidence
-from spikecam_env.gap.world import STATIC
 
 TITLE = "Rates and levels"
 CAPTION = (

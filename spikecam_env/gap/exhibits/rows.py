@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.evidence import Array, Panel, against_before, by_recording, loudest, takes
-from spikecam_env.gap.observe import Observation
+from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.result import Evidence
-from spikecam_env.gap.world import STATIC
 
 TITLE = "Rows and columns in time"
 CAPTION = "Variance in time of the spikes of a row or column, less what the whole array shares, over the model's."

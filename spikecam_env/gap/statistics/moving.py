@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from spikecam_env.gap.observe import BIN
-from spikecam_env.gap.world import Shown
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.observation import BIN
 from spikecam_env.sensor import Keyframes
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe import Observation
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.statistics.moving import Film
-from spikecam_env.gap.world import Shown
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe import BIN, BLOCKS, LAGS, LENGTHS, STEPS, observe
+from spikecam_env.gap.observe.observation import BIN, BLOCKS, LAGS, LENGTHS, STEPS, observe
 from spikecam_env.streams import pack_frames
 
 SHAPES = [(5, 7), (24, 40), (3, 64), (2, 130), (1, 1), (1, 9)]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.calibration.spike_times import SpikeTimes
-from spikecam_env.gap.passes import add_rows, through_frames, through_pixels
+from spikecam_env.gap.observe.bit_passes import add_rows, through_frames, through_pixels
 from spikecam_env.streams.bits import as_words
 from spikecam_env.streams.packing import unpack_frames
 
