@@ -17,10 +17,10 @@ import numpy as np
 from spikecam_env.gap.candidates import CANDIDATES, candidate, is_pattern
 from spikecam_env.gap.compare import TOLERANCE
 from spikecam_env.gap.fit import predict
-from spikecam_env.gap.refit import within
-from spikecam_env.gap.settle import FURTHEST
 from spikecam_env.gap.strength import bounded, is_linear, with_effect
 from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.gap.unit.indirect_inference import FURTHEST
+from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import CATALOGUE
 
 PEAK, TWINS = 15.0, 4

@@ -14,9 +14,9 @@ import numpy as np
 from spikecam_env.gap.candidates import candidate
 from spikecam_env.gap.case import twins
 from spikecam_env.gap.compare import values_of
-from spikecam_env.gap.refit import within
 from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import CATALOGUE
 
 PEAK, PAIRS = 20.0, 4

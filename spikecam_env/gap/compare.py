@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from spikecam_env.gap.moderate import moderated
-from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.statistics import Key, floor_of
+from spikecam_env.gap.unit.refit import BaseFit
 
 Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from spikecam_env.gap.candidates import candidate, is_pattern
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, scaled, size_of
 from spikecam_env.gap.fit import MANY, WANDER, Fit, as_seen, concerned, predict, twins_of, with_held_out, with_pattern
-from spikecam_env.gap.refit import LINES, BaseFit, within
-from spikecam_env.gap.settle import HIDDEN, shifted
 from spikecam_env.gap.strength import as_loud, with_effect
+from spikecam_env.gap.unit.indirect_inference import HIDDEN, shifted
+from spikecam_env.gap.unit.refit import LINES, BaseFit, within
 from spikecam_env.gap.units import drawn
 from spikecam_env.sensor import SensorModel
 

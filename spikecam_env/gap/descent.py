@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates import candidate
 from spikecam_env.gap.compare import Null, Prediction, change_of, judged, own_variance, step_of
 from spikecam_env.gap.fit import as_seen
-from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.settle import is_still
 from spikecam_env.gap.strength import bounded, with_effect
+from spikecam_env.gap.unit.indirect_inference import is_still
+from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -30,17 +30,17 @@ from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves
-from spikecam_env.gap.label_unit import counted_anew, nominal_per_label, said_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.missing import missing, with_all
 from spikecam_env.gap.null import model_null, unit_under
 from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
 from spikecam_env.gap.own_templates import own_templates
 from spikecam_env.gap.parameters import Off, off_nominal
-from spikecam_env.gap.refit import within
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.gap.search import Round, of_fit, search
 from spikecam_env.gap.templates import Templates, load
+from spikecam_env.gap.unit.label_unit import counted_anew, nominal_per_label, said_of
+from spikecam_env.gap.unit.refit import within
 from spikecam_env.gap.verdict import concluded, grounded, harmless
 from spikecam_env.gap.words import sentence, unfinished
 from spikecam_env.gap.workers import sums_in_one_order

@@ -29,11 +29,11 @@ from spikecam_env.gap.compare import (
     step_of,
     values_of,
 )
-from spikecam_env.gap.false_spikes import false_spikes_of
-from spikecam_env.gap.refit import BaseFit, within
-from spikecam_env.gap.settle import FURTHEST, is_still, settled, shifted
 from spikecam_env.gap.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
-from spikecam_env.gap.traps import traps_of
+from spikecam_env.gap.unit.false_spikes import false_spikes_of
+from spikecam_env.gap.unit.indirect_inference import FURTHEST, is_still, settled, shifted
+from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.traps import traps_of
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SensorModel
 

@@ -12,9 +12,9 @@ from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import Observation, observe
-from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.statistics import Key, bank
 from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.unit.refit import BaseFit
 
 LEAST_FRAMES = 1000
 """Shortest recording that is divided."""

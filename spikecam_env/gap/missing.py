@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.gap.case import Case, rests_on, twins
-from spikecam_env.gap.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common, within
+from spikecam_env.gap.unit.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common, within
 from spikecam_env.gap.units import width
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import Effect, SensorModel

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, judged, scale_to, scaled
 from spikecam_env.gap.fit import Fit, as_seen, concerned, predict
-from spikecam_env.gap.refit import within
-from spikecam_env.gap.settle import shifted
 from spikecam_env.gap.strength import bounded, with_effect
+from spikecam_env.gap.unit.indirect_inference import shifted
+from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -9,18 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.case import Case
-from spikecam_env.gap.refit import NOISE, BaseFit
 from spikecam_env.gap.strength import bounded, with_effect
+from spikecam_env.gap.unit.refit import NOISE, BaseFit
+from spikecam_env.gap.unit.usual import USUAL_NOISE, unusual
 from spikecam_env.gap.units import SPREADS, spread_factor, width
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
-
-USUAL = 1.8
-"""A unit's dark level and spreads differ from nominal by up to this factor; beyond, a parameter is wrong."""
-
-USUAL_NOISE = 1.5
-"""The same of s^2: the electrons, or the square of the millivolts, of a unit 20 % off."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +63,6 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> Off:
         base = replace(base, dark=base.dark / level)
     rows = {n: {"measured": has[n] * r, "nominal": has[n], "ratio": r} for n, r in ratios.items() if n in has}
     return Off(rows, base)
-
-
-def unusual(ratio: float, usual: float = USUAL) -> bool:
-    """Whether units do not differ by so much."""
-    return not 1 / usual < ratio < usual
 
 
 def nearer(values: Array, live: NDArray[np.bool_], factor: float) -> Array:

@@ -14,7 +14,7 @@ from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual
 from spikecam_env.gap.confirm import FINAL, confirmed
 from spikecam_env.gap.descent import WHITE, WORSE, Free, Probe, descend, longest_of, moved, spans
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of, with_held_out, with_pattern
-from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -36,12 +36,12 @@ from spikecam_env.gap.descent import PROBED
 from spikecam_env.gap.fit import Fit, concerned, fit, twins_of
 from spikecam_env.gap.opposed import PAIR, opposed
 from spikecam_env.gap.polish import Errors, no_surer, polished, simulated_for
-from spikecam_env.gap.refit import BaseFit, within
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.screen import Screened, screen
 from spikecam_env.gap.shapes import shaped, worth_shaping
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.templates import Templates
+from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

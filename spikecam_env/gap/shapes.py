@@ -16,7 +16,7 @@ from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged
 from spikecam_env.gap.descent import descend
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of
-from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -29,10 +29,10 @@ from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.descent import settled_there
 from spikecam_env.gap.fit import predict, with_pattern
 from spikecam_env.gap.null import model_null
-from spikecam_env.gap.refit import unit_as_base, within
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.unit.refit import unit_as_base, within
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.untrusted import Declared, Name, declared, numbers, parse_json, read_arrays
 from spikecam_env.whole import whole_file

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import LABELS, Shown
 from spikecam_env.gap.observe.observation import Observation, observe
-from spikecam_env.gap.refit import BaseFit, unit_of
+from spikecam_env.gap.unit.refit import BaseFit, unit_of
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.streams import pack_frames

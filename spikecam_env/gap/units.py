@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.false_spikes import read_with_false_spikes
 from spikecam_env.gap.observe.conditions import Shown
-from spikecam_env.gap.refit import BaseFit, responds
 from spikecam_env.gap.statistics import Key, pattern
-from spikecam_env.gap.traps import drawn_traps, level_of
+from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
+from spikecam_env.gap.unit.refit import BaseFit, responds
+from spikecam_env.gap.unit.traps import drawn_traps, level_of
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
 

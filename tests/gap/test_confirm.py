@@ -11,9 +11,9 @@ from spikecam_env.gap.compare import alarmed, judged, residual, size_of, values_
 from spikecam_env.gap.confirm import as_wide, confirmed, is_missed, made_loud, made_sure, of_any_dark, quietened
 from spikecam_env.gap.fit import MANY, Fit, fit, predict, with_pattern
 from spikecam_env.gap.null import model_null
-from spikecam_env.gap.refit import within
-from spikecam_env.gap.settle import FURTHEST
 from spikecam_env.gap.strength import with_effect
+from spikecam_env.gap.unit.indirect_inference import FURTHEST
+from spikecam_env.gap.unit.refit import within
 
 
 def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():

@@ -14,10 +14,10 @@ from spikecam_env.gap.candidates import testable as split_testable
 from spikecam_env.gap.compare import Prediction, judged, misfit, scale_of, values_of
 from spikecam_env.gap.fit import concerned, fit, predict, slope_between, with_held_out
 from spikecam_env.gap.null import model_null
-from spikecam_env.gap.refit import within
 from spikecam_env.gap.search import standing_on
-from spikecam_env.gap.settle import moved_by
 from spikecam_env.gap.strength import with_effect
+from spikecam_env.gap.unit.indirect_inference import moved_by
+from spikecam_env.gap.unit.refit import within
 from spikecam_env.gap.units import spread_factor
 from spikecam_env.sensor import CATALOGUE
 

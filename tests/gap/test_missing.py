@@ -13,8 +13,8 @@ from spikecam_env.gap.case import case_of
 from spikecam_env.gap.missing import LEAST_JITTER, missing
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.gap.refit import unit_of
 from spikecam_env.gap.twin import expose
+from spikecam_env.gap.unit.refit import unit_of
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 NAMES = tuple(CATALOGUE)

@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 from small import CLEAR, FRAMES, MODEL, SHAPE, conditions, effect, quiet, recorded
 
-from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.statistics import Key, floor_of, pattern
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SensorModel
 

@@ -15,9 +15,9 @@ from spikecam_env.gap.candidates import candidate, chosen, is_pattern
 from spikecam_env.gap.compare import Null, adjusted, alarmed, deviates, null_of, residual, values_of
 from spikecam_env.gap.maps.bank import Maps, bank, dark_of, of_use, read_maps, unit_levels, unit_maps
 from spikecam_env.gap.maps.search import SHARES, SPREADS, UNITS, State, Tried, free_of, search, within
-from spikecam_env.gap.parameters import USUAL
-from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.result import Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.gap.unit.usual import USUAL
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import MODEL, unit
 
-from spikecam_env.gap.settle import FURTHEST, settled, shifted
+from spikecam_env.gap.unit.indirect_inference import FURTHEST, settled, shifted
 
 
 def test_a_unit_is_settled_along_a_line_and_not_to_the_noise_of_each_pixel():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, effect, recorded, unit
 
-from spikecam_env.gap.refit import LINES, BaseFit, common, measured_base, unit_as_base, unit_of, within
+from spikecam_env.gap.unit.refit import LINES, BaseFit, common, measured_base, unit_as_base, unit_of, within
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 PIXELS = SHAPE[0] * SHAPE[1]

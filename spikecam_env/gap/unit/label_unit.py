@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import Shown
-from spikecam_env.gap.parameters import unusual
-from spikecam_env.gap.refit import BaseFit
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.gap.unit.usual import unusual
 
 
 def nominal_per_label(base: BaseFit) -> float:

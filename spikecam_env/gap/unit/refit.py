@@ -15,7 +15,7 @@ from spikecam_env.calibration.jitter import fit_jitter
 from spikecam_env.calibration.response import fit_lines, rates_from_times, together
 from spikecam_env.gap.observe.conditions import KNOWN, Shown
 from spikecam_env.gap.observe.observation import STEPS, Observation
-from spikecam_env.gap.traps import less_traps
+from spikecam_env.gap.unit.traps import less_traps
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.unit import PixelArray, Unit, firing_law
 

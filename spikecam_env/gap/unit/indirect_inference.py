@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.refit import BaseFit, within
+from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

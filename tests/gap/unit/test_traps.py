@@ -7,9 +7,9 @@ import pytest
 from small import MODEL, SHAPE, effect, recorded, unit
 
 from spikecam_env.gap.case import twins
-from spikecam_env.gap.refit import unit_of, within
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.traps import charge_of, drawn_traps, less_traps, level_of
+from spikecam_env.gap.unit.refit import unit_of, within
+from spikecam_env.gap.unit.traps import charge_of, drawn_traps, less_traps, level_of
 from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SpikeSensor
 

@@ -8,10 +8,10 @@ import numpy as np
 from small import MODEL, effect
 
 from spikecam_env.gap import Dark
-from spikecam_env.gap.false_spikes import read_with_false_spikes
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.twin import expose
+from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
 
 SHAPE, FRAMES = (64, 64), 8000
 FALSE = MODEL.with_effect(effect("spurious_spikes", probability=1e-4))
