@@ -14,7 +14,7 @@ from spikecam_env.gap.observe.conditions import KNOWN, Shown
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.scene import simulate_seen
 from spikecam_env.gap.statistics import Key, bank, pattern_bank
-from spikecam_env.gap.statistics.moving import Film, films
+from spikecam_env.gap.statistics.film import Film, films
 from spikecam_env.gap.statistics.reading import Reading
 from spikecam_env.gap.twin import FIRST
 from spikecam_env.gap.unit.refit import BaseFit, measured_base

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.evidence import Array, Panel, loudest, takes
 from spikecam_env.gap.result import Evidence
-from spikecam_env.gap.statistics.moving import light_film
+from spikecam_env.gap.statistics.film import light_film
 
 TITLE = "Moving light"
 CAPTION = (

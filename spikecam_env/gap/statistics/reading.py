@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.statistics.moving import Film
+from spikecam_env.gap.statistics.film import Film
 from spikecam_env.gap.unit.refit import BaseFit
 
 Array = NDArray[np.float64]

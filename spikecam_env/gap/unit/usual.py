@@ -5,7 +5,6 @@ from __future__ import annotations
 USUAL = 1.8
 """A unit's dark level and spreads differ from nominal by up to this factor; beyond, a parameter is wrong."""
 
-
 USUAL_NOISE = 1.5
 """The same of s^2: the electrons, or the square of the millivolts, of a unit 20 % off."""
 

@@ -7,7 +7,7 @@ import pytest
 from small import FRAMES, SHAPE, check_reveals, conditions, effect
 
 from spikecam_env.gap.observe.observation import BIN
-from spikecam_env.gap.statistics.moving import FEATURES, features, light_film
+from spikecam_env.gap.statistics.film import FEATURES, features, light_film
 
 CASES = [
     (effect("photodiode_lag", fraction=0.06, tau_us=1000.0), "bars", ["lag 16"], ["rates", "noise"]),
