@@ -17,9 +17,9 @@ from scipy.special import ndtr
 from tqdm import tqdm
 
 from spikecam_env.gap.alarm import ALARM
-from spikecam_env.gap.case import twins
 from spikecam_env.gap.compare import GATE, Null, adjusted, deviates, null_of
 from spikecam_env.gap.templates import standard_case
+from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import within
 
 Array = NDArray[np.float64]

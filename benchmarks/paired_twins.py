@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from spikecam_env.gap.candidates import candidate
-from spikecam_env.gap.case import twins
 from spikecam_env.gap.compare import values_of
 from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import CATALOGUE
 

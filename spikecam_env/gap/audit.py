@@ -12,12 +12,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import GATE, adjusted, deviates, values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import BIN, Observation
 from spikecam_env.gap.statistics.film import light_film
+from spikecam_env.gap.twins.case import Case
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
 

@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from spikecam_env.gap.candidates import candidate, expected_events, is_pattern
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, is_clear, of_a_pair, pooled
 from spikecam_env.gap.descent import settled_there
-from spikecam_env.gap.fit import UNITS, WANDER, concerned, predict, twins_of, with_pattern
+from spikecam_env.gap.fit import WANDER, concerned, predict, twins_of, with_pattern
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.strength import bounded, may_be_negative, with_effect
 from spikecam_env.gap.templates import Templates
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.fresh_units import UNITS
 from spikecam_env.gap.unit.indirect_inference import shifted
 from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import CATALOGUE, SensorModel

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, scaled, size_of
 from spikecam_env.gap.fit import MANY, WANDER, Fit, as_seen, concerned, predict, twins_of, with_held_out, with_pattern
 from spikecam_env.gap.strength import as_loud, with_effect
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.fresh_units import drawn
 from spikecam_env.gap.unit.indirect_inference import HIDDEN, shifted
 from spikecam_env.gap.unit.refit import LINES, BaseFit, within
-from spikecam_env.gap.units import drawn
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -25,9 +25,7 @@ from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.audit import Contradiction, audit, upheld
 from spikecam_env.gap.bounds import bounds
 from spikecam_env.gap.candidates import chosen, is_pattern, testable
-from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import Null, values_of
-from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.maps import diagnose_maps
@@ -39,11 +37,13 @@ from spikecam_env.gap.parameters import Off, off_nominal
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.gap.search import Round, of_fit, search
 from spikecam_env.gap.templates import Templates, load
+from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
+from spikecam_env.gap.twins.case import Case, case_of
+from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import counted_anew, nominal_per_label, said_of
 from spikecam_env.gap.unit.refit import within
 from spikecam_env.gap.verdict import concluded, grounded, harmless
 from spikecam_env.gap.words import sentence, unfinished
-from spikecam_env.gap.workers import sums_in_one_order
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.result import Evidence
-from spikecam_env.gap.scene import simulate_seen
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.fresh_units import drawn
+from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, measured_base
-from spikecam_env.gap.units import drawn
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.floating[Any]]

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.case import Case, rests_on, twins
 from spikecam_env.gap.compare import (
     Draw,
     Null,
@@ -30,11 +29,12 @@ from spikecam_env.gap.compare import (
     values_of,
 )
 from spikecam_env.gap.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
+from spikecam_env.gap.twins.case import Case, rests_on, twins
+from spikecam_env.gap.twins.fresh_units import UNITS, drawn_banks
 from spikecam_env.gap.unit.false_spikes import false_spikes_of
 from spikecam_env.gap.unit.indirect_inference import FURTHEST, is_still, settled, shifted
 from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.gap.unit.traps import traps_of
-from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -58,8 +58,9 @@ WANDER, SEVERAL = 6, 3
 APART = 0.05
 """Least step of a logarithm between two twins for a slope."""
 
-UNITS, MANY = 24, 240
-"""Units drawn for the pattern statistics of one model, and where these do not show what was measured."""
+
+MANY = 240
+"""The same where these do not show what was measured."""
 
 
 @dataclass(frozen=True, eq=False)

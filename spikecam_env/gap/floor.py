@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from spikecam_env.campaign.reading import CampaignRecording
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.gap.statistics import Key, bank
 from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 
 LEAST_FRAMES = 1000

@@ -23,14 +23,14 @@ from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.gap import plots
 from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.candidates import chosen, testable
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, adjusted, values_of
 from spikecam_env.gap.diagnose import in_order, read_case
 from spikecam_env.gap.missing import Missing, missing, with_all
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import of_fit, search
 from spikecam_env.gap.templates import load
-from spikecam_env.gap.workers import sums_in_one_order
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.whole import whole_file, write_text_whole
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.gap.case import Case, rests_on, twins
+from spikecam_env.gap.twins.case import Case, rests_on, twins
+from spikecam_env.gap.twins.fresh_units import width
 from spikecam_env.gap.unit.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common, within
-from spikecam_env.gap.units import width
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE

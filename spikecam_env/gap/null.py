@@ -9,14 +9,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.case import Case, twins
 from spikecam_env.gap.compare import Null, null_of, values_of
-from spikecam_env.gap.fit import UNITS
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.twins.case import Case, twins
+from spikecam_env.gap.twins.fresh_units import UNITS, drawn_banks
 from spikecam_env.gap.unit.indirect_inference import settled
 from spikecam_env.gap.unit.refit import BaseFit, within
-from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -14,10 +14,10 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, judged, scale_to, scaled
 from spikecam_env.gap.fit import Fit, as_seen, concerned, predict
 from spikecam_env.gap.strength import bounded, with_effect
+from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.indirect_inference import shifted
 from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import SensorModel

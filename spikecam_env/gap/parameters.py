@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.strength import bounded, with_effect
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.fresh_units import SPREADS, spread_factor, width
 from spikecam_env.gap.unit.refit import NOISE, BaseFit
 from spikecam_env.gap.unit.usual import USUAL_NOISE, unusual
-from spikecam_env.gap.units import SPREADS, spread_factor, width
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.observe.observation import BLOCKS
 from spikecam_env.gap.statistics.spectrum import spectrum, strongest_line
+from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.gap import plots
-from spikecam_env.gap.effort import CAMPAIGNS
 from spikecam_env.gap.evidence import Maps, shape_of
 from spikecam_env.gap.exhibits import LOUD, Exhibit, by_loudness, exhibits
 from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect
+from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.gap.words import (
     CONFIDENCE,
     VERDICTS,

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.alarm import lent, rings
 from spikecam_env.gap.candidates import candidate, is_pattern, of_motion
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import (
     Null,
     Prediction,
@@ -41,6 +40,7 @@ from spikecam_env.gap.screen import Screened, screen
 from spikecam_env.gap.shapes import shaped, worth_shaping
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.templates import Templates
+from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import Null, Prediction, alarmed, judged
 from spikecam_env.gap.descent import descend
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of
+from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel
 

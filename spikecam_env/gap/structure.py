@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import HEAVY, Null
 from spikecam_env.gap.place import when, where
+from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]
 

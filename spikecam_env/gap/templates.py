@@ -24,14 +24,14 @@ from tqdm import tqdm
 
 from spikecam_env.gap.campaign.design import standard_design
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
-from spikecam_env.gap.case import Case, case_of, twins
 from spikecam_env.gap.compare import Null, values_of
 from spikecam_env.gap.descent import settled_there
 from spikecam_env.gap.fit import predict, with_pattern
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import bounded, with_effect
-from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.twins.case import Case, case_of, twins
+from spikecam_env.gap.twins.simulate import simulate
 from spikecam_env.gap.unit.refit import unit_as_base, within
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.untrusted import Declared, Name, declared, numbers, parse_json, read_arrays

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.audit import Contradiction
 from spikecam_env.gap.candidates import candidate
-from spikecam_env.gap.case import Case
 from spikecam_env.gap.compare import (
     Null,
     Prediction,
@@ -29,6 +28,7 @@ from spikecam_env.gap.place import when, where
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.search import BESIDE, SECOND, Round
 from spikecam_env.gap.structure import structure
+from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.words import HELD_OUT_ALONE, LENT
 from spikecam_env.sensor import SensorModel
 

@@ -7,8 +7,8 @@ import inspect
 import math
 
 from spikecam_env.errors import InputError
-from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Gap, NamedEffect
+from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.catalogue_page import Sheet
 

@@ -11,7 +11,6 @@ from small import MODEL, effect, recorded, unit
 
 from spikecam_env.gap import search
 from spikecam_env.gap.compare import Draw, Null, Prediction, judged
-from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.screen import Screened
@@ -31,6 +30,7 @@ from spikecam_env.gap.search import (
     shows,
 )
 from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.gap.verdict import explains, harmless
 
 COUNT, TWINS = 200, 12

@@ -16,9 +16,9 @@ from spikecam_env.gap.fit import concerned, fit, predict, slope_between, with_he
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import standing_on
 from spikecam_env.gap.strength import with_effect
+from spikecam_env.gap.twins.fresh_units import spread_factor
 from spikecam_env.gap.unit.indirect_inference import moved_by
 from spikecam_env.gap.unit.refit import within
-from spikecam_env.gap.units import spread_factor
 from spikecam_env.sensor import CATALOGUE
 
 ONE, NONE = np.ones(200), np.zeros(200)

@@ -12,7 +12,7 @@ from spikecam_env.gap.compare import values_of
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.result import Gap
-from spikecam_env.gap.twin import expose
+from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.refit import unit_of
 from spikecam_env.gap.verdict import grounded
 from spikecam_env.streams import unpack_frames

@@ -9,11 +9,11 @@ import pytest
 from small import SHAPE, effect, recorded, unit
 
 from spikecam_env.gap import Dark, Flat
-from spikecam_env.gap.case import case_of
 from spikecam_env.gap.missing import LEAST_JITTER, missing
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.gap.twin import expose
+from spikecam_env.gap.twins.case import case_of
+from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.refit import unit_of
 from spikecam_env.sensor import CATALOGUE, SensorModel
 

@@ -6,9 +6,9 @@ import numpy as np
 from small import TWINS, null
 
 from spikecam_env.gap.compare import Draw, Null
-from spikecam_env.gap.fit import UNITS
 from spikecam_env.gap.null import surer
 from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.twins.fresh_units import UNITS
 
 
 def test_recordings_in_motion_are_told_by_twice_as_many_twins_and_the_pattern_by_drawn_units():

@@ -6,8 +6,8 @@ import pytest
 from small import MODEL, effect, recorded
 
 from spikecam_env.gap.parameters import off_nominal, with_strengths
+from spikecam_env.gap.twins.fresh_units import width
 from spikecam_env.gap.unit.refit import unit_as_base
-from spikecam_env.gap.units import width
 
 SHAPE = (128, 128)
 

@@ -19,8 +19,8 @@ from spikecam_env.gap.compare import HEAVY, Null, Prediction, alarmed, misfit, r
 from spikecam_env.gap.maps.bank import Maps, bank, of_use, unit_maps
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.strength import bounded, with_effect
-from spikecam_env.gap.units import SPREADS as OF_A_UNIT
-from spikecam_env.gap.units import WITHIN
+from spikecam_env.gap.twins.fresh_units import SPREADS as OF_A_UNIT
+from spikecam_env.gap.twins.fresh_units import WITHIN
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ from scipy import stats
 from small import CLEAR, FRAMES, MODEL, SHAPE, conditions, effect, quiet, recorded
 
 from spikecam_env.gap.statistics import Key, floor_of, pattern
+from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SensorModel
 
 DRAWS = 40

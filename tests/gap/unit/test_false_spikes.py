@@ -10,7 +10,7 @@ from small import MODEL, effect
 from spikecam_env.gap import Dark
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.gap.twin import expose
+from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
 
 SHAPE, FRAMES = (64, 64), 8000

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, effect, recorded, unit
 
-from spikecam_env.gap.case import twins
 from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.twins.case import twins
+from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.refit import unit_of, within
 from spikecam_env.gap.unit.traps import charge_of, drawn_traps, less_traps, level_of
-from spikecam_env.gap.units import drawn_banks
 from spikecam_env.sensor import SpikeSensor
 
 SEVERE = effect("random_telegraph_noise", amplitude_pA=2.0, fraction=0.04, dwell_ms=5.0)

@@ -15,11 +15,11 @@ from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.gap import polish
 from spikecam_env.gap import search as searching
 from spikecam_env.gap.compare import Null, Prediction, judged, residual, values_of
-from spikecam_env.gap.effort import CAMPAIGNS, Effort
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.parameters import Off
 from spikecam_env.gap.search import BESIDE, SECOND, Round, cancelling, joined, may_be_rejoined, may_be_shaped, revisited
 from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
 from spikecam_env.gap.verdict import concluded
 from spikecam_env.gap.words import sentence, unfinished
 

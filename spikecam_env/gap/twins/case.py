@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.effort import Effort
 from spikecam_env.gap.observe.conditions import KNOWN, Shown
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.scene import simulate_seen
 from spikecam_env.gap.statistics import Key, bank, pattern_bank
 from spikecam_env.gap.statistics.film import Film, films
 from spikecam_env.gap.statistics.reading import Reading
-from spikecam_env.gap.twin import FIRST
+from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.twins.simulate import FIRST
+from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, measured_base
 from spikecam_env.sensor import SensorModel
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from spikecam_env.calibration.real import plausible_rates
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.twin import simulate
+from spikecam_env.gap.twins.simulate import simulate
+from spikecam_env.gap.twins.workers import at_once
 from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.gap.workers import at_once
 from spikecam_env.sensor import Keyframes, SensorModel
 
 Array = NDArray[np.float64]

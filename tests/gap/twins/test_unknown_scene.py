@@ -10,14 +10,14 @@ from small import CLEAR, MODEL, effect
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap.candidates import testable as can_test
-from spikecam_env.gap.case import Case, case_of
 from spikecam_env.gap.compare import deviates, values_of
 from spikecam_env.gap.diagnose import refittable
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.parameters import off_nominal
-from spikecam_env.gap.scene import EXACT, likely_rates, missed_by, simulate_seen
+from spikecam_env.gap.twins.case import Case, case_of
+from spikecam_env.gap.twins.unknown_scene import EXACT, likely_rates, missed_by, simulate_seen
 from spikecam_env.sensor import Effect, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 

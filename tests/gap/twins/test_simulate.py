@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, unit
 
-from spikecam_env.gap import twin
 from spikecam_env.gap.observe.conditions import LABELS, Shown
-from spikecam_env.gap.twin import FIRST, as_known, at_any_phase
+from spikecam_env.gap.twins import simulate as twin
+from spikecam_env.gap.twins.simulate import FIRST, as_known, at_any_phase
 from spikecam_env.gap.unit.refit import unit_of
 from spikecam_env.sensor import Keyframes, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_info
 
 from spikecam_env.gap.diagnose import diagnose
 from spikecam_env.gap.ladder import ladder
-from spikecam_env.gap.workers import sums_in_one_order
+from spikecam_env.gap.twins.workers import sums_in_one_order
 
 
 def threads_of_linear_algebra() -> set[int]:

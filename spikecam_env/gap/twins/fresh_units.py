@@ -18,6 +18,9 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
+UNITS = 24
+"""Units drawn for the pattern statistics of one model."""
+
 SPREADS = {
     "gain": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
     "dark": {"dark_current_spread": "sigma_pA"},
