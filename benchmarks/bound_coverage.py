@@ -29,7 +29,7 @@ from spikecam_env.gap import Bars, Dark, Flat, Step
 from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.bounds import bounds
 from spikecam_env.gap.candidates import chosen, testable
-from spikecam_env.gap.compare import Null, values_of
+from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare import Null, adjusted, deviates, of_all_recordings
+from spikecam_env.gap.compare.distance import adjusted, deviates, of_all_recordings
+from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]

@@ -12,7 +12,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare import GATE, adjusted, deviates, values_of
+from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import BIN, Observation

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from spikecam_env.gap.candidates import candidate, expected_events, is_pattern
-from spikecam_env.gap.compare import Null, Prediction, is_clear, of_a_pair, pooled
+from spikecam_env.gap.compare.prediction import Null, Prediction, of_a_pair, pooled
+from spikecam_env.gap.compare.step import is_clear
 from spikecam_env.gap.descent import settled_there
 from spikecam_env.gap.fit import WANDER, concerned, predict, twins_of, with_pattern
 from spikecam_env.gap.result import Bound

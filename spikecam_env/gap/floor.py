@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from spikecam_env.campaign.reading import CampaignRecording
-from spikecam_env.gap.compare import Null, values_of
+from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.gap.statistics import Key, bank

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare import Null, null_of, values_of
+from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, twins

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.compare import Null, Prediction, alarmed, judged, residual, step_of
+from spikecam_env.gap.compare.distance import alarmed, judged, residual
+from spikecam_env.gap.compare.prediction import Null, Prediction
+from spikecam_env.gap.compare.step import step_of
 from spikecam_env.gap.confirm import FINAL, confirmed
 from spikecam_env.gap.descent import WHITE, WORSE, Free, Probe, descend, longest_of, moved, spans
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of, with_held_out, with_pattern

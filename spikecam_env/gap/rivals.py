@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from spikecam_env.gap.compare import Draw, Null, Prediction, judged, own_variance, scale_to, scaled
+from spikecam_env.gap.compare.distance import judged
+from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, own_variance, scaled
+from spikecam_env.gap.compare.step import scale_to
 
 Array = NDArray[np.float64]
 

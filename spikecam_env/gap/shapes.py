@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.compare import Null, Prediction, alarmed, judged
+from spikecam_env.gap.compare.distance import alarmed, judged
+from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.descent import descend
 from spikecam_env.gap.fit import Fit, concerned, predict, twins_of
 from spikecam_env.gap.twins.case import Case

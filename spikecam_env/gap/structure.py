@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare import HEAVY, Null
+from spikecam_env.gap.compare.distance import HEAVY
+from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.place import when, where
 from spikecam_env.gap.twins.case import Case
 

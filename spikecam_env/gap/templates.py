@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from spikecam_env.gap.campaign.design import standard_design
 from spikecam_env.gap.candidates import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
-from spikecam_env.gap.compare import Null, values_of
+from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.descent import settled_there
 from spikecam_env.gap.fit import predict, with_pattern
 from spikecam_env.gap.null import model_null

@@ -12,15 +12,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.audit import Contradiction
 from spikecam_env.gap.candidates import candidate
-from spikecam_env.gap.compare import (
-    Null,
-    Prediction,
-    adjusted,
-    alarmed,
-    deviates,
-    misfit,
-    residual,
-)
+from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
+from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit import Fit
 from spikecam_env.gap.missing import Missing
 from spikecam_env.gap.parameters import Off, with_strengths

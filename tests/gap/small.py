@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from spikecam_env.gap import Bars, Dark, Flat, Step
-from spikecam_env.gap.compare import Null, deviates, values_of
+from spikecam_env.gap.compare.distance import deviates
+from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import Shown, planned
 from spikecam_env.gap.observe.observation import observe

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, TWINS, case_from, conditions, unit
 
-from spikecam_env.gap.compare import values_of
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.floor import floor_of_halves
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.result import Gap

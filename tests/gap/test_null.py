@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from small import TWINS, null
 
-from spikecam_env.gap.compare import Draw, Null
+from spikecam_env.gap.compare.prediction import Draw, Null
 from spikecam_env.gap.null import surer
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.fresh_units import UNITS

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from small import MODEL, TWINS, effect, recorded
 
-from spikecam_env.gap.compare import judged, values_of
+from spikecam_env.gap.compare.distance import judged
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.opposed import PAIR, opposed
 from spikecam_env.gap.search import of_fit, search

@@ -7,7 +7,7 @@ import pytest
 from small import MODEL, effect, null, recorded, unit
 
 from spikecam_env.gap import polish
-from spikecam_env.gap.compare import Prediction, values_of
+from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.descent import derivatives, moved
 from spikecam_env.gap.fit import Fit, fit, predict
 from spikecam_env.gap.null import model_null

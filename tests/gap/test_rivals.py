@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from spikecam_env.gap.compare import Draw, Null, Prediction, judged
+from spikecam_env.gap.compare.distance import judged
+from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.rivals import LEAST, is_rival, lead
 from spikecam_env.gap.statistics import Key
 

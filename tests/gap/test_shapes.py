@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded
 
-from spikecam_env.gap.compare import judged, values_of
+from spikecam_env.gap.compare.distance import judged
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.descent import broyden
 from spikecam_env.gap.fit import fit
 from spikecam_env.gap.screen import Screened

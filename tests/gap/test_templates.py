@@ -9,7 +9,8 @@ import pytest
 from small import MODEL, TWINS, effect, recorded
 
 from spikecam_env.gap.candidates import NOISE_OF_A_RESET
-from spikecam_env.gap.compare import Null, misfit, values_of
+from spikecam_env.gap.compare.distance import misfit
+from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.screen import Screened, screen
 from spikecam_env.gap.search import loud, other_shapes, worth_fitting

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.campaign.reading import Campaign
 from spikecam_env.gap.candidates import candidate, chosen, is_pattern
-from spikecam_env.gap.compare import Null, adjusted, alarmed, deviates, null_of, residual, values_of
+from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, residual
+from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.maps.bank import Maps, bank, dark_of, of_use, read_maps, unit_levels, unit_maps
 from spikecam_env.gap.maps.search import SHARES, SPREADS, UNITS, State, Tried, free_of, search, within
 from spikecam_env.gap.result import Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic

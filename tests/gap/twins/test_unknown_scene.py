@@ -10,7 +10,8 @@ from small import CLEAR, MODEL, effect
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap.candidates import testable as can_test
-from spikecam_env.gap.compare import deviates, values_of
+from spikecam_env.gap.compare.distance import deviates
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import refittable
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import Shown

@@ -8,30 +8,31 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from spikecam_env.gap.compare import (
+from spikecam_env.gap.compare.distance import (
     GATE,
     HEAVY,
-    PAIRED,
-    TOLERANCE,
-    Draw,
-    Null,
-    Prediction,
     adjusted,
     alarmed,
     deviates,
     freedom_of,
     misfit,
     normal,
-    null_of,
     of_all_recordings,
-    paired,
     residual,
+)
+from spikecam_env.gap.compare.prediction import (
+    PAIRED,
+    TOLERANCE,
+    Draw,
+    Null,
+    Prediction,
+    null_of,
+    paired,
     scaled,
-    slope_of,
     spread_of,
-    step_of,
     values_of,
 )
+from spikecam_env.gap.compare.step import slope_of, step_of
 from spikecam_env.gap.statistics import Key, floor_of
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import polygamma
 
-from spikecam_env.gap.moderate import bias, moderated, worth
+from spikecam_env.gap.compare.pooled_variance import bias, moderated, worth
 from spikecam_env.gap.statistics import Key
 
 FREEDOM = 11
