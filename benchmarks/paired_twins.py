@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.candidates import candidate
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.strength import bounded, with_effect
 from spikecam_env.gap.templates import load, standard_case
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import within

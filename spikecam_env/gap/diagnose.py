@@ -24,7 +24,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.gap.alarm import rings
 from spikecam_env.gap.audit import Contradiction, audit, upheld
 from spikecam_env.gap.bounds import bounds
-from spikecam_env.gap.candidates import chosen, is_pattern, testable
+from spikecam_env.gap.candidates.table import chosen, is_pattern, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.floor import floor_of_halves

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates import candidate, is_pattern
+from spikecam_env.gap.candidates.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
+from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.compare.distance import judged, size_of
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, paired, scaled, values_of
 from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
-from spikecam_env.gap.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
 from spikecam_env.gap.twins.case import Case, rests_on, twins
 from spikecam_env.gap.twins.fresh_units import UNITS, drawn_banks
 from spikecam_env.gap.unit.false_spikes import false_spikes_of

@@ -22,7 +22,7 @@ from tqdm import tqdm
 from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.gap import plots
 from spikecam_env.gap.alarm import rings
-from spikecam_env.gap.candidates import chosen, testable
+from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import in_order, read_case

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.strength import bounded, with_effect
+from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import SPREADS, spread_factor, width
 from spikecam_env.gap.unit.refit import NOISE, BaseFit

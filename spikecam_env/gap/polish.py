@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates import candidate, is_pattern
+from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.compare.distance import alarmed, judged, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.compare.step import step_of

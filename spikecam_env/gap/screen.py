@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates import candidate, of_motion
+from spikecam_env.gap.candidates.strength import bounded, may_be_negative
+from spikecam_env.gap.candidates.table import candidate, of_motion
 from spikecam_env.gap.compare.distance import misfit
 from spikecam_env.gap.compare.prediction import TOLERANCE, Null, of_a_pair, pooled
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.strength import bounded, may_be_negative
 from spikecam_env.gap.templates import Template, Templates
 from spikecam_env.sensor import CATALOGUE
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates import candidate, is_pattern
+from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.compare.distance import alarmed, judged
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.descent import descend

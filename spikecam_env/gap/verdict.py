@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.audit import Contradiction
-from spikecam_env.gap.candidates import candidate
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit import Fit

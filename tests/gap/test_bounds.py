@@ -11,7 +11,7 @@ from small import MODEL, effect
 
 from spikecam_env.gap import Bars, Dark, Flat
 from spikecam_env.gap.bounds import EVENTS, Score, Tried, _OfTwins, bounds, first_tried
-from spikecam_env.gap.candidates import expected_events
+from spikecam_env.gap.candidates.table import expected_events
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import planned

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from small import MODEL, unit
 
+from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.descent import WHITE, Probe, derivatives, descend, nudge_of, spans
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.strength import with_effect
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 

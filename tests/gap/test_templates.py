@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import MODEL, TWINS, effect, recorded
 
-from spikecam_env.gap.candidates import NOISE_OF_A_RESET
+from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET
 from spikecam_env.gap.compare.distance import misfit
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.null import model_null

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.campaign.reading import Campaign
-from spikecam_env.gap.candidates import candidate, chosen, is_pattern
+from spikecam_env.gap.candidates.table import candidate, chosen, is_pattern
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, residual
 from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.maps.bank import Maps, bank, dark_of, of_use, read_maps, unit_levels, unit_maps

@@ -9,7 +9,7 @@ import pytest
 from small import CLEAR, MODEL, effect
 
 from spikecam_env.errors import InputError
-from spikecam_env.gap.candidates import testable as can_test
+from spikecam_env.gap.candidates.table import testable as can_test
 from spikecam_env.gap.compare.distance import deviates
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import refittable

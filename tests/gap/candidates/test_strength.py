@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from small import MODEL
 
-from spikecam_env.gap.strength import as_loud, bounded, with_effect
+from spikecam_env.gap.candidates.strength import as_loud, bounded, with_effect
 
 
 def test_parameters_are_kept_within_their_bounds_and_whole_where_they_count():

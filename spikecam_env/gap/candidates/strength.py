@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from spikecam_env.gap.candidates import candidate, is_pattern
+from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.unit.indirect_inference import FURTHEST
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import build
