@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.campaign.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate, is_pattern
-from spikecam_env.gap.fit import with_pattern
+from spikecam_env.gap.fit.candidate import with_pattern
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.templates import FRAMES, SHAPE, load, standard_case

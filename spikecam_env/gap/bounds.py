@@ -23,8 +23,8 @@ from spikecam_env.gap.candidates.strength import bounded, may_be_negative, with_
 from spikecam_env.gap.candidates.table import candidate, expected_events, is_pattern
 from spikecam_env.gap.compare.prediction import Null, Prediction, of_a_pair, pooled
 from spikecam_env.gap.compare.step import is_clear
-from spikecam_env.gap.descent import settled_there
-from spikecam_env.gap.fit import WANDER, concerned, predict, twins_of, with_pattern
+from spikecam_env.gap.fit.candidate import WANDER, concerned, predict, twins_of, with_pattern
+from spikecam_env.gap.fit.gauss_newton import settled_there
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.templates import Templates
 from spikecam_env.gap.twins.case import Case

@@ -18,7 +18,7 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import Null, scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit import Fit, as_seen, concerned, predict
+from spikecam_env.gap.fit.candidate import Fit, as_seen, concerned, predict
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.indirect_inference import shifted
 from spikecam_env.gap.unit.refit import within

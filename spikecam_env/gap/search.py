@@ -21,14 +21,14 @@ from spikecam_env.gap.alarm import lent, rings
 from spikecam_env.gap.candidates.table import candidate, is_pattern, of_motion
 from spikecam_env.gap.compare.distance import alarmed, freedom_of, judged, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction, law, own_variance
-from spikecam_env.gap.confirm import AGAIN, FINAL, confirmed, made_sure, of_any_dark, rejoined, rejudged, resettled
-from spikecam_env.gap.descent import PROBED
-from spikecam_env.gap.fit import Fit, concerned, fit, twins_of
+from spikecam_env.gap.fit.candidate import Fit, concerned, fit, twins_of
+from spikecam_env.gap.fit.confirm import AGAIN, FINAL, confirmed, made_sure, of_any_dark, rejoined, rejudged, resettled
+from spikecam_env.gap.fit.gauss_newton import PROBED
+from spikecam_env.gap.fit.joint import Errors, no_surer, polished, simulated_for
+from spikecam_env.gap.fit.shapes import shaped, worth_shaping
 from spikecam_env.gap.opposed import PAIR, opposed
-from spikecam_env.gap.polish import Errors, no_surer, polished, simulated_for
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.screen import Screened, screen
-from spikecam_env.gap.shapes import shaped, worth_shaping
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.templates import Templates
 from spikecam_env.gap.twins.case import Case

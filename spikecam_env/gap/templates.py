@@ -26,8 +26,8 @@ from spikecam_env.gap.campaign.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.descent import settled_there
-from spikecam_env.gap.fit import predict, with_pattern
+from spikecam_env.gap.fit.candidate import predict, with_pattern
+from spikecam_env.gap.fit.gauss_newton import settled_there
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, case_of, twins

@@ -14,7 +14,7 @@ from spikecam_env.gap.audit import Contradiction
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
-from spikecam_env.gap.fit import Fit
+from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.missing import Missing
 from spikecam_env.gap.parameters import Off, with_strengths
 from spikecam_env.gap.place import when, where

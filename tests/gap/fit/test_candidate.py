@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded
 
-from spikecam_env.gap import fit as fit_module
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import CANDIDATES, candidate, chosen, is_pattern
 from spikecam_env.gap.candidates.table import testable as split_testable
 from spikecam_env.gap.compare.distance import judged, misfit
 from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.compare.step import scale_of
-from spikecam_env.gap.fit import concerned, fit, predict, slope_between, with_held_out
+from spikecam_env.gap.fit import candidate as fit_module
+from spikecam_env.gap.fit.candidate import concerned, fit, predict, slope_between, with_held_out
 from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import standing_on
 from spikecam_env.gap.twins.fresh_units import spread_factor

@@ -8,11 +8,11 @@ from small import MODEL, effect, null, recorded
 
 from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.descent import broyden
-from spikecam_env.gap.fit import fit
+from spikecam_env.gap.fit.candidate import fit
+from spikecam_env.gap.fit.gauss_newton import broyden
+from spikecam_env.gap.fit.shapes import has_shapes, shaped, worth_shaping
 from spikecam_env.gap.screen import Screened
 from spikecam_env.gap.search import other_ends
-from spikecam_env.gap.shapes import has_shapes, shaped, worth_shaping
 
 
 @pytest.mark.parametrize("start", [0.4, 2.5])

@@ -18,7 +18,7 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import Null, Prediction, own_variance
 from spikecam_env.gap.compare.step import change_of, step_of
-from spikecam_env.gap.fit import as_seen
+from spikecam_env.gap.fit.candidate import as_seen
 from spikecam_env.gap.unit.indirect_inference import is_still
 from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel

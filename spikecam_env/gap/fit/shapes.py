@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.compare.distance import alarmed, judged
 from spikecam_env.gap.compare.prediction import Null, Prediction
-from spikecam_env.gap.descent import descend
-from spikecam_env.gap.fit import Fit, concerned, predict, twins_of
+from spikecam_env.gap.fit.candidate import Fit, concerned, predict, twins_of
+from spikecam_env.gap.fit.gauss_newton import descend
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel

@@ -12,9 +12,9 @@ from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.compare.distance import alarmed, judged, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.compare.step import step_of
-from spikecam_env.gap.confirm import FINAL, confirmed
-from spikecam_env.gap.descent import WHITE, WORSE, Free, Probe, descend, longest_of, moved, spans
-from spikecam_env.gap.fit import Fit, concerned, predict, twins_of, with_held_out, with_pattern
+from spikecam_env.gap.fit.candidate import Fit, concerned, predict, twins_of, with_held_out, with_pattern
+from spikecam_env.gap.fit.confirm import FINAL, confirmed
+from spikecam_env.gap.fit.gauss_newton import WHITE, WORSE, Free, Probe, descend, longest_of, moved, spans
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import SensorModel

@@ -12,7 +12,17 @@ from spikecam_env.gap.candidates.strength import as_loud, with_effect
 from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.compare.distance import alarmed, judged, residual, size_of
 from spikecam_env.gap.compare.prediction import Null, Prediction, scaled
-from spikecam_env.gap.fit import MANY, WANDER, Fit, as_seen, concerned, predict, twins_of, with_held_out, with_pattern
+from spikecam_env.gap.fit.candidate import (
+    MANY,
+    WANDER,
+    Fit,
+    as_seen,
+    concerned,
+    predict,
+    twins_of,
+    with_held_out,
+    with_pattern,
+)
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import drawn
 from spikecam_env.gap.unit.indirect_inference import HIDDEN, shifted

@@ -9,7 +9,7 @@ from small import MODEL, unit
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.descent import WHITE, Probe, derivatives, descend, nudge_of, spans
+from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, derivatives, descend, nudge_of, spans
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
