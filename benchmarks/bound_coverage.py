@@ -26,12 +26,12 @@ from tqdm import tqdm
 
 from spikecam_env.cli.table import table
 from spikecam_env.gap import Bars, Dark, Flat, Step
-from spikecam_env.gap.alarm import rings
+from spikecam_env.gap.baseline.alarm import rings
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.bounds import bounds
 from spikecam_env.gap.candidates.strength import bounded, may_be_negative, with_effect
 from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound

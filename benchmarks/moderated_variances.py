@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from tqdm import tqdm
 
-from spikecam_env.gap.alarm import ALARM
+from spikecam_env.gap.baseline.alarm import ALARM
 from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
 from spikecam_env.gap.compare.prediction import Null, null_of
 from spikecam_env.gap.templates import standard_case

@@ -21,13 +21,13 @@ from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.gap import plots
-from spikecam_env.gap.alarm import rings
+from spikecam_env.gap.baseline.alarm import rings
+from spikecam_env.gap.baseline.missing_from_refit import Missing, missing, with_all
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import in_order, read_case
-from spikecam_env.gap.missing import Missing, missing, with_all
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import of_fit, search
 from spikecam_env.gap.templates import load
 from spikecam_env.gap.twins.case import Case

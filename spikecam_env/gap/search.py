@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.alarm import lent, rings
+from spikecam_env.gap.baseline.alarm import lent, rings
 from spikecam_env.gap.candidates.table import candidate, is_pattern, of_motion
 from spikecam_env.gap.compare.distance import alarmed, freedom_of, judged, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction, law, own_variance

@@ -22,13 +22,13 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.campaign.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.fit.candidate import predict, with_pattern
 from spikecam_env.gap.fit.gauss_newton import settled_there
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, case_of, twins
 from spikecam_env.gap.twins.simulate import simulate

@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.audit import Contradiction
+from spikecam_env.gap.baseline.label_audit import Contradiction
+from spikecam_env.gap.baseline.missing_from_refit import Missing
+from spikecam_env.gap.baseline.off_nominal import Off, with_strengths
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.missing import Missing
-from spikecam_env.gap.parameters import Off, with_strengths
 from spikecam_env.gap.place import when, where
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.search import BESIDE, SECOND, Round

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from spikecam_env.gap import Bars, Dark, Flat, Step
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import deviates
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import Shown, planned
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics import Key

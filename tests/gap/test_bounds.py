@@ -10,10 +10,10 @@ import pytest
 from small import MODEL, effect
 
 from spikecam_env.gap import Bars, Dark, Flat
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.bounds import EVENTS, Score, Tried, _OfTwins, bounds, first_tried
 from spikecam_env.gap.candidates.table import expected_events
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound

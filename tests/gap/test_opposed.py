@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from small import MODEL, TWINS, effect, recorded
 
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.opposed import PAIR, opposed
 from spikecam_env.gap.search import of_fit, search
 from spikecam_env.gap.templates import load

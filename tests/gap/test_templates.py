@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from small import MODEL, TWINS, effect, recorded
 
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET
 from spikecam_env.gap.compare.distance import misfit
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.screen import Screened, screen
 from spikecam_env.gap.search import loud, other_shapes, worth_fitting
 from spikecam_env.gap.statistics import Key

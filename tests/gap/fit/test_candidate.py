@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded
 
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import CANDIDATES, candidate, chosen, is_pattern
 from spikecam_env.gap.candidates.table import testable as split_testable
@@ -16,7 +17,6 @@ from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.fit import candidate as fit_module
 from spikecam_env.gap.fit.candidate import concerned, fit, predict, slope_between, with_held_out
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.search import standing_on
 from spikecam_env.gap.twins.fresh_units import spread_factor
 from spikecam_env.gap.unit.indirect_inference import moved_by

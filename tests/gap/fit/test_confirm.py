@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from small import MODEL, TWINS, effect, null, recorded
 
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.distance import alarmed, judged, residual, size_of
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import MANY, Fit, fit, predict, with_pattern
 from spikecam_env.gap.fit.confirm import as_wide, confirmed, is_missed, made_loud, made_sure, of_any_dark, quietened
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.unit.indirect_inference import FURTHEST
 from spikecam_env.gap.unit.refit import within
 

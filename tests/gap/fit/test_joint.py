@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded, unit
 
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.fit import joint as polish
 from spikecam_env.gap.fit.candidate import Fit, fit, predict
 from spikecam_env.gap.fit.gauss_newton import derivatives, moved
 from spikecam_env.gap.fit.joint import agree, polished
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.twins.budget import Effort
 
 NOTHING = Prediction(np.zeros(0), np.zeros(0), np.zeros(0))

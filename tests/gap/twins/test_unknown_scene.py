@@ -9,14 +9,14 @@ import pytest
 from small import CLEAR, MODEL, effect
 
 from spikecam_env.errors import InputError
+from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.baseline.off_nominal import off_nominal
 from spikecam_env.gap.candidates.table import testable as can_test
 from spikecam_env.gap.compare.distance import deviates
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import refittable
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.gap.parameters import off_nominal
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.unknown_scene import EXACT, likely_rates, missed_by, simulate_seen
 from spikecam_env.sensor import Effect, SensorModel, SpikeSensor

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from small import null, recorded
 
-from spikecam_env.gap.alarm import lent, rings
+from spikecam_env.gap.baseline.alarm import lent, rings
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.search import of_fit
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, TWINS, case_from, conditions, unit
 
+from spikecam_env.gap.baseline.halves_floor import floor_of_halves
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.floor import floor_of_halves
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.result import Gap
 from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.refit import unit_of

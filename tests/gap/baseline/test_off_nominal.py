@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from small import MODEL, effect, recorded
 
-from spikecam_env.gap.parameters import off_nominal, with_strengths
+from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
 from spikecam_env.gap.twins.fresh_units import width
 from spikecam_env.gap.unit.refit import unit_as_base
 

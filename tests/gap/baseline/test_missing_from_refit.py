@@ -9,7 +9,7 @@ import pytest
 from small import SHAPE, effect, recorded, unit
 
 from spikecam_env.gap import Dark, Flat
-from spikecam_env.gap.missing import LEAST_JITTER, missing
+from spikecam_env.gap.baseline.missing_from_refit import LEAST_JITTER, missing
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.twins.case import case_of

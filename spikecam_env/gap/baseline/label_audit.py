@@ -12,9 +12,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.null import model_null
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import BIN, Observation
 from spikecam_env.gap.statistics.film import light_film

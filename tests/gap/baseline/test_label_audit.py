@@ -9,8 +9,8 @@ import pytest
 from small import FRAMES, MODEL, SHAPE, case_from, conditions, effect, recorded, spikes_of
 
 from spikecam_env.gap import write_campaign
-from spikecam_env.gap.audit import audit, upheld, without
-from spikecam_env.gap.audit import relabelled as labelled
+from spikecam_env.gap.baseline.label_audit import audit, upheld, without
+from spikecam_env.gap.baseline.label_audit import relabelled as labelled
 from spikecam_env.gap.diagnose import read_case
 
 EFFECTS = [

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from small import TWINS, null
 
+from spikecam_env.gap.baseline.null_model import surer
 from spikecam_env.gap.compare.prediction import Draw, Null
-from spikecam_env.gap.null import surer
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.fresh_units import UNITS
 
