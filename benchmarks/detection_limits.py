@@ -23,8 +23,8 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.fit.candidate import with_pattern
 from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.screen.templates import FRAMES, SHAPE, load, standard_case
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.templates import FRAMES, SHAPE, load, standard_case
 from spikecam_env.gap.unit.usual import USUAL_NOISE
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from tests.hidden_world.catalogue import CATALOGUE as HIDDEN

@@ -18,7 +18,7 @@ from spikecam_env.gap.candidates.strength import bounded, is_linear, with_effect
 from spikecam_env.gap.candidates.table import CANDIDATES, candidate, is_pattern
 from spikecam_env.gap.compare.prediction import TOLERANCE
 from spikecam_env.gap.fit.candidate import predict
-from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.gap.screen.templates import load, standard_case
 from spikecam_env.gap.unit.indirect_inference import FURTHEST
 from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import CATALOGUE

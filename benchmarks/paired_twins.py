@@ -14,7 +14,7 @@ import numpy as np
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.gap.screen.templates import load, standard_case
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import CATALOGUE

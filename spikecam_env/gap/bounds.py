@@ -26,7 +26,7 @@ from spikecam_env.gap.compare.step import is_clear
 from spikecam_env.gap.fit.candidate import WANDER, concerned, predict, twins_of, with_pattern
 from spikecam_env.gap.fit.gauss_newton import settled_there
 from spikecam_env.gap.result import Bound
-from spikecam_env.gap.templates import Templates
+from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import UNITS
 from spikecam_env.gap.unit.indirect_inference import shifted

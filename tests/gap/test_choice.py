@@ -14,7 +14,7 @@ from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
-from spikecam_env.gap.screen import Screened
+from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import (
     FREE,
     GAIN,

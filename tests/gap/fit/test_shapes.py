@@ -11,7 +11,7 @@ from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.gauss_newton import broyden
 from spikecam_env.gap.fit.shapes import has_shapes, shaped, worth_shaping
-from spikecam_env.gap.screen import Screened
+from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import other_ends
 
 

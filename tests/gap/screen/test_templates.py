@@ -12,10 +12,10 @@ from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET
 from spikecam_env.gap.compare.distance import misfit
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.screen import Screened, screen
+from spikecam_env.gap.screen.screen import Screened, screen
+from spikecam_env.gap.screen.templates import TIMES, load
 from spikecam_env.gap.search import loud, other_shapes, worth_fitting
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.templates import TIMES, load
 from spikecam_env.sensor import CATALOGUE
 
 

@@ -18,8 +18,8 @@ from spikecam_env.gap.compare.distance import misfit
 from spikecam_env.gap.compare.prediction import TOLERANCE, Null, of_a_pair, pooled
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.screen.templates import Template, Templates
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.templates import Template, Templates
 from spikecam_env.sensor import CATALOGUE
 
 Array = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """What each candidate does to the statistics bank, simulated beforehand on the standard design: to screen by.
 
-    python -m spikecam_env.gap.templates          rebuilds them (resumable)
+    python -m spikecam_env.gap.screen.templates          rebuilds them (resumable)
 
 A template is a direction, in noise, at a strength that shows clearly; as statistics bend where an effect is severe,
 there are others of TIMES as much.  Screening (`screen`) scales the one that suits best to what was measured.
@@ -94,7 +94,7 @@ class Templates:
 
 def load() -> Templates:
     """The shipped templates."""
-    with resources.as_file(resources.files("spikecam_env.gap") / FILE) as path, np.load(path) as file:
+    with resources.as_file(resources.files(__package__) / FILE) as path, np.load(path) as file:
         about = json.loads(str(file["about"]))
         shifts, noise = file["shift"].astype(np.float64), file["noise"].astype(np.float64)
     entries = tuple(Template(**e, shift=s) for e, s in zip(about["entries"], shifts, strict=True))

@@ -12,7 +12,7 @@ from dataclasses import replace
 from spikecam_env.gap.baseline.null_model import unit_under
 from spikecam_env.gap.candidates.table import is_pattern
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.templates import Templates, simulated, starts
+from spikecam_env.gap.screen.templates import Templates, simulated, starts
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.sensor import SensorModel
 
