@@ -1,1 +1,1 @@
-"""Before anything is searched: what the model as given predicts, what recordings contradict, and what the refit had to move."""
+"""Before a search: what the model as given predicts, what recordings contradict, what the refit had to move."""
