@@ -36,7 +36,7 @@ from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import Templates, load
-from spikecam_env.gap.search import of_fit
+from spikecam_env.gap.search.forward import of_fit
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import at_any_phase
 from spikecam_env.sensor import SensorModel, SpikeSensor

@@ -36,7 +36,7 @@ from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.gap.screen.own_templates import own_templates
 from spikecam_env.gap.screen.templates import Templates, load
-from spikecam_env.gap.search import Round, of_fit, search
+from spikecam_env.gap.search.forward import Round, of_fit, search
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order

@@ -29,7 +29,7 @@ from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import in_order, read_case
 from spikecam_env.gap.screen.templates import load
-from spikecam_env.gap.search import of_fit, search
+from spikecam_env.gap.search.forward import of_fit, search
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.sensor import Effect, SensorModel

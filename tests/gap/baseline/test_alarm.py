@@ -8,7 +8,7 @@ from small import null, recorded
 
 from spikecam_env.gap.baseline.alarm import lent, rings
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.search import of_fit
+from spikecam_env.gap.search.forward import of_fit
 
 
 def test_steady_light_held_out_is_not_lent_since_the_unit_would_be_another():

@@ -17,7 +17,7 @@ from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.fit import candidate as fit_module
 from spikecam_env.gap.fit.candidate import concerned, fit, predict, slope_between, with_held_out
-from spikecam_env.gap.search import standing_on
+from spikecam_env.gap.search.forward import standing_on
 from spikecam_env.gap.twins.fresh_units import spread_factor
 from spikecam_env.gap.unit.indirect_inference import moved_by
 from spikecam_env.gap.unit.refit import within

@@ -12,7 +12,7 @@ from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.gauss_newton import broyden
 from spikecam_env.gap.fit.shapes import has_shapes, shaped, worth_shaping
 from spikecam_env.gap.screen.screen import Screened
-from spikecam_env.gap.search import other_ends
+from spikecam_env.gap.search.forward import other_ends
 
 
 @pytest.mark.parametrize("start", [0.4, 2.5])

@@ -14,7 +14,7 @@ from spikecam_env.gap.compare.distance import misfit
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.screen.screen import Screened, screen
 from spikecam_env.gap.screen.templates import TIMES, load
-from spikecam_env.gap.search import loud, other_shapes, worth_fitting
+from spikecam_env.gap.search.forward import loud, other_shapes, worth_fitting
 from spikecam_env.gap.statistics import Key
 from spikecam_env.sensor import CATALOGUE
 

@@ -12,13 +12,22 @@ import small
 from small import effect, recorded
 
 from spikecam_env.cli.diagnose import Diagnose
-from spikecam_env.gap import search as searching
 from spikecam_env.gap.baseline.off_nominal import Off
 from spikecam_env.gap.compare.distance import judged, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.fit import joint as polish
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.search import BESIDE, SECOND, Round, cancelling, joined, may_be_rejoined, may_be_shaped, revisited
+from spikecam_env.gap.search import forward as searching
+from spikecam_env.gap.search.forward import (
+    BESIDE,
+    SECOND,
+    Round,
+    cancelling,
+    joined,
+    may_be_rejoined,
+    may_be_shaped,
+    revisited,
+)
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
 from spikecam_env.gap.verdict import concluded

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from small import MODEL, effect, recorded, unit
 
-from spikecam_env.gap import search
 from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.screen.screen import Screened
-from spikecam_env.gap.search import (
+from spikecam_env.gap.search import forward as search
+from spikecam_env.gap.search.forward import (
     FREE,
     GAIN,
     HINT,
@@ -30,6 +29,7 @@ from spikecam_env.gap.search import (
     settle,
     shows,
 )
+from spikecam_env.gap.search.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.gap.verdict import explains, harmless

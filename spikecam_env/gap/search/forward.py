@@ -26,10 +26,10 @@ from spikecam_env.gap.fit.confirm import AGAIN, FINAL, confirmed, made_sure, of_
 from spikecam_env.gap.fit.gauss_newton import PROBED
 from spikecam_env.gap.fit.joint import Errors, no_surer, polished, simulated_for
 from spikecam_env.gap.fit.shapes import shaped, worth_shaping
-from spikecam_env.gap.opposed import PAIR, opposed
-from spikecam_env.gap.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.screen.screen import Screened, screen
 from spikecam_env.gap.screen.templates import Templates
+from spikecam_env.gap.search.cancelling_pair import PAIR, opposed
+from spikecam_env.gap.search.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit, within

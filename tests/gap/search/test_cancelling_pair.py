@@ -8,9 +8,9 @@ from small import MODEL, TWINS, effect, recorded
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.opposed import PAIR, opposed
 from spikecam_env.gap.screen.templates import load
-from spikecam_env.gap.search import of_fit, search
+from spikecam_env.gap.search.cancelling_pair import PAIR, opposed
+from spikecam_env.gap.search.forward import of_fit, search
 
 TAU_US = 2.0
 CANCELLING = (effect("dead_time", tau_us=TAU_US), effect("photo_response_nonlinearity", beta=-TAU_US / 25.0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.rivals import LEAST, is_rival, lead
+from spikecam_env.gap.search.rivals import LEAST, is_rival, lead
 from spikecam_env.gap.statistics import Key
 
 COUNT, TWINS = 200, 12
