@@ -27,7 +27,6 @@ from spikecam_env.gap.baseline.label_audit import Contradiction, audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing, with_all
 from spikecam_env.gap.baseline.null_model import model_null, unit_under
 from spikecam_env.gap.baseline.off_nominal import Off, off_nominal
-from spikecam_env.gap.bounds import bounds
 from spikecam_env.gap.candidates.table import chosen, is_pattern, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.evidence import evidence_of
@@ -42,7 +41,8 @@ from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import counted_anew, nominal_per_label, said_of
 from spikecam_env.gap.unit.refit import within
-from spikecam_env.gap.verdict import concluded, grounded, harmless
+from spikecam_env.gap.verdict.bounds import bounds
+from spikecam_env.gap.verdict.verdict import concluded, grounded, harmless
 from spikecam_env.gap.words import sentence, unfinished
 from spikecam_env.sensor import SensorModel
 

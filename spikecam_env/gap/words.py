@@ -9,6 +9,7 @@ import math
 from spikecam_env.errors import InputError
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Gap, NamedEffect
 from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.verdict.notes import HELD_OUT_ALONE, LENT
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.catalogue_page import Sheet
 
@@ -86,19 +87,6 @@ def law(effect: str) -> str:
     """The effect's equation, as its file has it."""
     found = sheet(effect)
     return inspect.cleandoc(found.law) if found else ""
-
-
-LENT = (
-    "Within the errors of their fit, parameters were told by the recordings held out as well: "
-    "the gap on them is a fit, and no check."
-)
-"""A note on the data of a diagnosis: where the recordings to fit left something open."""
-
-HELD_OUT_ALONE = (
-    "The recordings to fit agree with the model, as given or with what was found first, and those held out do not. "
-    "What moves among them was fitted: the gap on it is a fit, and no check."
-)
-"""A note on the data of a diagnosis: where nothing else shows what is missing."""
 
 
 def unfinished(effort: Effort) -> list[str]:

@@ -14,7 +14,7 @@ from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.result import Gap
 from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.refit import unit_of
-from spikecam_env.gap.verdict import grounded
+from spikecam_env.gap.verdict.verdict import grounded
 from spikecam_env.streams import unpack_frames
 
 

@@ -32,7 +32,7 @@ from spikecam_env.gap.search.forward import (
 from spikecam_env.gap.search.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Effort
-from spikecam_env.gap.verdict import explains, harmless
+from spikecam_env.gap.verdict.verdict import explains, harmless
 
 COUNT, TWINS = 200, 12
 DEAD_TIME = effect("dead_time", tau_us=0.2)

@@ -30,7 +30,7 @@ from spikecam_env.gap.search.forward import (
 )
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
-from spikecam_env.gap.verdict import concluded
+from spikecam_env.gap.verdict.verdict import concluded
 from spikecam_env.gap.words import sentence, unfinished
 
 

@@ -17,12 +17,12 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.place import when, where
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.search.forward import BESIDE, SECOND, Round
-from spikecam_env.gap.structure import structure
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.words import HELD_OUT_ALONE, LENT
+from spikecam_env.gap.verdict.notes import HELD_OUT_ALONE, LENT
+from spikecam_env.gap.verdict.structure import structure
+from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -11,7 +11,6 @@ from small import MODEL, effect
 
 from spikecam_env.gap import Bars, Dark, Flat
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.bounds import EVENTS, Score, Tried, _OfTwins, bounds, first_tried
 from spikecam_env.gap.candidates.table import expected_events
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.observe.conditions import planned
@@ -20,6 +19,7 @@ from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import load
 from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.gap.twins.case import Case, case_of
+from spikecam_env.gap.verdict.bounds import EVENTS, Score, Tried, _OfTwins, bounds, first_tried
 from spikecam_env.gap.words import at_most, bounded_parameter
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.distance import HEAVY
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.place import when, where
 from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.verdict.where_and_when import when, where
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from small import FRAMES, SHAPE, case_from, effect, recorded, spikes_of
 
-from spikecam_env.gap.place import when, where
+from spikecam_env.gap.verdict.where_and_when import when, where
 
 SOME = [
     effect("spurious_spikes", probability=0.002),
