@@ -11,7 +11,7 @@ from spikecam_env.gap.campaign.real_files import import_campaign
 from spikecam_env.gap.campaign.recording_kinds import KINDS, Bars, Dark, Disk, Flat, MaskedRows, Planned, Step
 from spikecam_env.gap.diagnose import diagnose
 from spikecam_env.gap.ladder import ladder
-from spikecam_env.gap.report import write_report
+from spikecam_env.gap.report.page import write_report
 from spikecam_env.gap.result import Diagnosis
 
 __all__ = [

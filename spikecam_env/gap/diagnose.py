@@ -29,9 +29,10 @@ from spikecam_env.gap.baseline.null_model import model_null, unit_under
 from spikecam_env.gap.baseline.off_nominal import Off, off_nominal
 from spikecam_env.gap.candidates.table import chosen, is_pattern, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.evidence import evidence_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
+from spikecam_env.gap.report.evidence import evidence_of
+from spikecam_env.gap.report.words import sentence, unfinished
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.gap.screen.own_templates import own_templates
 from spikecam_env.gap.screen.templates import Templates, load
@@ -43,7 +44,6 @@ from spikecam_env.gap.unit.label_unit import counted_anew, nominal_per_label, sa
 from spikecam_env.gap.unit.refit import within
 from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.gap.verdict.verdict import concluded, grounded, harmless
-from spikecam_env.gap.words import sentence, unfinished
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
-from spikecam_env.gap import plots
 from spikecam_env.gap.baseline.alarm import rings
 from spikecam_env.gap.baseline.missing_from_refit import Missing, missing, with_all
 from spikecam_env.gap.baseline.null_model import model_null
@@ -28,6 +27,7 @@ from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import in_order, read_case
+from spikecam_env.gap.report import plots
 from spikecam_env.gap.screen.templates import load
 from spikecam_env.gap.search.forward import of_fit, search
 from spikecam_env.gap.twins.case import Case
@@ -160,7 +160,7 @@ def judged(case: Case, null: Null, values: Array, mean: Array, model: SensorMode
 
 def said(rung: Rung) -> str:
     """A rung in a line: its effect and how large it is."""
-    from spikecam_env.gap.words import human, quantity, unit_of
+    from spikecam_env.gap.report.words import human, quantity, unit_of
 
     if rung.added is None:
         return rung.model.name

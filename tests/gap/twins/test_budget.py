@@ -17,6 +17,7 @@ from spikecam_env.gap.compare.distance import judged, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.fit import joint as polish
 from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.report.words import sentence, unfinished
 from spikecam_env.gap.search import forward as searching
 from spikecam_env.gap.search.forward import (
     BESIDE,
@@ -31,7 +32,6 @@ from spikecam_env.gap.search.forward import (
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
 from spikecam_env.gap.verdict.verdict import concluded
-from spikecam_env.gap.words import sentence, unfinished
 
 
 def test_nothing_is_left_out_while_there_is_less_than_the_most():

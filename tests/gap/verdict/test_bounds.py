@@ -15,12 +15,12 @@ from spikecam_env.gap.candidates.table import expected_events
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
+from spikecam_env.gap.report.words import at_most, bounded_parameter
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import load
 from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.verdict.bounds import EVENTS, Score, Tried, _OfTwins, bounds, first_tried
-from spikecam_env.gap.words import at_most, bounded_parameter
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames
 

@@ -14,12 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.gap import plots
-from spikecam_env.gap.evidence import Maps, shape_of
-from spikecam_env.gap.exhibits import LOUD, Exhibit, by_loudness, exhibits
-from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect
-from spikecam_env.gap.twins.budget import CAMPAIGNS
-from spikecam_env.gap.words import (
+from spikecam_env.gap.report import plots
+from spikecam_env.gap.report.evidence import Maps, shape_of
+from spikecam_env.gap.report.exhibits import LOUD, Exhibit, by_loudness, exhibits
+from spikecam_env.gap.report.words import (
     CONFIDENCE,
     VERDICTS,
     at_most,
@@ -34,6 +32,8 @@ from spikecam_env.gap.words import (
     sizes,
     unit_of,
 )
+from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect
+from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.page import captioned, element, page, picture, table
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.version import __version__

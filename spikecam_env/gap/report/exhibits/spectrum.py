@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from spikecam_env.gap.evidence import Array, Panel, loudest, takes
+from spikecam_env.gap.report.evidence import Array, Panel, loudest, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Spectrum of the population"

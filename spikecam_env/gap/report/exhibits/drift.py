@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from spikecam_env.gap.evidence import Panel, loudest, over_pixels, takes
 from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.report.evidence import Panel, loudest, over_pixels, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Through the recording"

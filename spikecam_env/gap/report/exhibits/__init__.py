@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from spikecam_env.gap.evidence import Maps, Panel
-from spikecam_env.gap.exhibits import (
+from spikecam_env.gap.report.evidence import Maps, Panel
+from spikecam_env.gap.report.exhibits import (
     clock,
     drift,
     intervals,

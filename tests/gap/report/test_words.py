@@ -7,8 +7,8 @@ from dataclasses import replace
 import made_up
 import pytest
 
+from spikecam_env.gap.report.words import bare, quantity, sentence, unit_of
 from spikecam_env.gap.verdict.notes import LENT
-from spikecam_env.gap.words import bare, quantity, sentence, unit_of
 from spikecam_env.sensor import CATALOGUE
 
 

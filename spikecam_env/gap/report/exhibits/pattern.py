@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from spikecam_env.gap.evidence import Array, Maps, Panel, shape_of
+from spikecam_env.gap.report.evidence import Array, Maps, Panel, shape_of
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Fixed pattern"

@@ -14,12 +14,12 @@ import made_up
 import numpy as np
 import pytest
 
-from spikecam_env.gap.exhibits import by_loudness, exhibits
-from spikecam_env.gap.exhibits.spectrum import averaged, panels
-from spikecam_env.gap.exhibits.step import free_window
-from spikecam_env.gap.report import command_of, report, write_report
+from spikecam_env.gap.report.exhibits import by_loudness, exhibits
+from spikecam_env.gap.report.exhibits.spectrum import averaged, panels
+from spikecam_env.gap.report.exhibits.step import free_window
+from spikecam_env.gap.report.page import command_of, report, write_report
+from spikecam_env.gap.report.words import at_most
 from spikecam_env.gap.result import VERDICTS
-from spikecam_env.gap.words import at_most
 from spikecam_env.sensor import SensorModel
 
 VOID = {"meta", "img", "br", "link"}

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.evidence import Array, Panel, against_before, by_recording, loudest, takes
 from spikecam_env.gap.observe.conditions import STATIC
 from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.report.evidence import Array, Panel, against_before, by_recording, loudest, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Rows and columns in time"
