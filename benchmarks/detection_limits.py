@@ -4,9 +4,9 @@
 
 Limit: the strength at which the statistic that shows the effect best stands CLEAR noises off, in 64 x 64 pixels and
 8000 frames of the standard design: recordings to fit, and held-out ones in motion, which may ring the alarm as well
-(`gap.alarm`); over some 450 statistics it rings from about 4.2.  Effects in time are scaled from their template; those
-of the pattern, whose statistics are not in proportion, are searched for by drawing units; noise of a reset shows where
-it is more than units differ by.  The base model's own effects are not among them: they are hidden from `ideal`.
+(`baseline.alarm`); over some 450 statistics it rings from about 4.2.  Effects in time are scaled from their template;
+those of the pattern, whose statistics are not in proportion, are searched for by drawing units; noise of a reset shows
+where it is more than units differ by.  The base model's own effects are not among them: they are hidden from `ideal`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the noise of statistics is worth that twelve twins tell: as they scatter, and moderated (`gap.moderate`).
+"""What the noise of statistics is worth that twelve twins tell: as they scatter, and moderated (`pooled_variance`).
 
     python -m benchmarks.moderated_variances
 

@@ -1,8 +1,8 @@
 """The ladder: from a model that lacks nearly everything to one that leaves nothing, an effect a rung.
 
-What the free refit needed and the model has no effect for (`missing`) is added one after another, each time the one
-that takes away most; then the search for effects goes on as in a diagnosis.  Every rung is judged on the same held-out
-statistics, in the noise of the last.
+What the free refit needed and the model has no effect for (`missing_from_refit`) is added one after another, each
+time the one that takes away most; then the search for effects goes on as in a diagnosis.  Every rung is judged on the
+same held-out statistics, in the noise of the last.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
     """The prediction of `count` twins, and of recordings in motion as many again: of their statistics there is one of
-    a kind, and no other recording tells how much it varies (`moderate`)."""
+    a kind, and no other recording tells how much it varies (`pooled_variance`)."""
     base = unit_under(case, model)
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
     made = twins(case, model, base, range(count))

@@ -32,7 +32,7 @@ class Off:
 def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> Off:
     """Strengths of effects in the model that the unit `base` has in another amount than units differ by.
 
-    Not of scenes alone: in recordings so short the refit of jitter is a fifth too small (`templates.model_null`).
+    Not of scenes alone: in recordings so short the refit of jitter is a fifth too small (`null_model.model_null`).
     """
     if case.scenes_only:
         return Off({}, base)

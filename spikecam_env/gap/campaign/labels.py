@@ -3,7 +3,7 @@
 0.2                 even, steady light of that radiance; 0 is dark
 unknown             a static scene of unknown light
 steps.npz           light over time, `frame` (K,) and `radiance` (K, H, W) or broadcastable, as in a campaign
-relative            (flat maps only) the unit itself is the light meter, see `imports`
+relative            (flat maps only) the unit itself is the light meter, see `real_files`
 """
 
 from __future__ import annotations

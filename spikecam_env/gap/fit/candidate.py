@@ -56,7 +56,7 @@ MANY = 240
 class Fit:
     """A candidate at its best.  parameters, sd: by name.  prediction: what it gives; base: its unit.
 
-    rho: (S,) what it leaves, in noise.  misfit: `compare.judged`.
+    rho: (S,) what it leaves, in noise.  misfit: `distance.judged`.
     """
 
     name: str

@@ -168,7 +168,7 @@ def settled_there(
 
 
 def as_told(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:
-    """`fit.as_seen`, but for an s^2 that is fitted."""
+    """`candidate.as_seen`, but for an s^2 that is fitted."""
     there = as_seen(model, within(model, base), null, made)
     return replace(there, white=base.white) if WHITE in free else there
 

@@ -112,7 +112,7 @@ def _lack(name: str) -> str:
 
 
 def off_usual(case: Maps, state: State) -> dict[str, dict[str, float]]:
-    """Spreads of the model that this unit has in another amount than units differ by: as `parameters.off_nominal`."""
+    """Spreads of the model that this unit has in another amount than units differ by: as `baseline.off_nominal`."""
     found = {}
     for what, factor in state.factors.items():
         if 1 / USUAL < factor < USUAL:

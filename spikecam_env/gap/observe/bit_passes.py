@@ -1,4 +1,4 @@
-"""The passes over a recording's bits, compiled: pixel by pixel, and frame by frame.  What they fill is in `observe`."""
+"""The passes over a recording's bits, compiled: pixel by pixel, and frame by frame.  `observation` has what they fill."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ STILL = ("dark", "flat", "picture", "unknown")
 class Reading:
     """One campaign, measured or simulated.  base: refitted from these observations and no others.
 
-    films: of moving light, by recording (`moving.films`).
+    films: of moving light, by recording (`film.films`).
     """
 
     observations: Sequence[Observation]

@@ -45,7 +45,7 @@ def simulate_seen(
     takes: Sequence[int],
     jobs: int = 1,
 ) -> list[Observation]:
-    """As `twin.simulate`, with unknown scenes lit so that their pixels fire as in `seen`, `jobs` recordings at once.
+    """As `simulate`, with unknown scenes lit so that their pixels fire as in `seen`, `jobs` recordings at once.
 
     Those that take longest are begun first, what moves and then what is bright: no thread waits for one at the end.
     """

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 HIDDEN = 0.5
 """Share of a refit's s^2 that is the unit's own, below which it stays: beside so much noise of an effect, the refit of
-twins does not tell it (`polish` does, by all statistics)."""
+twins does not tell it (`fit.joint` does, by all statistics)."""
 
 STILL = 3e-4
 """Relative move of a unit's gain up to which its twins say what an effect does: where pixels saturate, statistics are

@@ -17,7 +17,7 @@ def test_no_group_alarms_where_nothing_is_missing(seed):
 
 
 def test_every_group_says_something_of_the_small_design():
-    """But for `clock`, which is of unknown scenes (test_scene.py)."""
+    """But for `clock`, which is of unknown scenes (test_unknown_scene.py)."""
     assert {k.group for k in null().keys} == {*GROUPS, "pattern"} - {"clock"}
 
 
