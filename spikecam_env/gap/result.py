@@ -93,7 +93,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Bound:
-    """Upper bound (95 %, `verdict.bounds`) of an effect that was not found.  at: its other parameters there, by name."""
+    """Upper bound (95 %, `verdict.bounds`) of an effect not found.  at: its other parameters there, by name."""
 
     name: str
     parameter: str

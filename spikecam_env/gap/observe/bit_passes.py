@@ -1,4 +1,4 @@
-"""The passes over a recording's bits, compiled: pixel by pixel, and frame by frame.  `observation` has what they fill."""
+"""The passes over a recording's bits, compiled: pixel by pixel, and frame by frame.  They fill an `Observation`."""
 
 from __future__ import annotations
 

@@ -193,8 +193,9 @@ def gap_of(case: Case, null: Null, values: Array, given: Array, after: Predictio
 
 
 def grounded(gap: Gap, floor: float) -> Gap:
-    """A gap with its floor: what chance alone makes of it (`halves_floor`), or 1 where that is not known, or where halves
-    of a recording differ by more than chance: the camera changes with time, and the floor would hold what is sought."""
+    """A gap with its floor: what chance alone makes of it (`halves_floor`), or 1 where that is not known, or where
+    halves of a recording differ by more than chance: the camera changes with time, and the floor would hold what is to
+    be found."""
     ground = min(floor, 1.0) if np.isfinite(floor) else 1.0
     removed = (gap.before - gap.after) / (gap.before - ground) if gap.before > 1.5 * ground else 0.0
     by = {name: {**values, "floor": ground} for name, values in gap.by_recording.items()}
