@@ -130,7 +130,8 @@ def map_limits(values: Array) -> tuple[float, float]:
 def strip(statistics: Sequence[Statistic]) -> Figure:
     """z of every statistic by group, before and after; loudest group on top."""
     patched = any(s.after != s.before for s in statistics)
-    groups = sorted({s.group for s in statistics}, key=lambda g: max(abs(s.z) for s in statistics if s.group == g))
+    there = dict.fromkeys(s.group for s in statistics)
+    groups = sorted(there, key=lambda g: max(abs(s.z) for s in statistics if s.group == g))
     with mpl.rc_context(_FONTS):
         figure, axis = _plot(0.8 + 0.36 * len(groups), groups, top=0.08)
         axis.axvspan(-3, 3, color=BAND, lw=0, zorder=0)

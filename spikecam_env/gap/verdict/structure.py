@@ -51,9 +51,10 @@ def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
 
 
 def _exponent(null: Null, off: Array, kind: dict[str, str], level: dict[str, float]) -> float | None:
-    """Slope of log |statistic| on log level over the flats, of the statistic that is seen on most of them."""
+    """Slope of log |statistic| on log level over the flats, of the statistic that is seen on most of them, the
+    first of several."""
     best: tuple[float, float] | None = None
-    for group, name in {(k.group, k.name) for k in null.keys}:
+    for group, name in dict.fromkeys((k.group, k.name) for k in null.keys):
         points = [
             (level[k.recording], abs(o) * n)
             for k, o, n in zip(null.keys, off, null.noise, strict=True)
