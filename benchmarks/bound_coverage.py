@@ -26,19 +26,19 @@ from tqdm import tqdm
 
 from spikecam_env.cli.table import table
 from spikecam_env.gap import Bars, Dark, Flat, Step
-from spikecam_env.gap.alarm import rings
-from spikecam_env.gap.bounds import bounds
-from spikecam_env.gap.candidates import chosen, testable
-from spikecam_env.gap.case import Case, case_of
-from spikecam_env.gap.compare import Null, values_of
-from spikecam_env.gap.null import model_null
-from spikecam_env.gap.observe import observe
+from spikecam_env.gap.baseline.alarm import rings
+from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.candidates.strength import bounded, may_be_negative, with_effect
+from spikecam_env.gap.candidates.table import chosen, testable
+from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound
-from spikecam_env.gap.search import of_fit
-from spikecam_env.gap.strength import bounded, may_be_negative, with_effect
-from spikecam_env.gap.templates import Templates, load
-from spikecam_env.gap.twin import at_any_phase
-from spikecam_env.gap.world import planned
+from spikecam_env.gap.screen.templates import Templates, load
+from spikecam_env.gap.search.forward import of_fit
+from spikecam_env.gap.twins.case import Case, case_of
+from spikecam_env.gap.twins.simulate import at_any_phase
+from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 from spikecam_env.whole import write_text_whole

@@ -4,9 +4,9 @@
 
 Limit: the strength at which the statistic that shows the effect best stands CLEAR noises off, in 64 x 64 pixels and
 8000 frames of the standard design: recordings to fit, and held-out ones in motion, which may ring the alarm as well
-(`gap.alarm`); over some 450 statistics it rings from about 4.2.  Effects in time are scaled from their template; those
-of the pattern, whose statistics are not in proportion, are searched for by drawing units; noise of a reset shows where
-it is more than units differ by.  The base model's own effects are not among them: they are hidden from `ideal`.
+(`baseline.alarm`); over some 450 statistics it rings from about 4.2.  Effects in time are scaled from their template;
+those of the pattern, whose statistics are not in proportion, are searched for by drawing units; noise of a reset shows
+where it is more than units differ by.  The base model's own effects are not among them: they are hidden from `ideal`.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.campaign import standard_design
-from spikecam_env.gap.candidates import candidate, is_pattern
-from spikecam_env.gap.fit import with_pattern
-from spikecam_env.gap.parameters import USUAL_NOISE
+from spikecam_env.gap.campaign.design import standard_design
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import candidate, is_pattern
+from spikecam_env.gap.fit.candidate import with_pattern
+from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.screen.templates import FRAMES, SHAPE, load, standard_case
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.strength import bounded, with_effect
-from spikecam_env.gap.templates import FRAMES, SHAPE, load, standard_case
-from spikecam_env.gap.world import planned
+from spikecam_env.gap.unit.usual import USUAL_NOISE
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from tests.hidden_world.catalogue import CATALOGUE as HIDDEN
 

@@ -1,4 +1,4 @@
-"""Whether statistics go with the strength of an effect as far as `gap.strength.AS_LOUD` takes them to.
+"""Whether statistics go with the strength of an effect as far as `candidates.strength.AS_LOUD` takes them to.
 
     python -m benchmarks.in_proportion [PRESET ...]      by default scsim and physical, whose noise is smaller
 
@@ -14,13 +14,13 @@ import sys
 
 import numpy as np
 
-from spikecam_env.gap.candidates import CANDIDATES, candidate, is_pattern
-from spikecam_env.gap.compare import TOLERANCE
-from spikecam_env.gap.fit import predict
-from spikecam_env.gap.refit import within
-from spikecam_env.gap.settle import FURTHEST
-from spikecam_env.gap.strength import bounded, is_linear, with_effect
-from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.gap.candidates.strength import bounded, is_linear, with_effect
+from spikecam_env.gap.candidates.table import CANDIDATES, candidate, is_pattern
+from spikecam_env.gap.compare.prediction import TOLERANCE
+from spikecam_env.gap.fit.candidate import predict
+from spikecam_env.gap.screen.templates import load, standard_case
+from spikecam_env.gap.unit.indirect_inference import FURTHEST
+from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import CATALOGUE
 
 PEAK, TWINS = 15.0, 4

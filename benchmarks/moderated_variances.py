@@ -1,4 +1,4 @@
-"""What the noise of statistics is worth that twelve twins tell: as they scatter, and moderated (`gap.moderate`).
+"""What the noise of statistics is worth that twelve twins tell: as they scatter, and moderated (`pooled_variance`).
 
     python -m benchmarks.moderated_variances
 
@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from tqdm import tqdm
 
-from spikecam_env.gap.alarm import ALARM
-from spikecam_env.gap.case import twins
-from spikecam_env.gap.compare import GATE, Null, adjusted, deviates, null_of
-from spikecam_env.gap.refit import within
-from spikecam_env.gap.templates import standard_case
+from spikecam_env.gap.baseline.alarm import ALARM
+from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
+from spikecam_env.gap.compare.prediction import Null, null_of
+from spikecam_env.gap.screen.templates import standard_case
+from spikecam_env.gap.twins.case import twins
+from spikecam_env.gap.unit.refit import within
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""How much noise is left of two twins of the same draws, one with an effect and one without: `gap.compare.PAIRED`.
+"""How much noise is left of two twins of the same draws, one with an effect and one without: `prediction.PAIRED`.
 
     python -m benchmarks.paired_twins
 
@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.candidates import candidate
-from spikecam_env.gap.case import twins
-from spikecam_env.gap.compare import values_of
-from spikecam_env.gap.refit import within
-from spikecam_env.gap.strength import bounded, with_effect
-from spikecam_env.gap.templates import load, standard_case
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.prediction import values_of
+from spikecam_env.gap.screen.templates import load, standard_case
+from spikecam_env.gap.twins.case import twins
+from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import CATALOGUE
 
 PEAK, PAIRS = 20.0, 4

@@ -9,7 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from spikecam_env.calibration import read_campaign, write_flats
+from spikecam_env.calibration import write_flats
+from spikecam_env.campaign import read_campaign
 from spikecam_env.cli.main import run
 from spikecam_env.datasets import verify
 from spikecam_env.errors import InputError

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from spikecam_env.calibration.campaign import Campaign
-from spikecam_env.calibration.takes import Take, own_v_d, record_takes
+from spikecam_env.campaign.reading import Campaign
+from spikecam_env.campaign.takes import Take, own_v_d, record_takes
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes, SensorModel
 

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.campaign import Campaign, CampaignRecording, read_campaign
 from spikecam_env.calibration.charge import ChargeScale, charge_at_one_v_d, charge_at_two_v_d
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
 from spikecam_env.calibration.population import FLAGS, pixel_flags
 from spikecam_env.calibration.response import Lines, Rates, fit_lines, rates_from_counts, rates_from_times, together
 from spikecam_env.calibration.spike_times import STEPS, SpikeTimes, spike_times
+from spikecam_env.campaign.reading import Campaign, CampaignRecording, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Circuit
 

@@ -96,7 +96,7 @@ def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequenc
     """`spikecam diagnose` as a trial wants it, its report included."""
     try:
         from spikecam_env.gap.diagnose import diagnose
-        from spikecam_env.gap.report import write_report
+        from spikecam_env.gap.report.page import write_report
     except ImportError as error:
         raise ImportError(f"this checkout has no spikecam_env.gap.diagnose to be tried ({error})") from error
     found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, progress=False)

@@ -31,7 +31,8 @@ class Calibrate:
     """Read files of the campaign that lie outside of its folder too."""
 
     def run(self) -> None:
-        from spikecam_env.calibration import calibrate, findings, read_campaign, save_calibration
+        from spikecam_env.calibration import calibrate, findings, save_calibration
+        from spikecam_env.campaign import read_campaign
         from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.table import table
 

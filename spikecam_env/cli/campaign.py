@@ -13,7 +13,7 @@ from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
 from spikecam_env.cli.reading import Reading
 
 if TYPE_CHECKING:
-    from spikecam_env.calibration import Campaign
+    from spikecam_env.campaign import Campaign
 
 Repeated = tyro.conf.UseAppendAction[tuple[str, ...]]
 

@@ -41,7 +41,7 @@ class Diagnose:
     """Read files of the campaign that lie outside of its folder too."""
 
     def run(self) -> None:
-        from spikecam_env.calibration import read_campaign
+        from spikecam_env.campaign import read_campaign
         from spikecam_env.cli.files import out_folder
         from spikecam_env.sensor import SensorModel
 
@@ -49,7 +49,7 @@ class Diagnose:
         self._known_effects()
         campaign = read_campaign(self.campaign, outside=True) if self.outside else self.campaign
         from spikecam_env.gap.diagnose import diagnose
-        from spikecam_env.gap.report import write_report
+        from spikecam_env.gap.report.page import write_report
 
         with out_folder(self.out) as folder:
             diagnosis = diagnose(
@@ -79,7 +79,7 @@ class Diagnose:
 def summary(diagnosis: Diagnosis) -> str:
     """The verdict, what was found with its parameters, and the gap, for a terminal."""
     from spikecam_env.cli.table import table
-    from spikecam_env.gap.words import gap_line
+    from spikecam_env.gap.report.words import gap_line
 
     parts = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
     found = _found(diagnosis)
@@ -97,7 +97,7 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
-    from spikecam_env.gap.words import at_most, bare, bounded_parameter, quantity, unit_of
+    from spikecam_env.gap.report.words import at_most, bare, bounded_parameter, quantity, unit_of
 
     rows = [
         {

@@ -31,7 +31,7 @@ class Ladder:
     """Read files of the campaign that lie outside of its folder too."""
 
     def run(self) -> None:
-        from spikecam_env.calibration import read_campaign
+        from spikecam_env.campaign import read_campaign
         from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SensorModel

@@ -4,14 +4,14 @@
 that the package's attribute is the function whichever is imported first.
 """
 
-from spikecam_env.calibration import Campaign, CampaignRecording, read_campaign
-from spikecam_env.gap.campaign import second_voltage, standard_design, write_campaign
+from spikecam_env.campaign import Campaign, CampaignRecording, read_campaign
+from spikecam_env.gap.campaign.design import second_voltage, standard_design, write_campaign
+from spikecam_env.gap.campaign.labels import Label, label_from_text, labels_from_table
+from spikecam_env.gap.campaign.real_files import import_campaign
+from spikecam_env.gap.campaign.recording_kinds import KINDS, Bars, Dark, Disk, Flat, MaskedRows, Planned, Step
 from spikecam_env.gap.diagnose import diagnose
-from spikecam_env.gap.imports import import_campaign
-from spikecam_env.gap.labels import Label, label_from_text, labels_from_table
 from spikecam_env.gap.ladder import ladder
-from spikecam_env.gap.recordings import KINDS, Bars, Dark, Disk, Flat, MaskedRows, Planned, Step
-from spikecam_env.gap.report import write_report
+from spikecam_env.gap.report.page import write_report
 from spikecam_env.gap.result import Diagnosis
 
 __all__ = [

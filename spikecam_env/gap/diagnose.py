@@ -19,31 +19,31 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.campaign import Campaign, read_campaign
+from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.errors import InputError
-from spikecam_env.gap.alarm import rings
-from spikecam_env.gap.audit import Contradiction, audit, upheld
-from spikecam_env.gap.bounds import bounds
-from spikecam_env.gap.candidates import chosen, is_pattern, testable
-from spikecam_env.gap.case import Case, case_of
-from spikecam_env.gap.compare import Null, values_of
-from spikecam_env.gap.effort import CAMPAIGNS, Effort
-from spikecam_env.gap.evidence import evidence_of
-from spikecam_env.gap.floor import floor_of_halves
-from spikecam_env.gap.label_unit import counted_anew, nominal_per_label, said_of
+from spikecam_env.gap.baseline.alarm import rings
+from spikecam_env.gap.baseline.halves_floor import floor_of_halves
+from spikecam_env.gap.baseline.label_audit import Contradiction, audit, upheld
+from spikecam_env.gap.baseline.missing_from_refit import missing, with_all
+from spikecam_env.gap.baseline.null_model import model_null, unit_under
+from spikecam_env.gap.baseline.off_nominal import Off, off_nominal
+from spikecam_env.gap.candidates.table import chosen, is_pattern, testable
+from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.maps import diagnose_maps
-from spikecam_env.gap.missing import missing, with_all
-from spikecam_env.gap.null import model_null, unit_under
-from spikecam_env.gap.own_templates import own_templates
-from spikecam_env.gap.parameters import Off, off_nominal
-from spikecam_env.gap.refit import within
+from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
+from spikecam_env.gap.report.evidence import evidence_of
+from spikecam_env.gap.report.words import sentence, unfinished
 from spikecam_env.gap.result import Diagnosis
-from spikecam_env.gap.search import Round, of_fit, search
-from spikecam_env.gap.templates import Templates, load
-from spikecam_env.gap.verdict import concluded, grounded, harmless
-from spikecam_env.gap.words import sentence, unfinished
-from spikecam_env.gap.workers import sums_in_one_order
-from spikecam_env.gap.world import KNOWN, Shown, observed, shown
+from spikecam_env.gap.screen.own_templates import own_templates
+from spikecam_env.gap.screen.templates import Templates, load
+from spikecam_env.gap.search.forward import Round, of_fit, search
+from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
+from spikecam_env.gap.twins.case import Case, case_of
+from spikecam_env.gap.twins.workers import sums_in_one_order
+from spikecam_env.gap.unit.label_unit import counted_anew, nominal_per_label, said_of
+from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.verdict.bounds import bounds
+from spikecam_env.gap.verdict.verdict import concluded, grounded, harmless
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -1,8 +1,8 @@
 """The ladder: from a model that lacks nearly everything to one that leaves nothing, an effect a rung.
 
-What the free refit needed and the model has no effect for (`missing`) is added one after another, each time the one
-that takes away most; then the search for effects goes on as in a diagnosis.  Every rung is judged on the same held-out
-statistics, in the noise of the last.
+What the free refit needed and the model has no effect for (`missing_from_refit`) is added one after another, each
+time the one that takes away most; then the search for effects goes on as in a diagnosis.  Every rung is judged on the
+same held-out statistics, in the noise of the last.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.campaign import Campaign, read_campaign
-from spikecam_env.gap import plots
-from spikecam_env.gap.alarm import rings
-from spikecam_env.gap.candidates import chosen, testable
-from spikecam_env.gap.case import Case
-from spikecam_env.gap.compare import Null, adjusted, values_of
+from spikecam_env.campaign.reading import Campaign, read_campaign
+from spikecam_env.gap.baseline.alarm import rings
+from spikecam_env.gap.baseline.missing_from_refit import Missing, missing, with_all
+from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.candidates.table import chosen, testable
+from spikecam_env.gap.compare.distance import adjusted
+from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import in_order, read_case
-from spikecam_env.gap.missing import Missing, missing, with_all
-from spikecam_env.gap.null import model_null
-from spikecam_env.gap.search import of_fit, search
-from spikecam_env.gap.templates import load
-from spikecam_env.gap.workers import sums_in_one_order
+from spikecam_env.gap.report import plots
+from spikecam_env.gap.screen.templates import load
+from spikecam_env.gap.search.forward import of_fit, search
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.whole import whole_file, write_text_whole
 
@@ -159,7 +160,7 @@ def judged(case: Case, null: Null, values: Array, mean: Array, model: SensorMode
 
 def said(rung: Rung) -> str:
     """A rung in a line: its effect and how large it is."""
-    from spikecam_env.gap.words import human, quantity, unit_of
+    from spikecam_env.gap.report.words import human, quantity, unit_of
 
     if rung.added is None:
         return rung.model.name

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.effort import CAMPAIGNS
-from spikecam_env.gap.observe import Observation
-from spikecam_env.gap.refit import BaseFit
-from spikecam_env.gap.world import Shown
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.twins.budget import CAMPAIGNS
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.whole import write_text_whole
 
@@ -93,7 +93,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Bound:
-    """Upper bound (95 %, see `bounds`) of an effect that was not found.  at: its other parameters there, by name."""
+    """Upper bound (95 %, `verdict.bounds`) of an effect not found.  at: its other parameters there, by name."""
 
     name: str
     parameter: str
@@ -121,8 +121,8 @@ class Evidence:
     """What the report draws: conditions and observations of the measurement, and of one twin before and after.
 
     again: another twin of the model before, with another seed: what chance alone makes differ.
-    drawn_before, drawn_after: gain and dark (P,) of a fresh unit of each model (`units.drawn`): the fixed pattern to
-    expect, where twins have the measured one.
+    drawn_before, drawn_after: gain and dark (P,) of a fresh unit of each model (`fresh_units.drawn`): the fixed pattern
+    to expect, where twins have the measured one.
     """
 
     conditions: tuple[Shown, ...]

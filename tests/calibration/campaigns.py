@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from spikecam_env.calibration import Campaign, write_flats
+from spikecam_env.calibration import write_flats
 from spikecam_env.calibration.response import best_possible
+from spikecam_env.campaign import Campaign
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.sensor.unit import Unit
 

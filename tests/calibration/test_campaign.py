@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from campaigns import flats
 
-from spikecam_env.calibration import calibrate, findings, read_campaign
+from spikecam_env.calibration import calibrate, findings
+from spikecam_env.campaign import read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
 

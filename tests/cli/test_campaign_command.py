@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spikecam_env.calibration import read_campaign
+from spikecam_env.campaign import read_campaign
 from spikecam_env.cli.camera import Camera
 from spikecam_env.cli.main import run
 from spikecam_env.sensor import CATALOGUE, SensorModel

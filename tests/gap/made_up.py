@@ -7,11 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from spikecam_env.gap.observe import Observation, observe
-from spikecam_env.gap.refit import measured_base
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
-from spikecam_env.gap.units import drawn
-from spikecam_env.gap.world import Shown
+from spikecam_env.gap.twins.fresh_units import drawn
+from spikecam_env.gap.unit.refit import measured_base
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from spikecam_env.gap import Bars, Dark, Flat, Step
-from spikecam_env.gap.case import Case, case_of
-from spikecam_env.gap.compare import Null, deviates, values_of
-from spikecam_env.gap.null import model_null
-from spikecam_env.gap.observe import observe
-from spikecam_env.gap.refit import BaseFit, unit_as_base, unit_of
+from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.compare.distance import deviates
+from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.observe.conditions import Shown, planned
+from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.twin import expose
-from spikecam_env.gap.world import Shown, planned
+from spikecam_env.gap.twins.case import Case, case_of
+from spikecam_env.gap.twins.simulate import expose
+from spikecam_env.gap.unit.refit import BaseFit, unit_as_base, unit_of
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 from spikecam_env.streams import pack_frames, unpack_frames
 

@@ -16,9 +16,9 @@ from spikecam_env.cli.diagnose import summary
 from spikecam_env.errors import InputError
 from spikecam_env.gap import Bars, Flat, Step, read_campaign, write_campaign
 from spikecam_env.gap.diagnose import diagnose, read_case
-from spikecam_env.gap.report import command_of, report
+from spikecam_env.gap.report.page import command_of, report
 from spikecam_env.gap.result import VERDICTS, Diagnosis
-from spikecam_env.gap.words import HELD_OUT_ALONE
+from spikecam_env.gap.verdict.notes import HELD_OUT_ALONE
 from spikecam_env.sensor import SensorModel
 
 pytestmark = pytest.mark.slow

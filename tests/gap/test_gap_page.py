@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from spikecam_env.gap import Dark, Flat, candidates, read_campaign, write_campaign
+from spikecam_env.gap import Dark, Flat, read_campaign, write_campaign
+from spikecam_env.gap.candidates import table as candidates
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 PAGE = Path(__file__).parents[2] / "docs" / "gap.md"

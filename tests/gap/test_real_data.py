@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap import Label, import_campaign
-from spikecam_env.gap.compare import adjusted, deviates, values_of
+from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.compare.distance import adjusted, deviates
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import diagnose, read_case
-from spikecam_env.gap.null import model_null
 from spikecam_env.sensor import SensorModel
 
 REAL = Path(__file__).parents[2].parent / "shared" / "data" / "real"

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spikecam_env.calibration.campaign import read_campaign
+from spikecam_env.campaign.reading import read_campaign
 from tests.hidden_world.mechanism import Hidden, draw
 from tests.hidden_world.tricky import TRICKS
 from tests.hidden_world.world import MECHANISMS, Recipe, stream, write_campaign

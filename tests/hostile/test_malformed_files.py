@@ -14,8 +14,9 @@ from mutations import damaged, json_files, npz, npz_files, toml_files
 from tally import reads_or_refuses
 
 from denoiser.weights import load_weights, pretrained_path
-from spikecam_env.calibration import read_campaign, write_flats
-from spikecam_env.calibration.campaign_files import save_rates
+from spikecam_env.calibration import write_flats
+from spikecam_env.campaign import read_campaign
+from spikecam_env.campaign.writing import save_rates
 from spikecam_env.datasets import verify
 from spikecam_env.datasets.manifest import Manifest
 from spikecam_env.sensor import SensorModel

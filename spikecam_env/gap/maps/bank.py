@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.calibration.campaign import Campaign
+from spikecam_env.campaign.reading import Campaign
 from spikecam_env.errors import InputError
+from spikecam_env.gap.observe.conditions import KNOWN, Shown, shown
 from spikecam_env.gap.statistics import Key, pattern, texture
-from spikecam_env.gap.world import KNOWN, Shown, shown
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

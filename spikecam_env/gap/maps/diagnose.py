@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.calibration.campaign import Campaign
-from spikecam_env.gap.candidates import candidate, chosen, is_pattern
-from spikecam_env.gap.compare import Null, adjusted, alarmed, deviates, null_of, residual, values_of
+from spikecam_env.campaign.reading import Campaign
+from spikecam_env.gap.candidates.table import candidate, chosen, is_pattern
+from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, residual
+from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.maps.bank import Maps, bank, dark_of, of_use, read_maps, unit_levels, unit_maps
 from spikecam_env.gap.maps.search import SHARES, SPREADS, UNITS, State, Tried, free_of, search, within
-from spikecam_env.gap.parameters import USUAL
-from spikecam_env.gap.refit import BaseFit
 from spikecam_env.gap.result import Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.gap.unit.usual import USUAL
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
@@ -111,7 +112,7 @@ def _lack(name: str) -> str:
 
 
 def off_usual(case: Maps, state: State) -> dict[str, dict[str, float]]:
-    """Spreads of the model that this unit has in another amount than units differ by: as `parameters.off_nominal`."""
+    """Spreads of the model that this unit has in another amount than units differ by: as `baseline.off_nominal`."""
     found = {}
     for what, factor in state.factors.items():
         if 1 / USUAL < factor < USUAL:

@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates import candidate
-from spikecam_env.gap.compare import HEAVY, Null, Prediction, alarmed, misfit, residual, values_of
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import HEAVY, alarmed, misfit, residual
+from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.maps.bank import Maps, bank, of_use, unit_maps
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.strength import bounded, with_effect
-from spikecam_env.gap.units import SPREADS as OF_A_UNIT
-from spikecam_env.gap.units import WITHIN
+from spikecam_env.gap.twins.fresh_units import SPREADS as OF_A_UNIT
+from spikecam_env.gap.twins.fresh_units import WITHIN
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.observe.conditions import LABELS
 from spikecam_env.gap.statistics import (
     clock,
     drift,
@@ -23,7 +24,6 @@ from spikecam_env.gap.statistics import (
     timing,
 )
 from spikecam_env.gap.statistics.reading import Reading
-from spikecam_env.gap.world import LABELS
 
 GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
     module.__name__.rsplit(".", 1)[1]: module.statistics

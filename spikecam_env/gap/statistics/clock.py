@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import ideal_second_difference
-from spikecam_env.gap.observe import STEPS
+from spikecam_env.gap.observe.observation import STEPS
 from spikecam_env.gap.statistics.reading import Reading, root
 
 NEAR = 0.005

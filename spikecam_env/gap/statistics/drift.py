@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.observe import BLOCKS, Observation
+from spikecam_env.gap.observe.observation import BLOCKS, Observation
 from spikecam_env.gap.statistics.reading import STILL, Reading, log, slope
 
 PARTS, PIECES = 8, 8

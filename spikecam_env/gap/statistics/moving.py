@@ -1,52 +1,15 @@
 """Moving light: what the refit leaves of the film, projected on what each kind of effect would do to it.
 
-The expected film x is the integral of gain L(t) + dark, at most a spike a frame.  Features are made orthogonal in
-this order, so that each says what those before it cannot: level, square, delay, skew, lag 16 / 64 / 256 / 2000 frames,
-blur, row, column, bloom.
+The expected film x is the integral of gain L(t) + dark, at most a spike a frame; its features are in `film`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import NDArray
-from scipy.signal import lfilter
 
-from spikecam_env.gap.observe import BIN
-from spikecam_env.gap.world import Shown
-from spikecam_env.sensor import Keyframes
-
-if TYPE_CHECKING:
-    from spikecam_env.gap.statistics.reading import Reading
-
-Pictures = NDArray[np.float32]
-FEATURES = ("level", "square", "delay", "skew", "lag 16", "lag 64", "lag 256", "lag 2000", "blur", "row", "column",
-            "bloom")  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Film:
-    """light: (bins, P) collected in each bin at gain 1.  basis: (n, bins P) orthonormal features of it.
-
-    size: (n,) of each feature before it was scaled, 0 where those before it say the same.
-    """
-
-    light: Pictures
-    basis: Pictures
-    size: NDArray[np.float64]
-
-
-def films(conditions: Sequence[Shown], shape: tuple[int, int]) -> dict[str, Film]:
-    """What `statistics` needs of every recording with moving light, worked out once."""
-    found = {}
-    for c in conditions:
-        if c.kind == "moving" and c.light is not None:
-            light = light_film(c.light, c.frames)
-            found[c.name] = Film(light, *features(light, shape))
-    return found
+from spikecam_env.gap.observe.observation import BIN
+from spikecam_env.gap.statistics.film import FEATURES
+from spikecam_env.gap.statistics.reading import Reading
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
@@ -65,59 +28,3 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     found = {name: float(s / n) for name, s, n in zip(FEATURES, share, film.size, strict=True) if n > 1e-6}
     found["left"] = float(np.log(max(float(np.sqrt(np.mean(rest**2))), 1e-9)))
     return found
-
-
-def light_film(light: Keyframes, frames: int) -> Pictures:
-    """(F // BIN, P) light collected in each bin, linear between keys."""
-    pixels = light.radiance.shape[1] * light.radiance.shape[2]
-    keys = light.radiance.reshape(len(light.frame), pixels)
-    out = np.zeros((frames // BIN, pixels), np.float32)
-    middle = np.arange(frames // BIN * BIN) + 0.5
-    at = np.clip(np.searchsorted(light.frame, middle, side="right") - 1, 0, max(len(light.frame) - 2, 0))
-    if len(light.frame) == 1:
-        out[:] = keys[0] * BIN
-        return out
-    w = np.clip((middle - light.frame[at]) / (light.frame[at + 1] - light.frame[at]), 0.0, 1.0)
-    for b in range(len(out)):
-        weights: dict[int, float] = {}
-        for f in range(b * BIN, (b + 1) * BIN):
-            weights[int(at[f])] = weights.get(int(at[f]), 0.0) + 1.0 - w[f]
-            weights[int(at[f]) + 1] = weights.get(int(at[f]) + 1, 0.0) + w[f]
-        for k, weight in weights.items():
-            out[b] += np.float32(weight) * keys[k]
-    return out
-
-
-def features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray[np.float64]]:
-    """Orthonormal features (n, bins P) of the nominal camera's film, and how large each was before that."""
-    bright = light / BIN
-    x = np.minimum(bright, np.float32(1.0))
-    bins = len(x)
-    change = np.gradient(x, axis=0) / BIN
-    row = np.linspace(-0.5, 0.5, shape[0], dtype=np.float32).repeat(shape[1])
-    film = x.reshape(bins, *shape)
-    kinds = [x, x * x, -change, -change * row]
-    for tau in (16.0, 64.0, 256.0, 2000.0):
-        kept = np.exp(-BIN / tau)
-        late, _ = lfilter([1.0 - kept], [1.0, -kept], x, axis=0, zi=kept * x[:1])
-        kinds.append(late.astype(np.float32) - x)
-    padded = np.pad(film, ((0, 0), (1, 1), (1, 1)), mode="edge")
-    around = (padded[:, :-2, 1:-1] + padded[:, 2:, 1:-1] + padded[:, 1:-1, :-2] + padded[:, 1:-1, 2:]) / 4
-    kinds.append((around - film).reshape(bins, -1))
-    kinds.append((film * (film.mean(axis=2, keepdims=True) - film.mean())).reshape(bins, -1))
-    kinds.append((film * (film.mean(axis=1, keepdims=True) - film.mean())).reshape(bins, -1))
-    over = np.pad(np.maximum(bright.reshape(bins, *shape) - 1.0, 0.0), ((0, 0), (1, 1), (1, 1)))
-    spill = (over[:, :-2, 1:-1] + over[:, 2:, 1:-1] + over[:, 1:-1, :-2] + over[:, 1:-1, 2:]) / 4
-    kinds.append((spill - over[:, 1:-1, 1:-1]).reshape(bins, -1))
-    basis = np.zeros((len(kinds), x.size))  # in single precision sums of 10^6 terms lose the fifth digit somewhere
-    size = np.zeros(len(kinds))
-    for n, kind in enumerate(kinds):
-        v = kind.reshape(-1).astype(np.float64)
-        whole = float(np.linalg.norm(v))
-        for _ in range(2):
-            v = v - (basis[:n] @ v) @ basis[:n]
-        length = float(np.linalg.norm(v))
-        if whole > 0 and length > 1e-3 * whole:
-            basis[n] = v / length
-            size[n] = length
-    return basis.astype(np.float32), size

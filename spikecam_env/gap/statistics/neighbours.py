@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spikecam_env.gap.observe import LAGS
+from spikecam_env.gap.observe.observation import LAGS
 from spikecam_env.gap.statistics.reading import STILL, Reading
 
 

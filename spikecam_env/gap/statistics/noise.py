@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from spikecam_env.calibration.jitter import second_difference
-from spikecam_env.gap.observe import STEPS
+from spikecam_env.gap.observe.observation import STEPS
 from spikecam_env.gap.statistics.reading import STILL, Reading, log
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from spikecam_env.gap.observe.conditions import KNOWN
 from spikecam_env.gap.statistics.reading import Reading, log, slope
-from spikecam_env.gap.world import KNOWN
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe import Observation
-from spikecam_env.gap.refit import BaseFit
-from spikecam_env.gap.statistics.moving import Film
-from spikecam_env.gap.world import Shown
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.statistics.film import Film
+from spikecam_env.gap.unit.refit import BaseFit
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ STILL = ("dark", "flat", "picture", "unknown")
 class Reading:
     """One campaign, measured or simulated.  base: refitted from these observations and no others.
 
-    films: of moving light, by recording (`moving.films`).
+    films: of moving light, by recording (`film.films`).
     """
 
     observations: Sequence[Observation]

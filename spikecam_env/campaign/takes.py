@@ -1,0 +1,210 @@
+"""Takes: one unit of a model recorded again and again, under light that is known, into a campaign.
+
+Every take has its own starting phase and temporal noise; the unit, its fixed pattern, is the same in all.
+
+A folder holds `model.toml` and `simulation.json` from the start: what it is the recording of.  Recordings of the same
+settings that are there already are kept, so a run that was stopped goes on where it was; `campaign.json` comes last.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from spikecam_env.campaign.reading import USES, Campaign, read_campaign
+from spikecam_env.campaign.writing import campaign_folder, finish_campaign, save_light, save_spikes
+from spikecam_env.checked import checked_count, checked_seed, checked_shape
+from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.names import distinct, file_name
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
+from spikecam_env.streams.packing import packed_bytes
+from spikecam_env.untrusted import read_json
+from spikecam_env.version import __version__
+from spikecam_env.whole import write_text_whole
+
+FORMAT = "spikecam-simulation/1"
+
+_BLOCK = 2_000_000
+"""Pixel-frames simulated between two writes [spikes of uint8]."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """One recording to be made.
+
+    name: of its files.  light: keys whose radiance is (K, H, W) or broadcasts to it.  use: fit or holdout.
+    v_d: V_D - V_ref [V]; None is the model's own.  The light is the same at any v_d: 1.0 makes the nominal pixel of the
+    model's own v_d fire once a frame.
+    """
+
+    name: str
+    light: Keyframes
+    frames: int
+    use: str = "fit"
+    v_d: float | None = None
+    note: str = ""
+
+
+def record_takes(
+    folder: str | Path,
+    model: SensorModel,
+    takes: Sequence[Take],
+    *,
+    shape: tuple[int, int],
+    seed: int = 0,
+    engine: str = "auto",
+    progress: bool = False,
+) -> Campaign:
+    """Record takes of unit `seed` of a model into a campaign, and read it back.
+
+    Same arguments, same bytes.  A folder that a stopped run left unfinished is completed; a finished campaign of the
+    same settings is returned as it is.
+    Errors: InputError for no takes, names that repeat or are no file names, an unknown use, light of another shape, a
+    v_d that leaves no threshold, and a folder that holds something else.
+    """
+    shape, seed = checked_shape(shape), checked_seed(seed)
+    _check(takes, shape)
+    target = Path(folder)
+    plan = _plan(takes, shape, seed, engine)
+    if (target / "campaign.json").exists() and _same_simulation(target, model, plan):
+        return read_campaign(target)
+    cameras = {v_d: _camera(model, v_d) for v_d in dict.fromkeys(take.v_d for take in takes)}
+    _claim(campaign_folder(target), model, plan)
+    with tqdm(total=sum(take.frames for take in takes), unit="frame", disable=not progress) as bar:
+        for number, take in enumerate(takes):
+            bar.set_description(f"record {take.name}")
+            stream = target / f"{take.name}.dat"
+            if stream.is_file() and stream.stat().st_size == take.frames * packed_bytes(shape):
+                bar.update(take.frames)
+                continue
+            camera = cameras[take.v_d]
+            save_light(target / f"{take.name}.npz", take.light)
+            sensor = SpikeSensor(camera, shape, seed, engine, take=number)
+            save_spikes(stream, _stream(sensor, take, _same_light(model, camera), bar))
+    entries = [_entry(take, model) for take in takes]
+    return finish_campaign(target, shape, model.frame_rate_hz, entries)
+
+
+def at_v_d(model: SensorModel, v_d: float) -> SensorModel:
+    """The same camera with its reset voltage set so that V_D - V_ref = v_d [V]: fewer or more electrons a spike."""
+    try:
+        circuit = replace(model.circuit, reset_V=model.circuit.reference_V + v_d)
+    except InputError as error:
+        bias_V = model.circuit.bias_V
+        raise InputError(f"v_d = {v_d:g} V with a bias of {bias_V:g} V leaves no threshold ({error})") from error
+    changed = replace(model, circuit=circuit)
+    for effect in model.effects:
+        if effect.name == "shot_noise":
+            quanta = effect.parameters()["quanta"] * circuit.swing_V / model.circuit.swing_V
+            changed = changed.with_effect(replace(effect, quanta=quanta))  # type: ignore[call-arg]
+    return changed
+
+
+def own_v_d(model: SensorModel) -> float:
+    """V_D - V_ref of the model's circuit [V]."""
+    return model.circuit.reset_V - model.circuit.reference_V
+
+
+def shown(light: Keyframes, start: int, stop: int, shape: tuple[int, int], scale: float = 1.0) -> Keyframes:
+    """The keys that frames [start, stop) see, scaled and broadcast to (k, H, W); a cut changes no bit of a stream."""
+    first = max(int(np.searchsorted(light.frame, start, side="right")) - 1, 0)
+    last = max(int(np.searchsorted(light.frame, stop, side="left")), first)
+    radiance = light.radiance[first : last + 1] * np.float32(scale)
+    return Keyframes(light.frame[first : last + 1], np.broadcast_to(radiance, (len(radiance), *shape)))
+
+
+def _stream(sensor: SpikeSensor, take: Take, scale: float, bar: tqdm) -> Iterator[NDArray[np.uint8]]:  # type: ignore[type-arg]
+    block = max(64, _BLOCK // (sensor.shape[0] * sensor.shape[1]) // 64 * 64)
+    for start in range(0, take.frames, block):
+        count = min(block, take.frames - start)
+        yield sensor.step(shown(take.light, start, start + count, sensor.shape, scale), count)
+        bar.update(count)
+
+
+def _camera(model: SensorModel, v_d: float | None) -> SensorModel:
+    return model if v_d is None or np.isclose(v_d, own_v_d(model), rtol=1e-9) else at_v_d(model, v_d)
+
+
+def _same_light(model: SensorModel, camera: SensorModel) -> float:
+    """Radiance in the camera's unit of radiance 1 in the model's: a lower threshold is filled by less light."""
+    return model.circuit.swing_V / camera.circuit.swing_V
+
+
+def _entry(take: Take, model: SensorModel) -> dict[str, Any]:
+    return {
+        "name": take.name,
+        "spikes": f"{take.name}.dat",
+        "frames": take.frames,
+        "radiance": f"{take.name}.npz",
+        "use": take.use,
+        "v_d": own_v_d(model) if take.v_d is None else take.v_d,
+        "temperature_k": model.circuit.temperature_K,
+        "note": take.note,
+    }
+
+
+def _check(takes: Sequence[Take], shape: tuple[int, int]) -> None:
+    if not takes:
+        raise InputError("a campaign needs at least one recording; give some")
+    distinct((file_name(take.name, "recording name") for take in takes), "recording")
+    for take in takes:
+        if take.use not in USES:
+            raise unknown_name(f"use of recording {take.name!r}", take.use, USES)
+        checked_count(take.frames)
+        size = take.light.radiance.shape[1:]
+        if not all(n in (1, m) for n, m in zip(size, shape, strict=True)):
+            raise InputError(
+                f"recording {take.name!r}: its light is {size} pixels, the camera {shape}; "
+                "it must be that size, or 1 along an axis on which it is even"
+            )
+
+
+def _plan(takes: Sequence[Take], shape: tuple[int, int], seed: int, engine: str) -> dict[str, Any]:
+    """All that the bytes depend on besides the model, as JSON has it."""
+    described = [
+        {"name": t.name, "frames": t.frames, "use": t.use, "v_d": t.v_d, "note": t.note, "light": _digest(t.light)}
+        for t in takes
+    ]
+    return {
+        "format": FORMAT,
+        "package_version": __version__,
+        "shape": list(shape),
+        "seed": seed,
+        "engine": engine,
+        "recordings": described,
+    }
+
+
+def _digest(light: Keyframes) -> str:
+    digest = hashlib.sha256(repr(light.radiance.shape).encode())
+    digest.update(light.frame.tobytes())
+    digest.update(light.radiance.tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _claim(target: Path, model: SensorModel, plan: dict[str, Any]) -> None:
+    """Mark the folder as the recording of this plan; raises InputError where it is that of another."""
+    if (target / "simulation.json").exists():
+        if not _same_simulation(target, model, plan):
+            raise InputError(
+                f"{target} holds an unfinished campaign of other settings; remove it or choose another folder"
+            )
+        return
+    model.to_toml(target / "model.toml")
+    write_text_whole(target / "simulation.json", json.dumps(plan, indent=1) + "\n")
+
+
+def _same_simulation(target: Path, model: SensorModel, plan: dict[str, Any]) -> bool:
+    try:
+        found = read_json(target / "simulation.json")
+        return bool(found == plan and SensorModel.from_toml(target / "model.toml") == model)
+    except InputError:
+        return False

@@ -1,0 +1,82 @@
+"""Whether what the model has is there in the amount it says: noise, dark level and spreads against nominal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.fresh_units import SPREADS, spread_factor, width
+from spikecam_env.gap.unit.refit import NOISE, BaseFit
+from spikecam_env.gap.unit.usual import USUAL_NOISE, unusual
+from spikecam_env.sensor import CATALOGUE, SensorModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Off:
+    """What is off.  parameters: {effect: {measured, nominal, ratio}}, each effect's strength in its own unit.
+
+    nominal: the measured unit as it would be, were those as the model has them.
+    """
+
+    parameters: dict[str, dict[str, float]]
+    nominal: BaseFit
+
+
+def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> Off:
+    """Strengths of effects in the model that the unit `base` has in another amount than units differ by.
+
+    Not of scenes alone: in recordings so short the refit of jitter is a fifth too small (`null_model.model_null`).
+    """
+    if case.scenes_only:
+        return Off({}, base)
+    shape = (128, 128)
+    unit = model.draw_unit(shape, 0)
+    has = {e.name: e.parameters()[CATALOGUE[e.name].strength] for e in model.effects}
+    live = base.live
+    ratios: dict[str, float] = {}
+    shot = float(np.mean(1 / unit.electrons)) if unit.shot else 0.0
+    reset = float(np.mean(unit.kappa**2))
+    if has.keys() & set(NOISE) and unusual(base.white / max(shot + reset, 1e-12), USUAL_NOISE):
+        if "reset_noise" in has and base.white > shot:
+            ratios["reset_noise"] = float(np.sqrt((base.white - shot) / max(reset, 1e-12)))
+        else:
+            ratios["shot_noise"] = (shot + reset) / max(base.white, 1e-12)
+        base = replace(base, white=shot + reset)
+    level = float(np.median(base.dark[live])) / max(float(np.median(unit.dark)), 1e-12)
+    if "dark_current" in has and unusual(level):
+        ratios["dark_current"] = level
+    for what, usual in (("gain", 1.0), ("dark", level)):
+        spreads = has.keys() & SPREADS[what].keys()
+        values = getattr(base, what)
+        if spreads and unusual(width(values[live]) / max(width(getattr(unit, what)), 1e-12)):
+            factor = spread_factor(model, what, width(values[live]), shape, 0)
+            ratios |= {name: factor * usual for name in has if name in spreads}
+            base = replace(base, **{what: nearer(values, live, factor)})  # type: ignore[arg-type]
+    if "dark_current" in ratios:
+        base = replace(base, dark=base.dark / level)
+    rows = {n: {"measured": has[n] * r, "nominal": has[n], "ratio": r} for n, r in ratios.items() if n in has}
+    return Off(rows, base)
+
+
+def nearer(values: Array, live: NDArray[np.bool_], factor: float) -> Array:
+    """Values with their distance from the median of those alive divided."""
+    middle = float(np.median(values[live]))
+    return np.maximum(middle + (values - middle) / max(factor, 1e-3), 0.0)
+
+
+def with_strengths(model: SensorModel, off: Mapping[str, Mapping[str, float]]) -> SensorModel:
+    """The model with its parameters as they were measured."""
+    for effect in model.effects:
+        if effect.name in off:
+            key = CATALOGUE[effect.name].strength
+            model = with_effect(
+                model, effect.name, bounded(effect.name, {**effect.parameters(), key: off[effect.name]["measured"]})
+            )
+    return model

@@ -1,0 +1,68 @@
+"""Campaigns by simulation: one unit of any model, recorded as a real camera would be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from spikecam_env.campaign import Campaign, Take, record_takes
+from spikecam_env.checked import checked_count, checked_disk, checked_shape
+from spikecam_env.gap.campaign.recording_kinds import Bars, Dark, Disk, Flat, Planned, Step
+from spikecam_env.sensor import SensorModel
+from spikecam_env.streams.packing import packed_bytes
+
+FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
+HOLDOUT_LEVELS = (0.05, 0.15, 0.5)
+BRIGHT = 1.4
+"""Of the bars: above one spike a frame, so that what flows over shows."""
+
+
+def write_campaign(
+    folder: str | Path,
+    model: SensorModel | str,
+    *,
+    shape: tuple[int, int] = (64, 64),
+    frames: int = 8000,
+    recordings: Sequence[Planned] | None = None,
+    seed: int = 0,
+    engine: str = "auto",
+    progress: bool = False,
+) -> Campaign:
+    """Record unit `seed` of a model into a campaign (format spikecam-campaign/1) and read it back.
+
+    model: a SensorModel, with any effects; a preset's name or a TOML path.  frames: length of recordings that do not
+    say their own.  recordings: default `standard_design()`.
+    Same arguments, same bytes; a run that was stopped goes on where it was.
+    Errors: InputError as `record_takes`, and for light that a recording cannot have.
+    """
+    camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
+    planned = standard_design() if recordings is None else recordings
+    size = checked_shape(shape)
+    lengths = [checked_count(frames if p.frames is None else p.frames) for p in planned]
+    checked_disk(sum(lengths) * packed_bytes(size), folder, f"{sum(lengths)} frames of {size[0]} x {size[1]} pixels")
+    takes = [_take(p, size, length) for p, length in zip(planned, lengths, strict=True)]
+    return record_takes(folder, camera, takes, shape=size, seed=seed, engine=engine, progress=progress)
+
+
+def standard_design() -> tuple[Planned, ...]:
+    """Dark, six flats, a step and bars to fit; three flats between them and a disk to judge."""
+    return (
+        Dark(),
+        *(Flat(radiance=level) for level in FIT_LEVELS),
+        Step(),
+        Bars(high=BRIGHT),
+        *(Flat(radiance=level, use="holdout") for level in HOLDOUT_LEVELS),
+        Disk(use="holdout"),
+    )
+
+
+def second_voltage(recordings: Sequence[Planned], v_d: float) -> tuple[Planned, ...]:
+    """The recordings, and the dark and flats to fit among them once more at another V_D - V_ref [V]."""
+    again = (p for p in recordings if isinstance(p, Dark | Flat) and p.use == "fit")
+    return (*recordings, *(replace(p, v_d=v_d, name=p.name and f"{p.name}-at-{v_d:g}V") for p in again))
+
+
+def _take(planned: Planned, shape: tuple[int, int], frames: int) -> Take:
+    planned.check()
+    return Take(planned.file_name, planned.light(shape, frames), frames, planned.use, planned.v_d, planned.kind)

@@ -1,0 +1,114 @@
+"""How far a measurement lies from a prediction: every statistic in units of its own noise."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special, stats
+
+from spikecam_env.gap.compare.prediction import Null, Prediction, variance
+from spikecam_env.gap.statistics import Key
+
+Array = NDArray[np.float64]
+
+HEAVY = 8.0
+"""Degrees of freedom of the loss: statistics far off count by their logarithm."""
+
+GATE = 0.005
+"""Adjusted p-value of what a named effect leaves, below which something is left."""
+
+
+def size_of(null: Null, measured: Array, change: Array) -> float:
+    """Noises by which a change of the statistics (S,) shows at best, on those that were measured."""
+    return float(np.max(np.where(np.isfinite(measured), np.abs(change), 0.0) / null.noise))
+
+
+def deviates(null: Null, values: Array) -> Array:
+    """(S,) normal deviates: Student's t of few twins, made normal; 0 where unknown."""
+    return normal(null, np.nan_to_num((values - null.mean) / null.noise))
+
+
+def normal(null: Null, t: Array, predicted: Prediction | None = None) -> Array:
+    """(S,) normal deviates of distances in noise, of a prediction's or of the null's: the noise was learnt from few
+    twins, and is the surer the more of it is floor.  What drawn units show is no less likely than their number says."""
+    known, freedom = null.sd**2 * (1.0 + 1.0 / null.twins), null.freedom
+    if predicted is not None:
+        known, freedom = predicted.spread**2 + predicted.error**2, freedom_of(null, predicted)
+    freedom = freedom * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
+    log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)
+    if predicted is not None and predicted.units is not None:
+        apart = (predicted.units - predicted.mean) / np.sqrt(variance(null, predicted))
+        log_p = np.maximum(log_p, np.log(np.maximum(share_beyond(t, apart), 1e-300)))
+    return np.sign(t) * -special.ndtri_exp(log_p)
+
+
+def share_beyond(t: Array, apart: Array) -> Array:
+    """(S,) share of drawn units, half at most, that lie as far to the same side as a distance; 0 where none does.
+    apart: (U, S) their own distances, NaN where they show nothing.
+
+    Pixels far out in a pattern of rows come by whole rows: one unit in a hundred has some, and no t knows of it.
+    """
+    beyond = np.sum(np.sign(t) * apart >= np.abs(t), axis=0)
+    return np.where(beyond > 0, np.minimum((beyond + 1) / (len(apart) + 1), 0.5), 0.0)
+
+
+def freedom_of(null: Null, predicted: Prediction) -> Array:
+    """(S,) degrees of freedom of a prediction's spread (Welch and Satterthwaite): what is the null's has its own, what
+    an effect's twins scatter beyond has those of few twins, `halved`, or of the drawn units.
+
+    How much they scatter beyond, all statistics of a group say: one that happened to scatter little is no surer.
+    """
+    beyond = np.maximum(predicted.spread / np.maximum(null.sd, 1e-300), 1.0) ** 2 - 1.0
+    groups = np.unique([k.group for k in null.keys], return_inverse=True)[1]
+    beyond = np.maximum(beyond, (np.bincount(groups, beyond) / np.bincount(groups))[groups])
+    kind = Counter((k.group, k.name) for k in null.keys)
+    few = max(len(predicted.draws) - 1, 1) / (0.25 + 0.75 / np.array([kind[k.group, k.name] for k in null.keys]))
+    if predicted.units is not None:
+        few = np.where(np.isfinite(predicted.units[0]), len(predicted.units) - 1, few)
+    return np.asarray((1.0 + beyond) ** 2 / (1.0 / null.freedom + beyond**2 / few))
+
+
+def of_all_recordings(keys: Sequence[Key], z: Array, group: str) -> Array:
+    """(n,) normal deviates of each statistic of a group over all recordings together, where z is not 0 (Stouffer): two
+    events in every recording are chance in none, and none in all."""
+    names = list(dict.fromkeys(k.name for k in keys if k.group == group))
+    of = [z[[(k.group, k.name) == (group, name) for k in keys]] for name in names]
+    return np.array([v.sum() / np.sqrt(max(int(np.count_nonzero(v)), 1)) for v in of])
+
+
+def adjusted(z: Array) -> Array:
+    """(S,) two-sided p-values, by Holm's step-down for as many statistics as there are."""
+    p = 2.0 * special.ndtr(-np.abs(z))
+    order = np.argsort(p)
+    stepped = np.maximum.accumulate(p[order] * (p.size - np.arange(p.size)))
+    out = np.empty_like(p)
+    out[order] = np.minimum(stepped, 1.0)
+    return out
+
+
+def alarmed(null: Null, rho: Array, predicted: Prediction | None = None) -> bool:
+    """Whether residuals, of a prediction or of the null's, say that something is left."""
+    return bool(adjusted(normal(null, rho, predicted)).min() < GATE)
+
+
+def residual(null: Null, measured: Array, predicted: Prediction) -> Array:
+    """(S,) measured less predicted in noise."""
+    return np.nan_to_num((measured - predicted.mean) / np.sqrt(variance(null, predicted)))
+
+
+def judged(null: Null, measured: Array, predicted: Prediction) -> tuple[Array, float]:
+    """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squares of what is left, and the price of
+    noise wider than the null's, without which a prediction would win by being vague.  What was not measured (NaN, held
+    out) counts for nothing."""
+    rho = residual(null, measured, predicted)
+    wider = (variance(null, predicted) - predicted.error**2) / (null.sd**2 + null.floor**2)
+    price = np.where(np.isfinite(measured), null.weight * np.log(wider), 0.0)
+    return rho, misfit(rho, null.weight) + float(price.sum())
+
+
+def misfit(rho: Array, weight: Array | float = 1.0) -> float:
+    """Heavy-tailed sum of squares: of the order of the weights' sum for noise alone."""
+    return float(np.sum(weight * (HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))

@@ -1,0 +1,176 @@
+"""What a model gives: the mean of every statistic, the error of that mean, and how far one campaign lies from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.compare.pooled_variance import moderated
+from spikecam_env.gap.statistics import Key, floor_of
+from spikecam_env.gap.unit.refit import BaseFit
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 0.05
+"""Share of an effect's own size by which its simulation may be off: laws are first order, and simulated with noise."""
+
+PAIRED = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6, "spectrum": 0.7,
+          "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
+"""Share of a campaign's noise that is left of a pair of twins of the same draws, with an effect and without, by group
+(`python -m benchmarks.paired_twins`, the noisiest effect); 1 for the others."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One simulated campaign.  number: of its random draws.  values: (S,), NaN where it was not simulated.
+
+    refit: of its unit, None where nothing was simulated that a refit rests on.
+    """
+
+    number: int
+    values: Array
+    refit: BaseFit | None
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a model gives.  mean: (S,).  error: (S,) standard deviation of that mean.  spread: (S,) of one campaign.
+
+    draws: the campaigns it was learnt from.  own: (S,) what its effects do to the very unit; where None, that is its
+    distance from the null, whose unit has taken an effect's noise for its own where they are severe.
+    units: (U, S) of the drawn units that the pattern was learnt from, NaN elsewhere; of all models by the same draws.
+    """
+
+    mean: Array
+    error: Array
+    spread: Array
+    draws: tuple[Draw, ...] = ()
+    own: Array | None = None
+    units: Array | None = None
+
+
+@dataclass(frozen=True)
+class Null:
+    """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns, the whole ones kept in
+    `draws`, or of the pattern over as many drawn units.
+
+    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  freedom: (S,) degrees of freedom
+    of sd.  weight: (S,) how much each says of its own: what several recordings tell of one fixed pattern is told once.
+    """
+
+    keys: tuple[Key, ...]
+    mean: Array
+    sd: Array
+    floor: Array
+    twins: Array | int
+    freedom: Array | float
+    weight: Array | float = 1.0
+    draws: tuple[Draw, ...] = ()
+
+    @property
+    def noise(self) -> Array:
+        """(S,) standard deviation of measured less mean."""
+        return np.sqrt(self.sd**2 * (1.0 + 1.0 / self.twins) + self.floor**2)
+
+    @property
+    def prediction(self) -> Prediction:
+        """Itself."""
+        return Prediction(self.mean, self.sd / np.sqrt(self.twins), self.sd, self.draws)
+
+
+def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key], refits: Sequence[BaseFit] = ()) -> Null:
+    """From simulated campaigns 0, 1, ..., for the statistics in `keys` that all of them have."""
+    there = tuple(k for k in keys if all(k in b for b in banks))
+    values = np.array([[b[k] for k in there] for b in banks])
+    floor = np.maximum([floor_of(k) for k in there], 1e-9)
+    variances, freedom = moderated(there, values.var(axis=0, ddof=1), len(banks) - 1)
+    draws = tuple(Draw(n, v, r) for n, (v, r) in enumerate(zip(values, refits, strict=False)))
+    return Null(there, values.mean(axis=0), np.sqrt(variances), floor, len(banks), freedom, draws=draws)
+
+
+def paired(null: Null, made: Sequence[Draw]) -> Prediction:
+    """What campaigns with an effect say, each less the null's of the same number: their noise cancels nearly.
+
+    What a draw lacks is the null's.  One pair has PAIRED of a campaign's noise; several tell it themselves.
+    """
+    without = {d.number: d for d in null.draws}
+    made = [
+        replace(d, values=np.where(np.isfinite(d.values), d.values, w.values), refit=d.refit or w.refit)
+        for d, w in ((d, without[d.number]) for d in made)
+    ]
+    change = np.nan_to_num([d.values - without[d.number].values for d in made])
+    if len(made) > 1:
+        error2, spread = halved(null, change.var(axis=0, ddof=1)) / len(made), spread_of(null, null.mean + change)
+    else:
+        counted = np.array([k.group == "intervals" for k in null.keys])  # roots of counts scatter by 1 of themselves
+        own = np.where(counted, 1.0, of_a_pair(null.keys) * null.sd)
+        error2, spread = own**2 * (change[0] != 0), null.sd
+    return Prediction(null.mean + change.mean(axis=0), np.sqrt(null.sd**2 / null.twins + error2), spread, tuple(made))
+
+
+def of_a_pair(keys: Sequence[Key]) -> Array:
+    """(S,) PAIRED of each statistic."""
+    return np.array([PAIRED.get(k.group, 1.0) for k in keys])
+
+
+def own_variance(null: Null, predicted: Prediction) -> Array:
+    """(S,) of a prediction's mean, beyond what the null's own mean has."""
+    return np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0)
+
+
+def scaled(null: Null, one: Prediction, factor: float) -> Prediction:
+    """A prediction whose change from the null is multiplied, and with it what it scatters more."""
+    error2 = null.sd**2 / null.twins + own_variance(null, one) * factor**2
+    spread2 = null.sd**2 + np.maximum(one.spread**2 - null.sd**2, 0.0) * abs(factor)
+    mean = null.mean + factor * (one.mean - null.mean)
+    own = None if one.own is None else factor * one.own
+    return replace(one, mean=mean, error=np.sqrt(error2), spread=np.sqrt(spread2), own=own)
+
+
+def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
+    """(S,) in the order of keys; NaN where the bank has none."""
+    return np.array([bank.get(k, np.nan) for k in keys])
+
+
+def variance(null: Null, predicted: Prediction) -> Array:
+    """(S,) of measured less predicted; a prediction is good to TOLERANCE of its effect."""
+    return predicted.spread**2 + predicted.error**2 + null.floor**2 + law(null, predicted) ** 2
+
+
+def law(null: Null, predicted: Prediction) -> Array:
+    """(S,) by how much a prediction's laws may be off."""
+    return TOLERANCE * (predicted.mean - null.mean if predicted.own is None else predicted.own)
+
+
+def pooled(keys: Sequence[Key], values: Array) -> Array:
+    """(S,) each statistic's mean over all recordings."""
+    of = {kind: i for i, kind in enumerate(dict.fromkeys((k.group, k.name) for k in keys))}
+    kind = np.array([of[k.group, k.name] for k in keys])
+    return np.asarray((np.bincount(kind, values) / np.bincount(kind))[kind])
+
+
+def spread_of(null: Null, values: Array) -> Array:
+    """(S,) standard deviation of statistics under a model with an effect, from its twins (n, S), at least the null's.
+
+    An effect of rare events makes statistics noisier than the null knows.
+    """
+    if len(values) < 2:
+        return null.sd
+    return np.asarray(np.sqrt(np.maximum(null.sd**2, halved(null, values.var(axis=0, ddof=1)))))
+
+
+def halved(null: Null, variances: Array) -> Array:
+    """(S,) variances from few twins: what they say of one statistic counts half, the other half is what they say of the
+    same one over all recordings."""
+    known = null.sd**2 + null.floor**2
+    return 0.5 * variances + 0.5 * known * pooled(null.keys, variances) / pooled(null.keys, known)
+
+
+def patterned(null: Null, predicted: Prediction) -> NDArray[np.bool_]:
+    """(S,) which statistics drawn units tell."""
+    if predicted.units is None:
+        return np.zeros(len(null.keys), np.bool_)
+    return np.asarray(np.isfinite(predicted.units).all(axis=0), np.bool_)

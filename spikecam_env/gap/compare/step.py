@@ -1,0 +1,182 @@
+"""From what a prediction leaves to a step of parameters, with the covariance of its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.compare.distance import HEAVY, judged, misfit
+from spikecam_env.gap.compare.prediction import (
+    TOLERANCE,
+    Null,
+    Prediction,
+    law,
+    own_variance,
+    patterned,
+    scaled,
+    variance,
+)
+
+Array = NDArray[np.float64]
+
+OPEN = 5e-4
+"""Damping of what errors are told from: a step may be held back, an error must not be.  What it holds back is open."""
+
+ENOUGH = 4
+"""Twins of an effect that tell by how much its own chance leads parameters astray."""
+
+MEDIAN = 0.455
+"""Of the square of a normal deviate."""
+
+
+def likeliest(null: Null, measured: Array, one: Prediction) -> tuple[float, float]:
+    """(factor, sd of its logarithm) that suits a prediction best which mostly scatters: by the misfit and its price."""
+    factors = np.geomspace(0.01, 100.0, 200)
+    left = np.array([judged(null, measured, scaled(null, one, f))[1] for f in factors])
+    near = np.log(factors[left < left.min() + 1.0])
+    return float(factors[left.argmin()]), float(max(np.ptp(near), np.log(factors[1] / factors[0]))) / 2
+
+
+def step_of(
+    null: Null,
+    measured: Array,
+    predicted: Prediction,
+    jacobian: Array,
+    doubt: Array | float = 0.0,
+    before: Array | float = 1.0,
+) -> tuple[Array, Array]:
+    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n), known to `doubt`.
+
+    before: (n,) standard deviation of what nothing tells.
+
+    What is far off is judged by how far off most is that moves: it would be outliers all, and hardly be heard.
+
+    Statistics are not independent: the covariance is of how far the null's own draws would have led the step astray,
+    and, where ENOUGH of them tell, those of the effect (other pixels have its traps), with the floors and TOLERANCE of
+    the effect, all of one sign, on top.  Of the fixed pattern, drawn units tell: all recordings show the same one.
+    Where two parameters do nearly the same, what twins scattered would seem to tell them apart: as many squares of it
+    as can be expected in the normal matrix are no knowledge (errors in variables).
+    """
+    noise2 = variance(null, predicted)
+    gap = np.nan_to_num(measured - predicted.mean)
+    concerned = np.isfinite(measured) & np.any(jacobian != 0, axis=1)
+    usual = max(float(np.median((gap**2 / noise2)[concerned])) / MEDIAN, 1.0) if concerned.any() else 1.0
+    w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2 / usual) / noise2
+    normal = jacobian.T @ (w[:, None] * jacobian)
+    scale = np.diag(normal) + 1e-12
+    step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
+    values, basis = along(normal - by_chance(w, jacobian, doubt), np.sqrt(scale))
+    back = np.linalg.inv(basis)
+    solve = (back / values) @ back.T @ (jacobian.T * w)
+    drawn = [d.values - null.mean for d in null.draws]
+    alike = solve * ~patterned(null, predicted)
+    chance = astray(alike, drawn) if len(drawn) > 1 else (alike * null.sd**2) @ alike.T
+    off = solve @ law(null, predicted)
+    total = chance + own_astray(null, predicted, solve) + (solve * null.floor**2) @ solve.T + np.outer(off, off)
+    prior = np.diag(np.square(before * np.ones(len(scale))))
+    held = (back * (OPEN / values)) @ basis
+    total = total + held @ prior @ held.T
+    total = total - total @ np.linalg.solve(total + prior, total)
+    return np.asarray(step, np.float64), np.atleast_2d(total)
+
+
+def by_chance(w: Array, jacobian: Array, doubt: Array | float) -> Array:
+    """(n, n) of a normal matrix with weights (S,), that the noise of its jacobian makes: each column is a twin less one
+    that they share.  doubt: (S, n) of both, with the sign of the step between them."""
+    there = doubt * (jacobian != 0)
+    shared = there.T @ (w[:, None] * there) / 2
+    return np.asarray(shared + np.diag(np.diag(shared)))
+
+
+def along(normal: Array, scale: Array) -> tuple[Array, Array]:
+    """((n,) what is known, OPEN at least, (n, n) directions in units of 1 / `scale` (n,), one a row)."""
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    return np.maximum(values, 0.0) + OPEN, vectors.T * scale
+
+
+def astray(solve: Array, draws: Sequence[Array] | Array) -> Array:
+    """(n, n) covariance of where campaigns such as these (S,), not their mean, lead a step (n,) = solve @ values."""
+    return np.atleast_2d(np.cov((np.nan_to_num(draws) @ solve.T).T)) * (1 + 1 / len(draws))
+
+
+def own_astray(null: Null, predicted: Prediction, solve: Array) -> Array:
+    """(n, n) covariance of a step by the effect's own chance: as its draws tell where ENOUGH of them move a statistic,
+    as drawn units do where they show it, elsewhere as of independent ones."""
+    variances = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
+    without = {d.number: d.values for d in null.draws}
+    draws = predicted.draws if len(predicted.draws) >= ENOUGH else ()
+    change = np.array([d.values - without[d.number] for d in draws])
+    shown = patterned(null, predicted)
+    told = np.any(np.nan_to_num(change) != 0, axis=0) & ~shown
+    total = np.asarray((solve * np.where(told | shown, 0.0, variances)) @ solve.T)
+    total = total + astray(solve * told, change) if told.any() else total
+    return total + astray(solve * shown, predicted.units) if predicted.units is not None else total
+
+
+def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, step: float) -> Array:
+    """(S,) change of predictions over `step`, 0 where it is not clear of the twins' own noise: hundreds of statistics
+    that do not move would drown those that do (regression dilution)."""
+    change, _, clear = change_of(null, measured, there, here)
+    return np.where(clear, change, 0.0) / step
+
+
+def change_of(
+    null: Null, measured: Array, there: Prediction, here: Prediction
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """((S,) change from one prediction to another, (S,) its noise, (S,) where it is clear of that).  What was not
+    measured (NaN), and may move more, is a matter of its own."""
+    change, known = there.mean - here.mean, np.isfinite(measured)
+    own2 = np.maximum(own_variance(null, there), own_variance(null, here))
+    if there.units is not None and here.units is not None:
+        apart = there.units - here.units
+        own2 = np.where(np.isfinite(apart).all(axis=0), apart.var(axis=0, ddof=1) / len(apart), own2)
+    own2 = np.maximum(own2, 1e-300)
+    clear = is_clear(np.where(known, change, 0.0), own2) | is_clear(np.where(known, 0.0, change), own2)
+    return change, np.sqrt(own2), clear
+
+
+def scale_of(
+    gap: Array, effect: Array, of_gap: Array, of_effect: Array, tolerance: float = TOLERANCE
+) -> tuple[float, float]:
+    """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
+
+    gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.
+    Only statistics on which the simulated effect is clear of its own noise count: the noise of the others would drag
+    the scale to 0 (regression dilution).  Under a heavy-tailed loss there are many minima: it is followed down from
+    every ratio that many statistics agree on.
+    """
+    clear = is_clear(effect, of_gap + of_effect)
+    if not clear.any():
+        return 0.0, np.inf
+    gap, effect, of_gap, of_effect = gap[clear], effect[clear], of_gap[clear], of_effect[clear]
+    starts = np.unique(np.quantile(gap / effect, [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95]))
+    best = (np.inf, 0.0, np.inf)
+    for start in starts:
+        scale, total = float(start), 0.0
+        for _ in range(8):
+            noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
+            w = (HEAVY + 1.0) / (HEAVY + (gap - scale * effect) ** 2 / noise2) / noise2
+            total = float(np.sum(w * effect**2))
+            scale = float(np.sum(w * effect * gap)) / max(total, 1e-300)
+        noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
+        left = misfit((gap - scale * effect) / np.sqrt(noise2))
+        best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))
+    return best[1], best[2]
+
+
+def scale_to(null: Null, measured: Array, predicted: Prediction) -> tuple[float, float]:
+    """(scale, sd) of a prediction's change from the null that comes nearest to the measured one."""
+    known = np.isfinite(measured)
+    gap, effect = (np.where(known, v - null.mean, 0.0) for v in (measured, predicted.mean))
+    return scale_of(gap, effect, null.noise**2, own_variance(null, predicted))
+
+
+def is_clear(effect: Array, variance: Array) -> NDArray[np.bool_]:
+    """(S,) whether an effect stands clear of noise on a statistic, or, where it does on none, half as well as on its
+    best."""
+    size = np.abs(effect) / np.sqrt(variance)
+    most = float(size.max())
+    least = max(min(3.0, 0.5 * most), min(6.0, 0.25 * most))  # of 600 statistics a few are 4 noises off by chance
+    return np.asarray((size > least) & (effect != 0))

@@ -1,0 +1,173 @@
+"""The passes over a recording's bits, compiled: pixel by pixel, and frame by frame.  They fill an `Observation`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spikecam_env.calibration.spike_times import second_differences
+from spikecam_env.compiled import njit
+from spikecam_env.streams.bits import by_pixel, ones, times_of
+
+SPARSE = 0.05
+"""Spikes a frame below which a pixel's are gone through one by one."""
+
+ALIKE = 8
+"""Lengths of intervals that are counted one after the other, where a pixel's are no more."""
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd):  # type: ignore[no-untyped-def]
+    frames = words.shape[0]
+    bits = np.empty((64, (frames + 63) // 64), np.uint64)
+    t = np.empty(frames + 1, np.int32)
+    d = np.empty(frames + 1, np.int32)
+    block = (frames + blocks.shape[0] - 1) // blocks.shape[0]
+    counts = np.zeros((4, lengths.size), np.int64)
+    for column in range(words.shape[1]):
+        by_pixel(words, column, bits)
+        known, means, variances = np.uint64(0), np.zeros(64), np.zeros(64)
+        for within in range(64):
+            p = 64 * column + within
+            if p >= ends.shape[0]:
+                break
+            n = times_of(bits[within], t)
+            ends[p, 0] = n
+            if n == 0:
+                continue
+            ends[p, 1], ends[p, 2] = t[0], t[n - 1]
+            i = 0
+            for b in range(blocks.shape[0]):
+                start, stop = i, min((b + 1) * block, frames)
+                i = np.searchsorted(t[:n], stop)
+                blocks[b, p] = i - start
+            for j in range(steps.size):
+                k = steps[j]
+                if n > 2 * k:
+                    square[p, j] = second_differences(t, n, k)
+                    terms[p, j] = n - 2 * k
+            if n < 2:
+                continue
+            least, most = np.int32(frames), np.int32(0)
+            for i in range(n - 1):
+                d[i] = t[i + 1] - t[i]
+                least, most = min(least, d[i]), max(most, d[i])
+            _count(d[: n - 1], least, most, counts)
+            if n < 4:
+                continue
+            mean = (t[n - 1] - t[0]) / (n - 1)
+            squares, products = np.int64(0), np.int64(0)
+            for i in range(n - 1):
+                squares += np.int64(d[i]) * d[i]
+            for i in range(n - 2):
+                products += np.int64(d[i]) * d[i + 1]
+            variance = squares / (n - 1) - mean * mean
+            # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2
+            inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
+            moments[p, 0], moments[p, 1] = variance, (products - mean * inner) / (n - 2) + mean * mean
+            below, above = np.int32(np.ceil(0.6 * mean - 1.0)), np.int32(np.floor(1.5 * mean + 1.0))
+            short, long = np.int64(0), np.int64(0)
+            if least < below or most > above:
+                for i in range(n - 1):
+                    too_short, too_long = d[i] < below, d[i] > above
+                    short += too_short
+                    long += too_long
+                    odd[t[i + 1]] += too_short | too_long
+            elif n < SPARSE * frames:
+                for i in range(n - 1):
+                    late[t[i + 1]] += d[i] - mean
+                    scatter[t[i + 1]] += variance
+                    timed[t[i + 1]] += 1
+            else:
+                for i in range(n - 1):
+                    late[t[i + 1]] += d[i]
+                known |= np.uint64(1) << np.uint64(within)
+                means[within], variances[within] = mean, variance
+                late[t[0]] += mean  # no interval ends with the first spike
+                scatter[t[0]] -= variance
+                timed[t[0]] -= 1
+            moments[p, 2], moments[p, 3] = short, long
+        if known:
+            _add_to_spikes(words[:, column].copy(), known, means, variances, late, scatter, timed)
+    lengths += counts.sum(axis=0)
+    for f in range(frames):
+        if timed[f] == 0:
+            late[f], scatter[f] = 0.0, 0.0  # but for rounding
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _count(d, least, most, lengths):  # type: ignore[no-untyped-def]
+    """Add the intervals d, of least to most, to those of their length: length by length where these are few.
+
+    lengths: (4, n), for intervals in turn: a count that is added to at once again waits for itself.
+    """
+    if most - least < ALIKE:
+        for length in range(least, most + 1):
+            count = 0
+            for i in range(d.size):
+                count += d[i] == length
+            lengths[0, min(length, lengths.shape[1] - 1)] += count
+    else:
+        for i in range(d.size):
+            lengths[i & 3, min(d[i], lengths.shape[1] - 1)] += 1
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _add_to_spikes(words, known, mean, variance, late, scatter, timed):  # type: ignore[no-untyped-def]
+    """Take a mean and add a variance (64,) for the spikes (F,) of each of 64 pixels, bit by bit those `known`; eight
+    pixels at a time, from sums over all that may fire together."""
+    means, variances = np.zeros((8, 256)), np.zeros((8, 256))
+    for octet in range(8):
+        for i in range(8):
+            for j in range(1 << i):
+                means[octet, j + (1 << i)] = means[octet, j] + mean[8 * octet + i]
+                variances[octet, j + (1 << i)] = variances[octet, j] + variance[8 * octet + i]
+    for f in range(words.size):
+        fired = words[f] & known
+        usual, own = 0.0, 0.0
+        for octet in range(8):
+            at = (fired >> np.uint64(8 * octet)) & np.uint64(255)
+            usual += means[octet, at]
+            own += variances[octet, at]
+        late[f] -= usual
+        scatter[f] += own
+        timed[f] += ones(fired)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def add_rows(octets, rows, spread, sums):  # type: ignore[no-untyped-def]
+    """octets: (F, rows * each) uint8; sums: (parts, F, each), 255 rows a part, the most a byte can count."""
+    parts, frames, each = sums.shape
+    for part in range(parts):
+        for f in range(frames):
+            for r in range(255 * part, min(255 * (part + 1), rows)):
+                for b in range(each):
+                    sums[part, f, b] += spread[octets[f, r * each + b]]
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def through_frames(words, rows, row, coincidences):  # type: ignore[no-untyped-def]
+    """words: (F, rows * n) uint64, each row of pixels n whole words, padded with zeros."""
+    frames = words.shape[0]
+    each = words.shape[1] // rows
+    right = words >> np.uint64(1)  # every pixel's neighbour to the right in its place
+    for f in range(frames):
+        for at in range(words.shape[1]):
+            if (at + 1) % each:
+                right[f, at] |= words[f, at + 1] << np.uint64(63)
+            row[f, at // each] += ones(words[f, at])
+    for lag in range(coincidences.shape[0]):
+        across, down = np.uint64(0), np.uint64(0)
+        for f in range(lag, frames):
+            now, then = words[f], words[f - lag]
+            across += _common(now, right[f - lag]) + _common(right[f], then)
+            down += _common(now[each:], then[:-each]) + _common(now[:-each], then[each:])
+        coincidences[lag] = across, down
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _common(a, b):  # type: ignore[no-untyped-def]
+    """Number of bits that two rows of words (n,) have in common."""
+    total = np.uint64(0)
+    for i in range(a.size):
+        total += ones(a[i] & b[i])
+    return total

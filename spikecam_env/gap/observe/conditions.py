@@ -1,0 +1,87 @@
+"""A campaign as the diagnosis works with it: every recording observed, and what the camera was shown.
+
+Kinds of light: `dark`, `flat` (uniform and steady), `picture` (steady), `step` (uniform, changes in time), `moving`,
+`unknown` (a static scene that nobody measured) and `rates` (no spikes, only the rates of pixels).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from spikecam_env.campaign.reading import Campaign, CampaignRecording
+from spikecam_env.gap.campaign.recording_kinds import Planned
+from spikecam_env.gap.observe.observation import Observation, observe
+from spikecam_env.sensor import Keyframes
+
+KNOWN = ("dark", "flat", "picture")
+"""Steady light that was measured: what a unit can be refitted by."""
+
+STATIC = (*KNOWN, "unknown")
+
+LABELS = 2e-5
+"""Relative error that labels of light, and first-order laws of it, are known to: a standard deviation."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One recording's conditions.  level: mean radiance; light: None where unknown; use: "fit" or "holdout"."""
+
+    name: str
+    kind: str
+    level: float
+    light: Keyframes | None
+    frames: int
+    use: str
+    v_d: float | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether light changes in time."""
+        return self.kind in ("step", "moving")
+
+    @property
+    def picture(self) -> NDArray[np.float64]:
+        """(P,) radiance, of static light."""
+        assert self.light is not None
+        return self.light.radiance[0].reshape(-1).astype(np.float64)
+
+
+def shown(recording: CampaignRecording) -> Shown:
+    """What kind of light a recording was taken in."""
+    light = recording.light()
+    if light is None:
+        return Shown(recording.name, "unknown", np.nan, None, recording.frames, recording.use, recording.v_d)
+    return _classed(recording.name, light, recording.frames, recording.use, recording.v_d)
+
+
+def planned(design: Sequence[Planned], shape: tuple[int, int], frames: int) -> list[Shown]:
+    """Conditions of recordings that are planned, not made."""
+    found = []
+    for p in design:
+        light = p.light(shape, frames)
+        whole = Keyframes(light.frame, np.broadcast_to(light.radiance, (len(light.frame), *shape)))
+        found.append(_classed(p.file_name, whole, frames, p.use, p.v_d))
+    return found
+
+
+def _classed(name: str, light: Keyframes, frames: int, use: str, v_d: float | None) -> Shown:
+    uniform = bool(np.all(light.radiance == light.radiance[:, :1, :1]))
+    steady = bool(np.all(light.radiance == light.radiance[:1]))
+    level = float(light.radiance.mean())
+    if steady:
+        kind = "dark" if level == 0 else "flat" if uniform else "picture"
+        light = Keyframes(light.frame[:1], light.radiance[:1])
+    else:
+        kind = "step" if uniform else "moving"
+    return Shown(name, kind, level, light, frames, use, v_d)
+
+
+def observed(campaign: Campaign, conditions: list[Shown], *, progress: bool = False) -> list[Observation | None]:
+    """Every recording of spikes in numbers; None for those that are rates only."""
+    bar = tqdm(zip(campaign.recordings, conditions, strict=True), "read", len(conditions), disable=not progress)
+    return [observe(r.packed(), campaign.shape, film=c.moves) if r.spikes else None for r, c in bar]

@@ -1,0 +1,154 @@
+"""A recording reduced to numbers, in two passes over its bits: what every statistic is computed from.
+
+Per pixel: spike times at both ends, second differences A_k, interval moments, counts by block of time.
+Per frame: spikes of the array, of each row and of each column.  Neighbours: coincidences at lags of 0 to 2 frames.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.calibration.spike_times import SpikeTimes
+from spikecam_env.gap.observe.bit_passes import add_rows, through_frames, through_pixels
+from spikecam_env.streams.bits import as_words
+from spikecam_env.streams.packing import unpack_frames
+
+Array = NDArray[np.float64]
+
+STEPS = (1, 4, 16, 64)
+"""k of A_k."""
+
+BLOCKS = 16
+"""Equal parts of a recording whose counts are kept pixel by pixel."""
+
+BIN = 16
+"""Frames of a bin of the film that is kept of a recording with moving light."""
+
+LENGTHS = 64
+"""Intervals are counted by length up to this many frames."""
+
+FEW = 0.3
+"""Share of pixels below which those with odd intervals are left out where noise of all pixels is asked for."""
+
+LAGS = 3
+"""Lags 0 .. LAGS - 1 [frames] of neighbours' coincidences."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One recording in numbers; P pixels row-major, F frames, shape (H, W).
+
+    times: ends, counts and A_k of each pixel.  variance, covariance: (P,) of intervals, and of successive ones, about
+    the pixel's own mean [frames^2]; NaN below 3 intervals.  short, long: (P,) intervals T below 0.6 T - 1 or
+    above 1.5 T + 1 of the mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.
+    blocks: (BLOCKS, P) counts.
+    frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (LAGS, 2) spikes of one pixel with its neighbour's,
+    lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
+    late: (F,) sum over the `timed` (F,) intervals that end in a frame of what they are longer than the pixel's mean
+    [frames], of pixels without short or long ones; scatter: (F,) of the variances of those pixels' intervals.
+    odd: (F,) short and long intervals that end in a frame.
+    """
+
+    shape: tuple[int, int]
+    times: SpikeTimes
+    variance: Array
+    covariance: Array
+    short: NDArray[np.int64]
+    long: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    blocks: NDArray[np.int32]
+    frame: NDArray[np.int32]
+    row: NDArray[np.int32]
+    column: NDArray[np.int32]
+    coincidences: Array
+    film: NDArray[np.uint8] | None
+    late: Array
+    scatter: Array
+    timed: NDArray[np.int32]
+    odd: NDArray[np.int32]
+
+    @property
+    def frames(self) -> int:
+        return self.times.frames
+
+    @property
+    def rate(self) -> Array:
+        """(P,) spikes a frame between first and last spike; count over frames below two spikes."""
+        return np.where(self.times.count > 1, self.times.rate, self.times.count / self.frames)
+
+    @property
+    def struck(self) -> NDArray[np.bool_]:
+        """(P,) pixels with a short or long interval, where they are FEW; none where odd intervals are the rule."""
+        odd: NDArray[np.bool_] = self.short + self.long > 0
+        return odd & (odd.mean() < FEW)
+
+
+def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = False) -> Observation:
+    """Reduce (F, ceil(H W / 8)) uint8 bits; film: keep counts in bins of time."""
+    pixels = shape[0] * shape[1]
+    ends = np.full((pixels, 3), -1, np.int64)
+    square, terms = np.zeros((pixels, len(STEPS))), np.zeros((pixels, len(STEPS)), np.int64)
+    moments = np.full((pixels, 4), np.nan)
+    blocks = np.zeros((BLOCKS, pixels), np.int32)
+    lengths = np.zeros(LENGTHS + 1, np.int64)
+    late, scatter = np.zeros((2, len(packed)))
+    timed, odd = np.zeros((2, len(packed)), np.int32)
+    words = as_words(packed)
+    through_pixels(words, np.array(STEPS), ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd)
+    by_row = _rows_in_words(packed, shape)
+    row = np.zeros((len(packed), shape[0]), np.int32)
+    coincidences = np.zeros((LAGS, 2))
+    through_frames(by_row, shape[0], row, coincidences)
+    count, first, last = ends.T
+    return Observation(
+        shape,
+        SpikeTimes(len(packed), count, first, last, np.array(STEPS), square, terms),
+        moments[:, 0],
+        moments[:, 1],
+        np.nan_to_num(moments[:, 2]).astype(np.int64),
+        np.nan_to_num(moments[:, 3]).astype(np.int64),
+        lengths[1:],
+        blocks,
+        row.sum(axis=1, dtype=np.int32),
+        row,
+        _columns(by_row, shape),
+        coincidences,
+        _film(words, pixels) if film else None,
+        late,
+        scatter,
+        timed,
+        odd,
+    )
+
+
+def _rows_in_words(packed: NDArray[np.uint8], shape: tuple[int, int]) -> NDArray[np.uint64]:
+    """(F, rows * words) bits with every row of pixels in words of its own."""
+    if shape[1] % 64 == 0:
+        return as_words(packed)
+    padded = np.pad(unpack_frames(packed, shape), ((0, 0), (0, 0), (0, -shape[1] % 64)))
+    return np.packbits(padded, axis=2, bitorder="little").reshape(len(padded), -1).view(np.uint64)
+
+
+_SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64)[:, 0]
+"""(256,) the eight bits of a byte as eight bytes of a word, which add up side by side."""
+
+
+def _columns(by_row: NDArray[np.uint64], shape: tuple[int, int]) -> NDArray[np.int32]:
+    """(F, W) spikes of each column, frame by frame."""
+    each = by_row.shape[1] * 8 // shape[0]
+    sums = np.zeros((-(-shape[0] // 255), len(by_row), each), np.uint64)
+    add_rows(by_row.view(np.uint8), shape[0], _SPREAD, sums)
+    parts = sums.view(np.uint8)[..., : shape[1]]
+    return parts[0].astype(np.int32) if len(parts) == 1 else parts.sum(axis=0, dtype=np.int32)
+
+
+def _film(words: NDArray[np.uint64], pixels: int) -> NDArray[np.uint8]:
+    """(F // BIN, P) spikes of each pixel in bins of BIN frames; words: (F, n) its bits."""
+    bins = len(words) // BIN
+    octets = words[: bins * BIN].view(np.uint8).reshape(bins, -1)
+    sums = np.zeros((1, bins, octets.shape[1] // BIN), np.uint64)
+    add_rows(octets, BIN, _SPREAD, sums)
+    return sums[0].view(np.uint8)[:, :pixels]

@@ -1,0 +1,1 @@
+"""What a diagnosis says: sentences, plots, and one page of HTML."""

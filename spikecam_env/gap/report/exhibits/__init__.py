@@ -1,0 +1,57 @@
+"""Exhibits: one way to look at the recordings a file, named as the group of statistics that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from spikecam_env.gap.report.evidence import Maps, Panel
+from spikecam_env.gap.report.exhibits import (
+    clock,
+    drift,
+    intervals,
+    moving,
+    neighbours,
+    noise,
+    pattern,
+    rates,
+    rows,
+    spectrum,
+    step,
+)
+from spikecam_env.gap.result import Evidence, Statistic
+
+LOUD = 4.0
+"""|z| from which an exhibit is shown among the evidence."""
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """One way to look.  name: of the group of statistics that it shows.  panels, maps: what is drawn of it."""
+
+    name: str
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+    maps: tuple[Maps, ...] = ()
+
+    def z(self, statistics: Sequence[Statistic]) -> float:
+        """Largest |z| of its statistics; of its own panels where the bank has none of this group."""
+        own = [abs(s.z) for s in statistics if s.group == self.name]
+        return max(own) if own else max((p.z for p in self.panels), default=0.0)
+
+
+def exhibits(evidence: Evidence, frame_rate_hz: float) -> list[Exhibit]:
+    """All that these recordings can show; those without a panel are left out."""
+    made = []
+    for module in (rates, noise, intervals, drift, spectrum, rows, neighbours, clock, step, moving, pattern):
+        panels = tuple(module.panels(evidence, frame_rate_hz))
+        maps = tuple(pattern.maps(evidence)) if module is pattern else ()
+        made.append(Exhibit(module.__name__.rsplit(".", 1)[1], module.TITLE, module.CAPTION, panels, maps))
+    return [e for e in made if e.panels or e.maps]
+
+
+def by_loudness(made: Sequence[Exhibit], statistics: Sequence[Statistic]) -> tuple[list[Exhibit], list[Exhibit]]:
+    """Exhibits where measured and before differ, loudest first, and the others."""
+    order = sorted(made, key=lambda e: -e.z(statistics))
+    return [e for e in order if e.z(statistics) >= LOUD], [e for e in order if e.z(statistics) < LOUD]

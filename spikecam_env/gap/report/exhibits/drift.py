@@ -1,0 +1,28 @@
+"""The array's rate through a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.report.evidence import Panel, loudest, over_pixels, takes
+from spikecam_env.gap.result import Evidence
+
+TITLE = "Through the recording"
+CAPTION = "The array's rate in sixteen parts of a recording, less the model's."
+
+
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+    """The rate of the array in sixteen parts of a recording."""
+    made = []
+    for t in takes(evidence, STATIC):
+        if t.before.blocks.sum() < 100:
+            continue
+        measured, before, after, sd = over_pixels(t, lambda o: o.blocks / max(o.blocks.mean(), 1e-9))
+        x = (np.arange(len(measured)) + 0.5) * (t.measured.frames / len(measured)) * 1e3 / frame_rate_hz
+        made.append(Panel(f"Rate through {t.shown.name}", "time [ms]", "rate over its mean, less 1 [%]", x,
+                            100 * (measured - before), np.zeros(x.size),
+                            None if after is None else 100 * (after - before), 100 * sd))  # fmt: skip
+    yield from loudest(made, 2)

@@ -1,0 +1,36 @@
+"""Intervals by length."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.report.evidence import Panel, loudest, scaled, takes
+from spikecam_env.gap.result import Evidence
+
+TITLE = "Lengths of intervals"
+CAPTION = "How often intervals of each length occur, less the model's share."
+
+
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+    """Intervals by length, and how their shares differ."""
+    made = []
+    for t in takes(evidence, STATIC):
+        total = [max(float(o.lengths.sum()), 1.0) if o else 1.0 for o in (t.measured, t.before, t.after)]
+        if min(total[:2]) < 100:
+            continue
+        both = t.measured.lengths + t.before.lengths
+        shown = np.flatnonzero(both > 0)
+        shown = np.arange(shown[0], shown[-1] + 1)
+        measured, before = t.measured.lengths[shown] / total[0], t.before.lengths[shown] / total[1]
+        after = t.after.lengths[shown] / total[2] if t.after else None
+        sd = np.sqrt(np.maximum(measured, 1 / total[0]) / total[0] + np.maximum(before, 1 / total[1]) / total[1])
+        sd = scaled(sd, t.again.lengths[shown] / max(t.again.lengths.sum(), 1) - before if t.again else None)
+        made.append(Panel(
+            f"Intervals by length, {t.shown.name}", "length [frames]", "share, less the model's [%]",
+            shown + 1.0, 100 * (measured - before), np.zeros(shown.size),
+            None if after is None else 100 * (after - before), 100 * sd,
+        ))  # fmt: skip
+    yield from loudest(made, 3)

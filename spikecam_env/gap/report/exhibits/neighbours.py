@@ -1,0 +1,37 @@
+"""Neighbours that fire together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.report.evidence import Panel, loudest, scaled, takes
+from spikecam_env.gap.result import Evidence
+
+TITLE = "Neighbours"
+CAPTION = (
+    "How often a pixel fires with its neighbour, in the same frame (0) and one or two frames after, over the model's."
+)
+
+
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+    """Spikes of a pixel with its neighbour's, in the same frame and one or two after."""
+    made = []
+    for t in takes(evidence, STATIC):
+        measured, before = (o.coincidences.T.reshape(-1) for o in (t.measured, t.before))
+        if min(measured.min(), before.min()) < 20:
+            continue
+        after = t.after.coincidences.T.reshape(-1) if t.after else None
+        labels = tuple(f"{where}, {lag}" for where in ("in a row", "in a column") for lag in range(len(measured) // 2))
+        again = t.again.coincidences.T.reshape(-1) if t.again else None
+        # Every pair is counted both ways round.
+        sd = scaled(np.sqrt(2 / measured + 2 / before), None if again is None else again / before - 1)
+        made.append(Panel(
+            f"Coincidences of neighbours, {t.shown.name}", "", "over the model's, less 1 [%]",
+            np.arange(len(labels), dtype=np.float64), 100 * (measured / before - 1), np.zeros(len(labels)),
+            None if after is None else 100 * (after / before - 1), 100 * sd,
+            labels=labels,
+        ))  # fmt: skip
+    yield from loudest(made, 2)

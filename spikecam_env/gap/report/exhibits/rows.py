@@ -1,0 +1,43 @@
+"""Noise that the pixels of a row or column have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.report.evidence import Array, Panel, against_before, by_recording, loudest, takes
+from spikecam_env.gap.result import Evidence
+
+TITLE = "Rows and columns in time"
+CAPTION = "Variance in time of the spikes of a row or column, less what the whole array shares, over the model's."
+
+
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+    """Variance of rows and columns over the model's, recording by recording."""
+    found = [t for t in takes(evidence, STATIC) if t.before.frame.sum() > 500]
+    made = []
+    for name in ("row", "column") if found else ():
+        for frames in (1, 16):
+            measured, before, after, sd = by_recording(found, partial(_variance_of, name, frames))
+            title = f"Variance of {name}s in {frames} frame{'s' if frames > 1 else ''}"
+            made.append(against_before(title, "over the model's, less 1 [%]", found, measured, before, after, sd,
+                                       100 / before))  # fmt: skip
+    yield from loudest(made, 3)
+
+
+def _variance_of(name: str, frames: int, observation: Observation) -> Array:
+    return variance(observation.row if name == "row" else observation.column, frames)
+
+
+def variance(lines: NDArray[np.int32], frames: int) -> Array:
+    """(lines,) variance in time of spikes in `frames` frames (F, lines), less the mean over lines."""
+    whole = len(lines) // frames * frames
+    binned = lines[:whole].reshape(-1, frames, lines.shape[1]).sum(axis=1).astype(np.float64)
+    binned -= binned.mean(axis=0)
+    out: Array = ((binned - binned.mean(axis=1, keepdims=True)) ** 2).mean(axis=0)
+    return out

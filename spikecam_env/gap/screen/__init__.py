@@ -1,0 +1,1 @@
+"""Which candidates are worth a fit, by templates of what each does."""

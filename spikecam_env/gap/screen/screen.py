@@ -1,0 +1,117 @@
+"""Which candidates are worth a fit: templates scaled to the measurement, and what they would leave of it.
+
+The fit that follows simulates the campaign at hand and rests on no template.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates.strength import bounded, may_be_negative
+from spikecam_env.gap.candidates.table import candidate, of_motion
+from spikecam_env.gap.compare.distance import misfit
+from spikecam_env.gap.compare.prediction import TOLERANCE, Null, of_a_pair, pooled
+from spikecam_env.gap.compare.step import scale_of
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.screen.templates import Template, Templates
+from spikecam_env.gap.statistics import Key
+from spikecam_env.sensor import CATALOGUE
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A candidate as its template sees it.  start: parameters to fit from.  misfit: what it would leave.
+
+    expected: (S,) change of the statistics there.  white: s^2 of the unit there, over the refit's.
+    """
+
+    name: str
+    start: dict[str, float]
+    misfit: float
+    expected: Array
+    white: float = 1.0
+
+
+def screen(
+    templates: Templates,
+    conditions: Sequence[Shown],
+    null: Null,
+    measured: Array,
+    names: Sequence[str],
+    line_hz: float | None = None,
+) -> list[Screened]:
+    """Candidates by what their best template of each shape, scaled, would leave unexplained; least first.
+
+    line_hz: frequency of the strongest line of the measured spectra, to start periodic candidates from.
+    """
+    at = _places(templates, conditions, null.keys)
+    d = np.nan_to_num((measured - null.mean) / null.noise)
+    best: dict[tuple[str, frozenset[Any]], Screened] = {}
+    for entry in templates.entries:
+        if entry.name not in names:
+            continue
+        shift = np.where((at >= 0) & np.isfinite(measured), (entry.shift * templates.noise)[at] / null.noise, 0.0)
+        now = (
+            _scattered(entry, null, d, shift)
+            if candidate(entry.name).wanders
+            else _in_proportion(entry, null, d, shift)
+        )
+        if now is None and of_motion(entry.name):
+            now = Screened(entry.name, dict(entry.parameters), misfit(d, null.weight), shift * null.noise)
+        if now is None:
+            continue
+        if line_hz and "frequency_hz" in entry.parameters:
+            now = replace(now, start=bounded(entry.name, {**now.start, "frequency_hz": line_hz}))
+        if entry.shape not in best or now.misfit < best[entry.shape].misfit:
+            best[entry.shape] = now
+    return sorted(best.values(), key=lambda s: s.misfit)
+
+
+def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Screened | None:
+    """A template scaled to the measured distances `d`, in noise; None where only a wrong sign would do."""
+    own2 = of_a_pair(null.keys) ** 2 * (shift != 0)
+    scale, _ = scale_of(d, shift, np.ones_like(d), own2, 2 * TOLERANCE)
+    if scale <= 0 and not may_be_negative(entry.name):
+        return None
+    strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
+    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
+    there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
+    start = bounded(entry.name, {**entry.parameters, strength: there})
+    white = 1.0 / (1.0 + abs(scale) * (1.0 / entry.white - 1.0))
+    return Screened(entry.name, start, misfit(rho, null.weight), scale * shift * null.noise, white)
+
+
+def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
+    """A template of what wanders: its size alone, over all recordings, is by how much statistics scatter."""
+    strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
+    size2 = pooled(null.keys, shift**2)
+    tried = []
+    for factor in np.geomspace(1e-3, 1e3, 100):
+        wider = 1.0 + factor * size2
+        price = float(np.sum(null.weight * np.log(wider) * (d != 0)))
+        tried.append((misfit(d / np.sqrt(wider), null.weight) + price, factor))
+    left, factor = min(tried)
+    start = bounded(entry.name, {**entry.parameters, strength: entry.parameters[strength] * factor ** (1 / power)})
+    return Screened(entry.name, start, left, np.sqrt(factor * size2) * null.noise)
+
+
+def _places(templates: Templates, conditions: Sequence[Shown], keys: Sequence[Key]) -> NDArray[np.int64]:
+    """Where in the templates each statistic stands: on the recording of its kind whose level is nearest; -1 nowhere."""
+    nearest: dict[str, str] = {}
+    for c in conditions:
+        kind = "flat" if c.kind in ("picture", "unknown") else c.kind
+        same = [n for n, k in templates.kinds.items() if k == kind]
+        if not same:
+            continue
+        level = c.level if c.level > 0 else 0.1
+        byname = [n for n in same if n == c.name]
+        nearest[c.name] = (byname or [min(same, key=lambda n: abs(np.log(max(templates.levels[n], 1e-6) / level)))])[0]
+    index = {k: i for i, k in enumerate(templates.keys)}
+    return np.array([index.get(Key(k.group, nearest.get(k.recording, ""), k.name), -1) for k in keys])

@@ -1,0 +1,1 @@
+"""The search: one effect after another, while something is left."""

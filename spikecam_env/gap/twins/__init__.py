@@ -1,0 +1,1 @@
+"""Simulated campaigns of the measured unit under a model, its recordings in the same light."""

@@ -1,0 +1,128 @@
+"""One measurement under diagnosis: what was shown and seen, and how to simulate the same campaign under a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.observe.conditions import KNOWN, Shown
+from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.statistics import Key, bank, pattern_bank
+from spikecam_env.gap.statistics.film import Film, films
+from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.twins.simulate import FIRST
+from spikecam_env.gap.twins.unknown_scene import simulate_seen
+from spikecam_env.gap.unit.refit import BaseFit, measured_base
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Case:
+    """conditions, observations: of the measurement.  base: its free refit.  bank: its statistics.
+
+    effort: what was simulated for it, by all that was made of it.  nominal_per_label: nominal radiance of 1 of the
+    labels, by which the light of `conditions` was multiplied.
+    """
+
+    shape: tuple[int, int]
+    conditions: tuple[Shown, ...]
+    observations: tuple[Observation, ...]
+    films: Mapping[str, Film]
+    base: BaseFit
+    bank: dict[Key, float]
+    seed: int
+    jobs: int = 1
+    frame_rate_hz: float = 40_000.0
+    effort: Effort = field(default_factory=Effort, compare=False)
+    nominal_per_label: float = 1.0
+
+    @property
+    def scenes_only(self) -> bool:
+        """Whether no light is known: response and dark level cannot be told from the scene."""
+        return not any(c.kind in KNOWN for c in self.conditions)
+
+    def use(self, recording: str) -> str:
+        """fit or holdout."""
+        return next((c.use for c in self.conditions if c.name == recording), "fit")
+
+    def to_fit(self, keys: Sequence[Key]) -> NDArray[np.bool_]:
+        """(S,) which statistics are of recordings to fit."""
+        return np.array([self.use(k.recording) == "fit" for k in keys], bool)
+
+    def held_out(self, keys: Sequence[Key]) -> NDArray[np.bool_]:
+        """(S,) which statistics the gap is the mean of: those of recordings held out, or all where none is."""
+        held = np.array([self.use(k.recording) == "holdout" for k in keys], bool)
+        return held if held.any() else np.ones(len(keys), bool)
+
+    def of(self, conditions: Sequence[Shown], observations: Sequence[Observation]) -> Case:
+        """Other recordings of the same camera, refitted anew."""
+        return case_of(self.shape, conditions, observations, self.seed, self.jobs, self.frame_rate_hz)
+
+
+@dataclass(frozen=True)
+class Twin:
+    """One simulated campaign: its statistics, and its own refit where what that rests on was simulated."""
+
+    bank: dict[Key, float]
+    base: BaseFit | None
+
+
+def case_of(
+    shape: tuple[int, int],
+    conditions: Sequence[Shown],
+    observations: Sequence[Observation],
+    seed: int = 0,
+    jobs: int = 1,
+    frame_rate_hz: float = 40_000.0,
+) -> Case:
+    """Refit and statistics of a measurement."""
+    moving = films(conditions, shape)
+    base = measured_base(list(observations), list(conditions))
+    reading = Reading(observations, conditions, base, moving)
+    statistics = {**bank(reading), **pattern_bank(reading)}
+    return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs, frame_rate_hz)
+
+
+def twins(
+    case: Case,
+    model: SensorModel,
+    base: BaseFit,
+    numbers: Sequence[int],
+    only: Sequence[int] | None = None,
+    refits: Mapping[int, BaseFit | None] | None = None,
+) -> list[Twin]:
+    """Campaigns of the unit `base` under `model`; one number is one set of draws, whatever the model.
+
+    only: recordings to simulate, by index.  Without all of those that the refit rests on, that of `refits` stands for
+    it, by number, or the unit itself: beside an effect that bends rates, what a unit has is not what a refit sees.
+    """
+    stands = refits or {}
+
+    def made(n: int) -> Twin:
+        return _twin(case, model, base, case.seed * 1000 + FIRST + n, only, stands.get(n) or base)
+
+    with ThreadPoolExecutor(case.jobs) as pool:
+        return list(pool.map(made, numbers))
+
+
+def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None, refit: BaseFit) -> Twin:
+    which = range(len(case.conditions)) if only is None else only
+    case.effort.spent.append(len(which))
+    conditions = [case.conditions[i] for i in which]
+    seen = [case.observations[i] for i in which]
+    observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)
+    own = measured_base(observations, conditions) if rests_on(case) <= set(which) else None
+    return Twin(bank(Reading(observations, conditions, own or refit, case.films)), own)
+
+
+def rests_on(case: Case) -> set[int]:
+    """Recordings that the base refit rests on: of use fit and of known light, or where none is, of unknown scenes."""
+    known = {i for i, c in enumerate(case.conditions) if c.kind in KNOWN and c.use == "fit"}
+    return known or {i for i, c in enumerate(case.conditions) if c.kind == "unknown"}

@@ -1,0 +1,109 @@
+"""Fresh units drawn from a model: what the fixed pattern of rates should look like, and what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.statistics import Key, pattern
+from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
+from spikecam_env.gap.unit.refit import BaseFit, responds
+from spikecam_env.gap.unit.traps import drawn_traps, level_of
+from spikecam_env.robust import scatter
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+UNITS = 24
+"""Units drawn for the pattern statistics of one model."""
+
+SPREADS = {
+    "gain": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
+    "dark": {"dark_current_spread": "sigma_pA"},
+}
+"""Parameters that make pixels differ, by effect and by what of a unit differs."""
+
+WITHIN = (0.6, 1.67)
+"""Units' spreads lie within this of the model's; beyond, it is a gap."""
+
+
+def drawn_banks(
+    model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], count: int, seed: int
+) -> list[dict[Key, float]]:
+    """Pattern statistics of `count` units of the model, at the measured unit's mean response, dark level and noise.
+
+    The model's own spreads are scaled, within limits, so that the whole spread is the measured one.
+    """
+    fitted = model
+    for _ in range(2):
+        fitted = _rescaled(fitted, model, base, shape, seed)
+    return [_bank(fitted, base, shown, shape, seed + n) for n in range(count)]
+
+
+def _rescaled(
+    model: SensorModel, nominal: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int
+) -> SensorModel:
+    out = model
+    for what, spreads in SPREADS.items():
+        factor = spread_factor(model, what, width(getattr(base, what)[base.live]), shape, seed)
+        for effect in model.effects:
+            if effect.name in spreads:
+                key = spreads[effect.name]
+                first = next(e for e in nominal.effects if e.name == effect.name).parameters()[key]
+                value = float(np.clip(effect.parameters()[key] * factor, WITHIN[0] * first, WITHIN[1] * first))
+                out = out.with_effect(replace(effect, **{key: value}))
+    return out
+
+
+def spread_factor(model: SensorModel, what: str, wanted: float, shape: tuple[int, int], seed: int) -> float:
+    """By how much to multiply all spreads of `what` (gain or dark) that a model has, for a relative width `wanted`."""
+    rest = model
+    for name in {e.name for e in model.effects} & SPREADS[what].keys():
+        rest = rest.without(name)
+    units = [m.draw_unit(shape, seed) for m in (model, rest)]
+    whole, others = (width(getattr(unit, what)[responds(unit.gain)]) for unit in units)
+    own = whole**2 - others**2
+    return float(np.sqrt(max(wanted**2 - others**2, 0.0) / own)) if own > 1e-10 else 1.0
+
+
+def width(values: Array) -> float:
+    """Robust relative spread: the scatter over the median."""
+    middle = float(np.median(values))
+    return scatter(values) / middle if middle > 0 else 0.0
+
+
+def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:
+    """gain, dark (P,) of a fresh unit of the model, scaled to the measured unit's medians."""
+    unit = model.draw_unit(shape, seed)
+    live, alive = base.live & (base.gain > 0), responds(unit.gain)
+    gain = unit.gain * (np.median(base.gain[live]) / max(float(np.median(unit.gain[alive])), 1e-12))
+    middle = float(np.median(unit.dark[alive]))
+    dark = unit.dark * (np.median(base.dark[live]) / middle) if middle > 0 else unit.dark
+    return gain, dark
+
+
+def _bank(
+    model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], seed: int
+) -> dict[Key, float]:
+    gain, dark = drawn(model, base, shape, seed)
+    charge = drawn_traps(model, shape, seed)
+    rng, phases, false = (np.random.default_rng([seed, n]) for n in (1, 2, 3))
+    found = {}
+    for c in shown:
+        if c.kind not in ("dark", "flat") or c.light is None:
+            continue
+        rate = gain * c.picture + dark + level_of(model, charge, c.frames, rng)
+        spikes = np.maximum(rate * c.frames, 1.0)
+        noise = np.sqrt(base.white / spikes + 1.0 / (6.0 * c.frames**2))  # first and last spike, each read to a frame
+        phase = phases.random(rate.size)
+        count = np.floor(rate * c.frames + phase)
+        read = np.clip(rate * (1.0 + noise * rng.standard_normal(rate.size)), 0.0, 1.0)
+        read = np.where(count > 1, read, count / c.frames)  # as `Observation.rate`: one spike has no interval
+        read = read_with_false_spikes(model, read, rate, phase, c.frames, false)
+        for name, value in pattern.statistics(read.reshape(shape)).items():
+            found[Key("pattern", c.name, name)] = value
+    return found

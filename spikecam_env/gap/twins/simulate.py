@@ -1,0 +1,86 @@
+"""The twin: the fitted unit simulated under a model, through the same conditions, and observed the same way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.observe.conditions import LABELS, Shown
+from spikecam_env.gap.observe.observation import Observation, observe
+from spikecam_env.gap.unit.refit import BaseFit, unit_of
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
+from spikecam_env.sensor.light import GRAINS
+from spikecam_env.streams import pack_frames
+
+_BLOCK = 1024
+
+FIRST = 17
+"""Seed of a campaign's first twin; the others' follow."""
+
+
+def simulate(
+    model: SensorModel,
+    base: BaseFit,
+    conditions: Sequence[Shown],
+    shape: tuple[int, int],
+    seed: int,
+    takes: Sequence[int] | None = None,
+) -> list[Observation]:
+    """One simulated campaign of the unit `base` under `model`; another seed is other temporal noise and phases.
+
+    takes: number of each recording, by default in order; the same number and seed give the same draws.
+    """
+    unit = unit_of(model, base, shape)
+    return [
+        observe(expose(model, as_known(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
+        for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
+    ]
+
+
+def expose(
+    model: SensorModel, unit: Unit, condition: Shown, shape: tuple[int, int], seed: int, take: int
+) -> NDArray[np.uint8]:
+    """(F, P/8) bits of one recording in known light."""
+    sensor = SpikeSensor(at_any_phase(model, seed, take), shape, seed, engine="auto", take=take, unit=unit, threads=1)
+    light = condition.light
+    assert light is not None
+    picture: Keyframes | NDArray[np.float32] = light.radiance[0] if not condition.moves else light
+    spikes = np.empty((min(_BLOCK, condition.frames), *shape), np.uint8)
+    parts = []
+    for first in range(0, condition.frames, _BLOCK):
+        frames = min(_BLOCK, condition.frames - first)
+        parts.append(pack_frames(sensor.step(picture, frames, out=spikes[:frames])))
+    return np.concatenate(parts)
+
+
+def as_known(unit: Unit, seed: int, take: int) -> Unit:
+    """A unit of pixels that are all alike, in light and with a dark level no surer than they are known, drawn for one
+    recording: light to LABELS, dark to half a grain.
+
+    Where all pixels fire alike and without noise, the beat with the read-out's clock shows a hundred thousandth of the
+    rate: of the dark level what the sensor rounds, since it counts charge in whole grains, and of light what no label
+    says.  Drawn, it is no law.
+    """
+    if np.ptp(unit.gain) > 0:
+        return unit
+    rng = np.random.default_rng([seed, take, 4])
+    grains = rng.uniform(-0.5, 0.5) if unit.dark.min() >= 1.0 / GRAINS else 0.0
+    return replace(unit, gain=unit.gain * (1.0 + LABELS * rng.standard_normal()), dark=unit.dark + grains / GRAINS)
+
+
+def at_any_phase(model: SensorModel, seed: int, take: int) -> SensorModel:
+    """The model with its waves at phases drawn for one recording: nobody starts a recording by the mains.
+
+    Those of successive seeds are spread over the wave, two on opposite sides and four at right angles: of so few that
+    were drawn at random, all may be alike, and their scatter nothing.
+    """
+    rng = np.random.default_rng(take)
+    spread = int(f"{max(seed - FIRST, 0):064b}"[::-1], 2) / 2**64  # van der Corput's sequence
+    for effect in model.effects:
+        if "phase_cycles" in effect.parameters():
+            phase = (float(rng.random()) + spread) % 1.0
+            model = model.with_effect(replace(effect, phase_cycles=phase))  # type: ignore[call-arg]
+    return model

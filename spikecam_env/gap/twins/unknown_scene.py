@@ -1,0 +1,101 @@
+"""Static scenes that nobody measured: the light that gives every pixel the rate it was seen to have.
+
+    L(x, y) = (rate(x, y) - dark(x, y)) / gain(x, y)        under the unit and the model to be tested
+
+Rates then say nothing; what is left to test is when spikes come: noise, neighbours, rows, drift, lines.  Every twin
+draws rates anew from what the recording leaves open (`calibration.real.plausible_rates`), and where a model bends the
+response, light is corrected until the rates come out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.calibration.real import plausible_rates
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.twins.simulate import simulate
+from spikecam_env.gap.twins.workers import at_once
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.sensor import Keyframes, SensorModel
+
+Array = NDArray[np.float64]
+
+FEWEST = 3
+"""Spikes from which a pixel has a rate; others are given what two would."""
+
+EXACT = 3e-4
+"""Relative error of rates from which light is corrected."""
+
+_BINS = 12
+_TURNS = 6
+
+
+def simulate_seen(
+    model: SensorModel,
+    base: BaseFit,
+    conditions: Sequence[Shown],
+    seen: Sequence[Observation],
+    shape: tuple[int, int],
+    seed: int,
+    takes: Sequence[int],
+    jobs: int = 1,
+) -> list[Observation]:
+    """As `simulate`, with unknown scenes lit so that their pixels fire as in `seen`, `jobs` recordings at once.
+
+    Those that take longest are begun first, what moves and then what is bright: no thread waits for one at the end.
+    """
+
+    def one(i: int) -> Observation:
+        if conditions[i].kind == "unknown":
+            return simulate_scene(model, base, conditions[i], seen[i], shape, seed, takes[i])
+        return simulate(model, base, [conditions[i]], shape, seed, [takes[i]])[0]
+
+    order = sorted(range(len(conditions)), key=lambda i: (not conditions[i].moves, -seen[i].frame.sum()))
+    made = dict(zip(order, at_once(one, order, jobs), strict=True))
+    return [made[i] for i in range(len(conditions))]
+
+
+def simulate_scene(
+    model: SensorModel, base: BaseFit, scene: Shown, seen: Observation, shape: tuple[int, int], seed: int, take: int
+) -> Observation:
+    """One recording of an unknown scene, lit so that its pixels fire as in `seen`."""
+    wanted = likely_rates(seen, base.white, np.random.default_rng([seed, take]))
+    light = np.maximum(wanted - base.dark, 0.0) / np.maximum(base.gain, 1e-9)
+    for turn in range(_TURNS):
+        lit = replace(scene, light=Keyframes(np.zeros(1), light.reshape(1, *shape).astype(np.float32)))
+        [twin] = simulate(model, base, [lit], shape, seed, [take])
+        factor = missed_by(twin.rate, wanted)
+        if turn == _TURNS - 1 or np.abs(factor - 1.0).max() < EXACT:
+            break
+        light = light * factor
+    return twin
+
+
+def likely_rates(seen: Observation, white: float, rng: np.random.Generator) -> Array:
+    """(P,) rates [thresholds/frame] that the pixels may have had."""
+    few = seen.times.count < FEWEST
+    known = replace(
+        seen.times,
+        count=np.where(few, 2, seen.times.count),
+        first=np.where(few, 0, seen.times.first),
+        last=np.where(few, seen.frames - 1, seen.times.last),
+    )
+    return np.asarray(plausible_rates(known, white, rng), np.float64)
+
+
+def missed_by(simulated: Array, wanted: Array) -> Array:
+    """(P,) factor by which light misses, a smooth function of the rate: means of pixels of about the same one."""
+    edges = np.unique(np.quantile(wanted, np.linspace(0.0, 1.0, _BINS + 1)))
+    if edges.size < 3 or simulated.sum() == 0:
+        return np.full(wanted.shape, wanted.mean() / max(float(simulated.mean()), 1e-9))
+    bins = np.clip(np.searchsorted(edges, wanted, "right") - 1, 0, edges.size - 2)
+    total = np.bincount(bins, minlength=edges.size - 1)
+    there = total > 0
+    mean = np.bincount(bins, wanted)[there] / total[there]
+    got = np.bincount(bins, simulated)[there] / total[there]
+    return np.interp(wanted, mean, mean / np.maximum(got, 1e-9))

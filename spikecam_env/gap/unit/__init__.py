@@ -1,0 +1,1 @@
+"""The measured unit: response, dark level and jitter of every pixel, refitted from the recordings."""

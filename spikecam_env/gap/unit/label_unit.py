@@ -1,0 +1,46 @@
+"""Labels of light in a unit of their own, counted anew: radiance 1 makes the usual pixel fire about once a frame.
+
+What a diagnosis says of anything but light must not depend on the unit that light was labelled in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.gap.unit.usual import unusual
+
+
+def nominal_per_label(base: BaseFit) -> float:
+    """Nominal radiance of 1 of the labels, by the refit: 1 where the median gain is what units differ by, or where no
+    pixel gets brighter in more light.
+
+    A power of ten where that is enough: light in thousandths is then as if it had been labelled right, to the bit.
+    """
+    gain = float(np.median(base.gain[base.live])) if base.live.any() else 1.0
+    if not (gain > 0 and unusual(gain)):
+        return 1.0
+    decades = 10.0 ** round(np.log10(gain))
+    return gain if unusual(gain / decades) else decades
+
+
+def counted_anew(condition: Shown, factor: float) -> Shown:
+    """A recording's conditions with light in nominal radiance; light that nobody measured stays."""
+    if condition.light is None or factor == 1.0:
+        return condition
+    radiance = (condition.light.radiance * np.float64(factor)).astype(np.float32)
+    return replace(condition, level=float(radiance.mean()), light=replace(condition.light, radiance=radiance))
+
+
+def said_of(factor: float, base: BaseFit) -> list[str]:
+    """A note on labels whose unit is another than nominal.  base: the refit by the light that was counted anew."""
+    if factor == 1.0:
+        return []
+    gain = factor * float(np.median(base.gain[base.live]))
+    return [
+        f"The gain is {gain:.3g} of nominal: light is labelled in another unit. It was counted anew, 1 of the labels "
+        f"as {factor:.3g}, and so it is on this page; nothing but light depends on the unit."
+    ]

@@ -1,0 +1,148 @@
+"""Gauss-Newton on made-up statistics whose laws are known: it finds the parameters, and keeps the best of its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from small import MODEL, unit
+
+from spikecam_env.gap.candidates.strength import with_effect
+from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
+from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, derivatives, descend, nudge_of, spans
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.sensor import SensorModel
+
+COUNT, TWINS = 60, 12
+NAME = "incomplete_reset"
+TRUE = {"fraction": 0.02, "tau_us": 300.0}
+FREE = [(NAME, key) for key in TRUE]
+
+
+def null() -> Null:
+    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
+    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
+    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
+
+
+def law(fraction: float, tau_us: float) -> np.ndarray:
+    """Thirty statistics in proportion to the fraction, as many to its product with a power of the time constant."""
+    strength = 20.0 * fraction / TRUE["fraction"]
+    return strength * np.where(np.arange(COUNT) < 30, 1.0, (tau_us / TRUE["tau_us"]) ** 0.5)
+
+
+def probe_of(n: Null, change: Callable[..., np.ndarray]) -> Probe:
+    def probe(model: SensorModel, base: BaseFit) -> Prediction:
+        [effect] = [e for e in model.effects if e.name == NAME]
+        values = n.mean + change(**{k: effect.parameters()[k] for k in TRUE})
+        return Prediction(values, n.sd / np.sqrt(TWINS), n.sd, (Draw(TWINS - 1, values, None),))
+
+    return probe
+
+
+def start(**times: float) -> SensorModel:
+    return with_effect(MODEL, NAME, {k: v * times[k] for k, v in TRUE.items()})
+
+
+def parameters_of(model: SensorModel) -> dict[str, float]:
+    [effect] = [e for e in model.effects if e.name == NAME]
+    return {k: effect.parameters()[k] for k in TRUE}
+
+
+def test_both_parameters_are_found_within_their_errors():
+    n = null()
+    measured = n.mean + law(**TRUE) + n.sd * np.random.default_rng(1).standard_normal(COUNT)
+    end = descend(probe_of(n, law), n, measured, start(fraction=0.6, tau_us=2.0), unit(), FREE)
+    found = parameters_of(end.model)
+    errors = np.sqrt(np.diag(end.covariance))
+    print({k: f"{v:.4g} of {TRUE[k]:g}" for k, v in found.items()}, errors)
+    for (_, key), error in zip(FREE, errors, strict=True):
+        assert 0.001 < error < 0.1
+        assert abs(np.log(found[key] / TRUE[key])) < 4 * error
+
+
+def test_what_one_parameter_moves_says_how_far_another_of_its_effect_does():
+    """Statistics that the time constant moves by less than is clear have its derivative too, and a doubt about it."""
+    n = null()
+
+    def weak(fraction: float, tau_us: float) -> np.ndarray:
+        return law(fraction, TRUE["tau_us"]) * (1.0 + 0.02 * np.log(tau_us / TRUE["tau_us"]) * (np.arange(COUNT) < 30))
+
+    model, probe = start(fraction=1.0, tau_us=1.0), probe_of(n, weak)
+    columns, doubt = derivatives(probe, n, n.mean, model, unit(), probe(model, unit()), FREE)
+    told = columns[:30, 1]
+    print(told[:3], doubt[:3])
+    assert np.all(columns[:, 0] != 0) and 0.1 < np.median(told) < 0.6 and np.all(columns[30:, 1] == 0)
+    assert np.all(np.abs(doubt[:, 1]) > 0)
+
+
+def test_shapes_are_told_by_steps_that_suit_them():
+    """A time constant by half a logarithm, the level from which light spills by a tenth; each is open by twice that."""
+    free = [("blooming", "share"), ("blooming", "full"), ("incomplete_reset", "tau_us"), WHITE]
+    assert [nudge_of(*what, peak=12.0) for what in free] == [0.5, -0.1, -0.5, -0.2]
+    assert list(spans(free)) == [1.0, 0.2, 1.0, 1.0]
+
+
+def test_where_steps_come_to_leave_more_the_best_is_kept():
+    """A law that promises more of the fraction, and turns round where the step leads."""
+    n = null()
+    here = 0.5 * TRUE["fraction"]
+
+    def broken(fraction: float, tau_us: float) -> np.ndarray:
+        return law(fraction, tau_us) * (-1.0 if abs(np.log(fraction / here)) > 0.63 else 1.0)
+
+    measured = n.mean + law(**TRUE)
+    first = start(fraction=0.5, tau_us=1.0)
+    end = descend(probe_of(n, broken), n, measured, first, unit(), FREE)
+    kept = descend(probe_of(n, law), n, measured, first, unit(), FREE)
+    print(parameters_of(end.model), parameters_of(kept.model))
+    assert parameters_of(end.model) == parameters_of(first)
+    assert abs(np.log(parameters_of(kept.model)["fraction"] / TRUE["fraction"])) < 0.05
+
+
+def test_a_far_step_that_promises_little_is_not_taken():
+    """Nothing tells the time constant but a whisper, that would have it three times as long."""
+    n = null()
+
+    def whisper(fraction: float, tau_us: float) -> np.ndarray:
+        return law(fraction, TRUE["tau_us"]) + 0.4 * np.log(tau_us / TRUE["tau_us"]) * (np.arange(COUNT) < 30)
+
+    measured = n.mean + law(**TRUE) + np.where(np.arange(COUNT) < 30, 0.45, 0.0)
+    end = descend(probe_of(n, whisper), n, measured, start(fraction=1.0, tau_us=1.0), unit(), FREE, worth=20.0)
+    print(parameters_of(end.model), np.sqrt(np.diag(end.covariance)))
+    assert parameters_of(end.model) == TRUE
+
+
+def test_steps_go_on_while_they_are_worth_their_twins():
+    """One look here and one for each derivative; then a step that promises too little is the last."""
+    n = null()
+    measured = n.mean + law(**TRUE)
+
+    def looks(worth: float) -> int:
+        seen = []
+
+        def probe(model: SensorModel, base: BaseFit) -> Prediction:
+            seen.append(parameters_of(model))
+            return probe_of(n, law)(model, base)
+
+        descend(probe, n, measured, start(fraction=0.6, tau_us=2.0), unit(), FREE, worth=worth)
+        return len(seen)
+
+    assert looks(1e6) == 1 + len(FREE) < looks(1.0)
+
+
+def test_a_step_that_removed_nothing_is_the_last_but_one():
+    """A camera that promises by its derivatives what it never gives."""
+    n = null()
+    measured, here, looks = n.mean + law(**TRUE), parameters_of(start(fraction=0.5, tau_us=1.0)), []
+
+    def probe(model: SensorModel, base: BaseFit) -> Prediction:
+        nudged = (None, "fraction", "tau_us")[len(looks) % 3]
+        looks.append(nudged)
+        there = {key: value * (1.3 if key == nudged else 1.0) for key, value in here.items()}
+        return probe_of(n, law)(with_effect(MODEL, NAME, there), base)
+
+    descend(probe, n, measured, start(fraction=0.5, tau_us=1.0), unit(), FREE)
+    assert len(looks) == 2 * (1 + len(FREE))

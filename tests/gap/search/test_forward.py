@@ -1,0 +1,404 @@
+"""Which candidate is chosen: by the recordings to fit, and between rivals by those held out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from small import MODEL, effect, recorded, unit
+
+from spikecam_env.gap.compare.distance import judged
+from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.screen.screen import Screened
+from spikecam_env.gap.search import forward as search
+from spikecam_env.gap.search.forward import (
+    FREE,
+    GAIN,
+    HINT,
+    PROMISE,
+    Round,
+    chosen_of,
+    helped,
+    instead_of,
+    joined,
+    promises,
+    revisited,
+    settle,
+    shows,
+)
+from spikecam_env.gap.search.rivals import CLOSE, LEAST, is_rival, lead
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.verdict.verdict import explains, harmless
+
+COUNT, TWINS = 200, 12
+DEAD_TIME = effect("dead_time", tau_us=0.2)
+FIT = np.arange(COUNT) < 150
+"""Statistics of the recordings to fit; the others are held out."""
+
+
+def null() -> Null:
+    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
+    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
+    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
+
+
+def a_fit(n: Null, name: str, change, seen) -> Fit:
+    prediction = Prediction(n.mean + change, n.sd / np.sqrt(TWINS), n.sd)
+    rho, left = judged(n, seen, prediction)
+    return Fit(name, {}, {}, prediction, unit(), rho, left, MODEL)
+
+
+def campaign():
+    """An effect of 4 noises on 50 statistics to fit and on all that are held out."""
+    n = null()
+    effect = np.where((np.arange(COUNT) < 50) | ~FIT, 4.0, 0.0)
+    values = n.mean + effect + n.sd * np.random.default_rng(1).standard_normal(COUNT)
+    return n, effect, values, np.where(FIT, values, np.nan)
+
+
+def test_recordings_held_out_decide_between_what_the_others_cannot_tell_apart():
+    """A twin that is a little better on the recordings to fit, and wrong on those held out."""
+    n, effect, values, seen = campaign()
+    nudge = np.where(np.arange(COUNT) < 50, 0.1 * np.sign(values - n.mean - effect), 0.0)
+    true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
+    assert twin.misfit < true.misfit
+    fits, rivals = chosen_of(n, n, seen, values, [twin, true])
+    assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
+
+
+def test_what_loses_little_and_wins_all_recordings_is_chosen():
+    """The true one wins by far on what is held out, and loses by more than chance on the others."""
+    n, effect, values, seen = campaign()
+    nudge = np.where(np.arange(COUNT) < 50, 0.18 * (values - n.mean - effect), 0.0)
+    true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
+    loss = lead(n, seen, twin.prediction, true.prediction)
+    print(f"loses {loss:.1f}")
+    assert LEAST < loss < CLOSE and not is_rival(n, n.draws, seen, twin.prediction, true.prediction)
+    fits, rivals = chosen_of(n, n, seen, values, [twin, true])
+    assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
+
+
+def test_a_later_effect_that_leaves_nothing_to_hear_has_but_to_leave_no_more():
+    """Beside a drift of the lamp a skew explained 12 noises, and the price of the drift's scatter was told anew."""
+    n, effect, _, seen = campaign()
+    seen = seen + 4.0 * effect
+    all_of_it, some = a_fit(n, "dead_time", 5.0 * effect, seen), a_fit(n, "dead_time", effect, seen)
+    for found, silent in ((all_of_it, True), (some, False)):
+        assert helped(n, found.misfit + GAIN, found, later=False)
+        assert not helped(n, found.misfit + GAIN - 1.0, found, later=False)
+        assert helped(n, found.misfit + 1.0, found, later=True) is silent
+        assert not helped(n, found.misfit - 1.0, found, later=True)
+        assert helped(n, found.misfit + GAIN, found, later=True, hint=True) is silent
+
+
+def test_what_all_recordings_together_cannot_tell_apart_are_rivals():
+    n, effect, values, seen = campaign()
+    one, other = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", 1.002 * effect, seen)
+    assert chosen_of(n, n, seen, values, [one, other])[1]
+
+
+@pytest.mark.parametrize(("better", "first"), [(0.0, "dead_time"), (20.0, "incomplete_reset")])
+def test_a_parameter_more_has_to_explain_more(better, first):
+    """An incomplete reset, whose time constant is free, with the change of a dead time, and once with what it lacks."""
+    n, effect, values, seen = campaign()
+    nudge = np.where((np.arange(COUNT) >= 50) & (np.arange(COUNT) < 60), better * n.sd, 0.0)
+    simple = a_fit(n, "dead_time", effect, seen + nudge)
+    richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
+    fits, rivals = chosen_of(n, n, seen + nudge, values + nudge, [richer, simple])
+    assert fits[0].name == first and rivals == ()
+
+
+def test_what_has_a_parameter_more_is_a_rival_where_it_leaves_more_than_that_less():
+    """An incomplete reset with the change of a dead time and ever more of what that lacks."""
+    n, effect, values, seen = campaign()
+    told = []
+    for better in np.linspace(0.0, 1.0, 21):
+        nudge = np.where((np.arange(COUNT) >= 50) & (np.arange(COUNT) < 60), better * n.sd, 0.0)
+        simple = a_fit(n, "dead_time", effect, seen + nudge)
+        richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
+        ahead = lead(n, values + nudge, richer.prediction, simple.prediction)
+        if 0 < ahead < LEAST:
+            told.append((ahead, chosen_of(n, n, seen + nudge, values + nudge, [richer, simple])[1]))
+    print([(round(ahead, 2), rivals) for ahead, rivals in told])
+    assert {rivals for ahead, rivals in told if ahead < FREE} == {()}
+    assert {rivals for ahead, rivals in told if ahead > FREE} == {("incomplete_reset",)}
+
+
+def test_what_makes_campaigns_scatter_shows_though_their_mean_stays():
+    """A few hot pixels are in some units, and in most none: the spread is four times the null's, or as it was."""
+    n, effect, _values, seen = campaign()
+    still = a_fit(n, "hot_pixels", 0.0 * effect, seen)
+    wide = replace(still, prediction=replace(still.prediction, spread=4.0 * n.sd))
+    assert shows(n, wide) and not shows(n, still)
+
+
+def test_recordings_held_out_have_no_say_where_the_others_tell():
+    """The wrong one is perfect where it is not asked, and has nothing to offer where it is."""
+    n, effect, values, seen = campaign()
+    wrong = a_fit(n, "crosstalk", np.where(FIT, np.roll(effect * FIT, 60), values - n.mean), seen)
+    fits, rivals = chosen_of(n, n, seen, values, [a_fit(n, "dead_time", effect, seen), wrong])
+    assert fits[0].name == "dead_time" and rivals == ()
+    assert chosen_of(n, n, seen, values, []) == ([], ())
+
+
+def test_fits_are_confirmed_until_one_stands_clear_above_the_best():
+    """Confirmation makes each 10 better; the third promises less than the best by more than that and PROMISE."""
+    n, effect, _values, seen = campaign()
+    base = a_fit(n, "", effect, seen)
+    asked = []
+
+    def confirm(f: Fit) -> Fit:
+        asked.append(f.name)
+        return replace(f, misfit=f.misfit - 10.0)
+
+    near, far = 100.0 + PROMISE - 1.0, 100.0 + PROMISE + 11.0
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 100.0), ("b", near), ("c", near), ("d", far))]
+    sure, rest = settle(fits, confirm)
+    assert asked == ["a", "b", "c"] and [f.name for f in sure] == ["a", "b", "c"] and [f.name for f in rest] == ["d"]
+
+
+def test_fits_that_promise_too_little_are_not_confirmed_unless_one_does_not():
+    """60 are enough.  Alone, 61 are not worth it; beside one confirmed at 55, those within PROMISE of it are."""
+    n, effect, _values, seen = campaign()
+    base = a_fit(n, "", effect, seen)
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 61.0), ("b", 66.0), ("c", 55.0 + PROMISE))]
+    best = replace(base, name="best", misfit=55.0)
+    sure, rest = settle(fits, lambda f: f, enough=60.0)
+    assert sure == [] and [f.name for f in rest] == ["a", "b", "c"]
+    sure, rest = settle([best, *fits], lambda f: f, enough=60.0)
+    assert [f.name for f in sure] == ["best", "a", "b"] and [f.name for f in rest] == ["c"]
+    disappointing = replace(best, misfit=75.0)
+    sure, rest = settle([best, *fits], lambda f: disappointing, enough=60.0)
+    assert [f.name for f in sure] == ["best"] and [f.name for f in rest] == ["a", "b", "c"], "as will the others"
+
+
+def test_a_round_in_which_nothing_promises_enough_is_one_without_a_choice(monkeypatch):
+    n, _effect, values, seen = campaign()
+    poor = a_fit(n, "crosstalk", np.where(np.arange(COUNT) >= 150, 4.0, 0.0), seen)
+    rho, before = judged(n, seen, n.prediction)
+    assert poor.misfit == pytest.approx(before)
+    monkeypatch.setattr(search, "screen", lambda *_: [])
+    monkeypatch.setattr(search, "fits_of", lambda *_: ([poor], {}))
+    monkeypatch.setattr(search, "confirmed", lambda *_: pytest.fail("it was confirmed"))
+    turn = Round(MODEL, unit(), n.prediction, rho, before)
+    after = search.compared(recorded(), n, n, seen, values, [], {}, turn)
+    assert after.fits == (poor,) and after.rivals == ()
+
+
+def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
+    """What came first may have taken the share of what comes later: how much both remove, only both together tell."""
+    n, _effect, values, seen = campaign()
+    rho, before = judged(n, seen, n.prediction)
+    hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (GAIN + HINT) / 2)
+    asked = []
+    monkeypatch.setattr(search, "screen", lambda *_: [])
+    monkeypatch.setattr(search, "fits_of", lambda *_: ([hint], {Screened("crosstalk", {}, 0.0, rho): hint}))
+    monkeypatch.setattr(search, "confirmed", lambda _case, _model, _null, _seen, found: asked.append(found) or found)
+    first = Round(MODEL, unit(), n.prediction, rho, before)
+    search.compared(recorded(), n, n, seen, values, [], {}, first)
+    assert not asked
+    search.compared(recorded(), n, n, seen, values, [], {}, replace(first, least=HINT))
+    assert asked == [hint]
+
+
+def test_a_later_effect_of_little_is_polished_together_with_the_first(monkeypatch):
+    n, change, values, seen = campaign()
+    values, seen = values + 9 * change, seen + 9 * change
+    little = of_two(n, "crosstalk", 0.02 * change, seen)
+    left = judged(n, seen, n.prediction)[1]
+    first = Round(MODEL, unit(), n.prediction, seen, left + 500.0, (a_fit(n, "dead_time", 0.0 * change, seen),))
+    asked = []
+
+    def polish(case, model, here, measured, everything, found, names):
+        asked.append(list(names))
+        return found, {}, False
+
+    monkeypatch.setattr(search, "polished", polish)
+    monkeypatch.setattr(search, "rejoined", lambda case, model, here, measured, best, earlier: best)
+    monkeypatch.setattr(search, "revisited", lambda case, model, here, measured, everything, best, turn: (best, turn))
+    joined(recorded(), MODEL, n, seen, values, [first, replace(first, misfit=left, fits=(little,))], 0.0)
+    assert asked == [["dead_time", "crosstalk"]]
+    asked.clear()
+    joined(recorded(), MODEL, n, seen, values, [replace(first, misfit=left, fits=(little,))], 0.0)
+    assert asked == [], "alone it is a stand-in"
+    bend = replace(little, name="comparator_delay")
+    beside = replace(first, model=MODEL.with_effect(DEAD_TIME), misfit=left, fits=(bend,))
+    joined(recorded(), MODEL, n, seen, values, [first, beside], 0.0)
+    assert asked == [], "and so is another bend"
+
+
+def test_a_hint_of_another_bend_is_none():
+    n, change, _, seen = campaign()
+    hint = a_fit(n, "crosstalk", change, seen)
+    beside = MODEL.with_effect(DEAD_TIME)
+    turn = Round(beside, unit(), n.prediction, seen, hint.misfit + (GAIN + HINT) / 2, (hint,), least=HINT)
+    bend = replace(turn, fits=(replace(hint, name="comparator_delay"),))
+    assert promises(turn, n) and not promises(bend, n)
+    assert promises(replace(bend, model=MODEL), n), "it is the first"
+
+
+def test_one_confirmed_before_is_among_those_that_others_are_measured_by():
+    n, effect, _values, seen = campaign()
+    base = a_fit(n, "", effect, seen)
+    known = replace(base, name="known", misfit=10.0)
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 10.0 + PROMISE), ("b", 11.0 + PROMISE))]
+    sure, rest = settle(fits, lambda f: f, known=[known])
+    assert [f.name for f in sure] == ["known", "a"] and [f.name for f in rest] == ["b"]
+
+
+def test_what_is_left_may_be_little_beside_what_was_there():
+    n = null()
+    loud, calm = np.where(np.arange(COUNT) < 50, 100.0, 0.5), np.full(COUNT, 0.5)
+    assert explains(n, loud, calm, n.prediction)
+    assert explains(n, loud, np.where(np.arange(COUNT) < 1, 9.0, 0.5), n.prediction), "9 noises of 100"
+    assert not explains(n, loud, np.where(np.arange(COUNT) < 1, 11.0, 0.5), n.prediction), "11 of 100 are not quiet"
+    assert not explains(n, calm, np.where(np.arange(COUNT) < 1, 9.0, 0.5), n.prediction), "nothing was as loud before"
+
+
+def test_an_effect_that_moves_what_agreed_is_contradicted():
+    """9 noises where there was nothing, however much goes elsewhere."""
+    n = null()
+    loud = np.where(np.arange(COUNT) < 50, 100.0, 0.5)
+    assert not explains(n, loud, np.where(np.arange(COUNT) == 100, 9.0, 0.5), n.prediction)
+
+
+def test_beside_a_later_effect_a_runner_up_may_take_the_earlier_ones_place(monkeypatch):
+    """A wrong first effect stood for part of the second; with the second there, the right one explains more."""
+    n, change, values, seen = campaign()
+    late = np.where((np.arange(COUNT) >= 100) & FIT, 4.0, 0.0)
+    half = np.where(np.arange(COUNT) < 25, 4.0, 0.0)
+    values, seen = values + late, seen + late
+    two = MODEL.with_effect(effect("dead_time", tau_us=0.5)).with_effect(effect("crosstalk", kick=1e-3))
+    right = MODEL.with_effect(effect("comparator_delay", delay_us=0.5)).with_effect(effect("crosstalk", kick=1e-3))
+    made = {
+        two: a_fit(n, "crosstalk", half + late, seen).prediction,
+        right: a_fit(n, "comparator_delay", change + late, seen).prediction,
+        two.without("dead_time"): a_fit(n, "crosstalk", late, seen).prediction,
+    }
+
+    def confirm(case, model, here, measured, found):
+        rho, left = judged(here, measured, made[found.model])
+        return replace(found, prediction=made[found.model], rho=rho, misfit=left)
+
+    monkeypatch.setattr(search, "confirmed", confirm)
+    monkeypatch.setattr(search, "resettled", lambda case, null, found, model: replace(found, model=model))
+    monkeypatch.setattr(
+        search, "fit", lambda case, model, here, measured, name, start: replace(best, name=name, model=right)
+    )
+    best = replace(a_fit(n, "crosstalk", half + late, seen), model=two)
+    first, other = (replace(best, name=name) for name in ("dead_time", "comparator_delay"))
+    turn = Round(
+        MODEL, unit(), n.prediction, values, 500.0, (replace(first, misfit=300.0), replace(other, misfit=340.0))
+    )
+    now, then = revisited(recorded(), MODEL, n, seen, values, best, turn)
+    assert now.name == "crosstalk" and now.model == right
+    assert [f.name for f in then.fits] == ["comparator_delay", "dead_time"] and then.rivals == ()
+    far = replace(turn, fits=(replace(first, misfit=300.0), replace(other, misfit=480.0)))
+    assert revisited(recorded(), MODEL, n, seen, values, best, far) == (best, far), "it explained too little"
+
+
+def of_two(n, name: str, change, seen) -> Fit:
+    """A fit beside a dead time found before, confirmed by two twins."""
+    made = a_fit(n, name, change, seen)
+    beside = MODEL.with_effect(effect("dead_time", tau_us=0.5)).with_effect(effect(name))
+    return replace(made, model=beside, prediction=replace(made.prediction, draws=n.draws[:2]))
+
+
+def test_what_leaves_something_is_put_against_its_runner_up_when_all_is_polished(monkeypatch):
+    """The earlier effect had taken some of the true one for its own, so that the wrong one looked better at first."""
+    n, change, values, seen = campaign()
+    values, seen, change = values + 9 * change, seen + 9 * change, 10 * change
+    wrong, true = of_two(n, "light_flicker", 0.5 * change, seen), of_two(n, "supply_ripple", 0.4 * change, seen)
+    left = 10_000.0
+    first = Round(MODEL, unit(), n.prediction, seen, left, (a_fit(n, "dead_time", change, seen),))
+    second = Round(MODEL, unit(), n.prediction, seen, left, (wrong, true), rivals=("supply_ripple",))
+    polished = {"light_flicker": 0.5 * change, "supply_ripple": change}
+    asked = []
+
+    def polish(case, model, here, measured, everything, found, names):
+        asked.append(tuple(names))
+        return of_two(n, found.name, polished[found.name], seen), {found.name: {"x": 0.1}}, False
+
+    monkeypatch.setattr(search, "polished", polish)
+    monkeypatch.setattr(search, "rejoined", lambda case, model, here, measured, best, earlier: best)
+    monkeypatch.setattr(search, "revisited", lambda case, model, here, measured, everything, best, turn: (best, turn))
+    *_, last = joined(recorded(), MODEL, n, seen, values, [first, second], 0.0)
+    assert asked == [("dead_time", "light_flicker"), ("dead_time", "supply_ripple")]
+    assert [f.name for f in last.fits] == ["supply_ripple", "light_flicker"] and last.rivals == ()
+    polished["light_flicker"] = change
+    asked.clear()
+    *_, last = joined(recorded(), MODEL, n, seen, values, [first, second], 0.0)
+    assert len(asked) == 1 and last.fits[0].name == "light_flicker", "it leaves nothing"
+
+
+def test_a_runner_up_that_explained_little_or_was_not_confirmed_is_not_tried_again():
+    n, change, _, seen = campaign()
+    best, near, far = (of_two(n, name, change, seen) for name in ("light_flicker", "supply_ripple", "crosstalk"))
+    best, near, far = (replace(f, misfit=m) for f, m in ((best, 300.0), (near, 390.0), (far, 410.0)))
+    turn = Round(MODEL, unit(), n.prediction, seen, 800.0, (best, far, near))
+    names = ["dead_time", "light_flicker"]
+    assert [f.name for f in instead_of(turn, names)] == ["supply_ripple"]
+    guess = replace(near, prediction=replace(near.prediction, draws=()))
+    assert instead_of(replace(turn, fits=(best, far, guess)), names) == []
+    assert instead_of(turn, ["lamp_drift", "light_flicker"]) == [], "what was found before is another one now"
+
+
+def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
+    """It takes the effect up where it was fitted; on what was held out it does nothing, or the opposite."""
+    n, change, values, seen = campaign()
+    case = SimpleNamespace(held_out=lambda keys: ~FIT, conditions=())
+    start = Round(MODEL, unit(), n.prediction, change, 800.0)
+    patched = MODEL.with_effect(effect("optical_blur", sigma_pixels=0.1))
+    for held_out, kept in ((0.5, True), (-1.0, False)):
+        found = a_fit(n, "optical_blur", np.where(FIT, 0.9 * change, held_out * change), seen)
+        end = Round(patched, unit(), found.prediction, found.rho, found.misfit)
+        after = harmless(case, n, values, [replace(start, fits=(found,)), end])
+        assert (after[-1].model is patched) == kept and len(after) == 2 and after[-1].fits == ()
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, monkeypatch):
+    n, effect, values, _ = campaign()
+    found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
+    faded = replace(found, prediction=n.prediction, misfit=judged(n, values, n.prediction)[1])
+    case = SimpleNamespace(base=unit(), to_fit=lambda keys: np.ones(len(keys), bool), effort=Effort(), conditions=())
+
+    def polished(*given):
+        *before, last = given[5]
+        return [*before, replace(last, fits=(found if keeps else faded, *last.fits[1:]))]
+
+    monkeypatch.setattr(search, "compared", lambda *given: replace(given[-1], fits=(found,)))
+    monkeypatch.setattr(search, "joined", polished)
+    monkeypatch.setattr(search, "cancelling", lambda *_: [])
+    rounds = search.search(case, MODEL, n, values, [], None)
+    assert rounds[-1].model is (found.model if keeps else MODEL)
+
+
+@pytest.mark.parametrize("spent, begun", [(43, True), (44, False)])
+def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int, begun: bool, monkeypatch):
+    """Of sixty recordings, and three tenths more, it takes two campaigns of BESIDE."""
+    n, effect, values, _ = campaign()
+    found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
+    case = SimpleNamespace(
+        base=unit(), to_fit=lambda keys: np.ones(len(keys), bool), effort=Effort(60), conditions=(None, None)
+    )
+    asked = []
+
+    def compared(*given):
+        asked.append(given[-1])
+        case.effort.spent.append(spent)
+        return replace(given[-1], fits=(found,) if len(asked) == 1 else ())
+
+    monkeypatch.setattr(search, "compared", compared)
+    monkeypatch.setattr(search, "joined", lambda *given: given[5])
+    monkeypatch.setattr(search, "cancelling", lambda *_: [])
+    monkeypatch.setattr(search, "alarmed", lambda *_: True)
+    monkeypatch.setattr(search, "is_little", lambda *_: False)
+    monkeypatch.setattr(search, "BESIDE", 17)
+    search.search(case, MODEL, n, values, [], None)
+    assert len(asked) == 1 + begun and case.effort.left_out == ([] if begun else ["a second effect"])

@@ -1,0 +1,36 @@
+"""What runs on which threads."""
+
+from __future__ import annotations
+
+import importlib
+
+import pytest
+from threadpoolctl import threadpool_info
+
+from spikecam_env.gap.diagnose import diagnose
+from spikecam_env.gap.ladder import ladder
+from spikecam_env.gap.twins.workers import sums_in_one_order
+
+
+def threads_of_linear_algebra() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_linear_algebra_takes_one_thread_during_a_diagnosis_and_what_it_took_after_it() -> None:
+    before = threads_of_linear_algebra()
+    assert sums_in_one_order(threads_of_linear_algebra)() == {1}
+    assert threads_of_linear_algebra() == before
+
+
+@pytest.mark.parametrize("command", [diagnose, ladder], ids=["diagnose", "ladder"])
+def test_linear_algebra_takes_one_thread_in_a(command, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    class Read(Exception):
+        """How far the command is to go."""
+
+    def read(folder: object) -> None:
+        raise Read(threads_of_linear_algebra())
+
+    monkeypatch.setattr(importlib.import_module(command.__module__), "read_campaign", read)
+    with pytest.raises(Read) as reached:
+        command("anywhere")
+    assert reached.value.args == ({1},)

@@ -1,0 +1,137 @@
+"""Upper bounds: what these recordings refute, and nothing that they cannot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from small import MODEL, effect
+
+from spikecam_env.gap import Bars, Dark, Flat
+from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.candidates.table import expected_events
+from spikecam_env.gap.compare.prediction import values_of
+from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.observation import observe
+from spikecam_env.gap.report.words import at_most, bounded_parameter
+from spikecam_env.gap.result import Bound
+from spikecam_env.gap.screen.templates import load
+from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.twins.case import Case, case_of
+from spikecam_env.gap.verdict.bounds import EVENTS, Score, Tried, _OfTwins, bounds, first_tried
+from spikecam_env.sensor import SpikeSensor
+from spikecam_env.streams import pack_frames
+
+SHAPE, FRAMES = (24, 24), 800
+CONDITIONS = planned((Dark(), *(Flat(radiance=x) for x in (0.1, 0.2, 0.4)), Bars(high=1.4)), SHAPE, FRAMES)
+COUNTED = ("spurious_spikes", "missed_spikes", "hot_pixels", "dead_pixels")
+
+
+def recorded(*effects, camera: int = 1) -> Case:
+    """A camera's campaign with effects."""
+    model = MODEL
+    for e in effects:
+        model = model.with_effect(e)
+    seen = []
+    for take, c in enumerate(CONDITIONS):
+        sensor = SpikeSensor(model, SHAPE, seed=camera, take=take, threads=1)
+        spikes = sensor.step(c.light if c.moves else c.light.radiance[0], FRAMES)
+        seen.append(observe(pack_frames(spikes), SHAPE, film=c.moves))
+    return case_of(SHAPE, CONDITIONS, seen, seed=camera)
+
+
+def bounds_of(case: Case, names) -> dict[str, Bound]:
+    null = model_null(case, MODEL, 8)
+    found, _ = bounds(case, MODEL, null, values_of(case.bank, null.keys), names, load())
+    for b in found:
+        print(b)
+    return {b.name: b for b in found}
+
+
+@pytest.fixture(scope="module")
+def clean() -> dict[str, Bound]:
+    return bounds_of(recorded(), (*COUNTED, "frame_threshold_noise"))
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_no_bound_of_what_is_counted_lets_expect_fewer_than_three(name, clean):
+    """Of events at a rate p, one campaign of N chances in twenty has none where p N = 3.0 (the rule of three)."""
+    case, bound = recorded(), clean[name]
+    chances = {
+        "spurious_spikes": sum(o.times.count.size * o.frames for o in case.observations[:4]),
+        "missed_spikes": sum(o.times.count.sum() for o in case.observations[:4]),
+    }.get(name, SHAPE[0] * SHAPE[1])
+    print(f"{bound.below * chances:.1f} of {chances}")
+    assert 3.0 < bound.below * chances < 60.0
+
+
+def test_false_and_missed_spikes_far_below_the_noise_are_not_excluded(clean):
+    """A tenth of an event of each is expected in all recordings."""
+    case = recorded(effect("spurious_spikes", probability=5e-8), effect("missed_spikes", probability=5e-7), camera=2)
+    found = bounds_of(case, ("spurious_spikes", "missed_spikes"))
+    assert found["spurious_spikes"].below > 5e-8 and found["missed_spikes"].below > 5e-7
+
+
+@pytest.mark.parametrize("name", ["frame_threshold_noise", "missed_spikes"])
+def test_an_effect_at_its_bound_is_not_excluded(name, clean):
+    """One whose statistics go with its square, and one of single events, in two other cameras."""
+    hidden = effect(name, **{clean[name].parameter: clean[name].below})
+    for camera in (3, 4):
+        found = bounds_of(recorded(hidden, camera=camera), [name])
+        assert name not in found or found[name].below >= clean[name].below
+
+
+def test_what_these_recordings_would_not_show_at_its_strongest_has_no_bound():
+    """Where noise is a million times as large."""
+    keys = model_null(recorded(), MODEL, 6)
+    nothing = replace(keys, sd=1e6 * keys.sd, floor=1e6 * keys.floor)
+    found, open_ = bounds(recorded(), MODEL, nothing, keys.mean, ["readout_skew", "vignetting"], load())
+    assert found == [] and [name for name, _ in open_] == ["readout_skew", "vignetting"]
+    assert all("longer recordings" in needs for _, needs in open_)
+
+
+def test_without_effort_there_is_no_bound_and_that_is_said():
+    case = replace(recorded(), effort=Effort(10, [9]))
+    found, open_ = bounds(case, MODEL, None, None, ["dead_time", "vignetting"], load())
+    assert found == [] and dict(open_).keys() == {"dead_time", "vignetting"}
+    assert all("--effort" in needs for _, needs in open_) and case.effort.left_out == ["upper bounds"]
+
+
+def test_a_strength_of_which_few_events_are_expected_is_never_refuted():
+    assert not Tried(more=1e9, sd=1.0, quantile=1.8, events=EVENTS).refuted_by(0.0)
+    assert Tried(more=1e9, sd=1.0, quantile=1.8, events=3.01).refuted_by(0.0)
+    assert pytest.approx(0.05) == np.exp(-EVENTS)
+
+
+def test_a_strength_is_refuted_by_what_scores_below_nineteen_of_twenty_of_its_campaigns():
+    tried = Tried(more=10.0, sd=2.0, quantile=1.8, events=np.inf)
+    assert tried.refuted_by(6.3) and not tried.refuted_by(6.5)
+
+
+def test_what_so_few_events_scatter_counts_however_alike_a_few_campaigns_are():
+    """Nine events expected: their number is known to a third, and so is the score."""
+    score = Score(lambda v: 0.0, np.array([-1.0, 0.0, 1.0]), 0.0, {}, 1.0)
+    alike = np.array([12.0, 12.0, 12.1, 12.0])
+    assert _OfTwins.variance(score, alike, more=12.0, events=9.0) == pytest.approx(1.0 + 12.0**2 / 9)
+    assert _OfTwins.variance(score, alike, more=12.0, events=np.inf) == pytest.approx(1.0)
+
+
+def test_what_is_counted_is_first_tried_where_some_are_expected():
+    case = recorded()
+    probe = SimpleNamespace(
+        name="missed_spikes", events=lambda p: expected_events("missed_spikes", p, case.conditions, case.observations)
+    )
+    score = Score(lambda v: 0.0, np.array([-1.0, 0.0, 1.0]), 0.0, {"probability": 1e-4}, 30.0)
+    look = SimpleNamespace(probe=probe, score=score, expected=1e-9)
+    assert probe.events(first_tried(look)) == pytest.approx(2 * EVENTS)
+    look.expected = 1e-3
+    assert first_tried(look)["probability"] == pytest.approx(1.2e-3)
+
+
+def test_a_bound_is_rounded_up_and_says_where_it_holds():
+    bound = Bound("light_flicker", "modulation", "relative", 0.012011, {"frequency_hz": 2000.0})
+    assert at_most(bound) == "1.3 %" and bounded_parameter(bound) == "modulation (frequency 2000 Hz)"
+    assert at_most(replace(bound, below=0.012)) == "1.2 %"
+    assert at_most(Bound("spurious_spikes", "probability", "per frame", 3.81e-7)) == "3.9e-07 per frame"
