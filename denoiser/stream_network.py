@@ -1,11 +1,11 @@
 """The recurrent network of `best` mode: one pass gives the rate in 16 consecutive frames, and what the next pass gets.
 
     joined, carried' = body(fold [spikes, planes, last], carried)          half resolution, a U-Net of one level
-    rate = sum over k of w_k rate_k,   w = softmax of the head             [spikes/frame]
+    rate = unfold(out(joined)) + head([unfold(out(joined)), planes])       [spikes/frame]
 
-rate_0 is unfold(out(joined)) and what the full-resolution head adds to it; the other rate_k are the running means among
-the planes, to which the head turns where nothing moves: they hold more than any window.  The folding of 2 x 2 pixels
-into channels and the 1 x 1 convolution after it are one 2 x 2 convolution of stride 2.
+Where the unit is calibrated, the running means hold more than any window, as long as nothing moves: the head then says
+for each mean how much of the rate it is, and the rest is the rate above.  The folding of 2 x 2 pixels into channels and
+the 1 x 1 convolution after it are one 2 x 2 convolution of stride 2.
 
 Carried from pass to pass: `last`, the rate in the last frame of the pass before, (N, 1, H, W), and a hidden picture
 (N, CARRY, H/2, W/2) in [-1, 1]; nothing (None) before the first.  (N, channels, H, W) in and out; sizes that 4 does not
@@ -41,7 +41,7 @@ class Residual(nn.Module):
 class StreamDnSS(nn.Module):
     """(N, span, H, W) spikes, (N, layers, H, W) planes, carried -> (N, planes, H, W) rates [spikes/frame], carried.
 
-    means: which of the layers are running means (first, last + 1).
+    means: which of the layers are running means (first, last + 1).  The last layer is 1 where the unit is calibrated.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class StreamDnSS(nn.Module):
         self.keep = conv(fine, CARRY)
         self.out = conv(fine, 4 * planes)
         self.unfold = nn.PixelShuffle(2)
-        self.head = nn.Sequential(conv_relu(planes + layers + 1, 24), conv(24, planes + 1 + means[1] - means[0]))
+        self.head = nn.Sequential(conv_relu(planes + layers + 1, 24), conv(24, planes + means[1] - means[0]))
 
     def forward(self, spikes: Tensor, planes: Tensor, carried: Carried = None) -> tuple[Tensor, tuple[Tensor, Tensor]]:
         height, width = spikes.shape[-2:]
@@ -80,10 +80,10 @@ class StreamDnSS(nn.Module):
         first = self.unfold(self.out(joined))
         change = self.head(torch.cat([first, seen.to(first.dtype)], dim=1)).float()
         count = first.shape[1]
-        weights = change[:, count:].softmax(dim=1)
+        rate = first.float() + change[:, :count]
+        shares = functional.pad(change[:, count:] - 2.0, (0, 0, 0, 0, 1, 0)).softmax(dim=1)[:, 1:] * planes[:, -1:]
         means = planes[:, self.means[0] : self.means[1]]
-        steady = (weights[:, 1:] * means).sum(dim=1, keepdim=True)
-        rate = weights[:, :1] * (first.float() + change[:, :count]) + steady
+        rate = rate * (1 - shares.sum(dim=1, keepdim=True)) + (shares * means).sum(dim=1, keepdim=True)
         kept = torch.tanh(self.keep(joined).float())
         rate = rate[..., :height, :width]
         return rate, (rate[:, -1:].clamp(0.0, 1.0), kept)
