@@ -73,6 +73,8 @@ class Alignment(nn.Module):
         self.join = nn.ModuleList(
             conv_relu(width if level == LEVELS - 1 else 2 * width, width) for level in range(LEVELS)
         )
+        twice = torch.tensor([2.0, 2.0, 1.0]).repeat(GROUPS)[:, None, None]  # a level down; weights stay
+        self.register_buffer("twice", twice, persistent=False)
 
     def forward(self, moving: Tensor, middle: Tensor) -> Tensor:
         pyramid = [(moving, middle)]
@@ -87,7 +89,8 @@ class Alignment(nn.Module):
             displaced = displace(there, moves)
             aligned = self.join[level](displaced if aligned is None else torch.cat([displaced, aligned], dim=1))
             if level:
-                moves, aligned = _twice_as_fine(moves), functional.interpolate(aligned, scale_factor=2.0)
+                moves = self.twice * functional.interpolate(moves, scale_factor=2.0, mode="bilinear")
+                aligned = functional.interpolate(aligned, scale_factor=2.0)
         assert aligned is not None
         return aligned
 
@@ -139,12 +142,6 @@ def displace(features: Tensor, moves: Tensor) -> Tensor:
     groups = features.float().reshape(count * GROUPS, channels // GROUPS, height, width)
     read = functional.grid_sample(groups, grid, mode="bilinear", padding_mode="border", align_corners=False)
     return (read * (2 * torch.sigmoid(logit))[:, None]).reshape(features.shape).to(features.dtype)
-
-
-def _twice_as_fine(moves: Tensor) -> Tensor:
-    """Displacements of the next finer level: twice as many pixels; the weights' logits as they are."""
-    scale = moves.new_tensor([2.0, 2.0, 1.0]).repeat(GROUPS)[:, None, None]
-    return functional.interpolate(moves, scale_factor=2.0, mode="bilinear", align_corners=False) * scale
 
 
 def _at_rest(inputs: int, outputs: int) -> nn.Conv2d:

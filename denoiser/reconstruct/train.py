@@ -25,7 +25,7 @@ from torch import Tensor, nn
 from tqdm import tqdm
 
 from denoiser.reconstruct import ssml
-from denoiser.reconstruct.lessons import Lesson, lesson_of
+from denoiser.reconstruct.lessons import Lesson, Windows, lesson_of
 from denoiser.reconstruct.recipe import ReconstructorRecipe, reconstructor_recipe
 from denoiser.reconstruct.rolling import RollingWindows
 from denoiser.reconstruct.run import Run
@@ -170,25 +170,22 @@ def _set_rate(optimiser: torch.optim.Optimizer, lr: float, step: int, done: floa
         group["lr"] = rate
 
 
-def _held_out(config: ReconstructorConfig) -> list[tuple[Tensor, Tensor]]:
-    """(spikes (n, 41, H, W) uint8, light at the middle frame (n, 1, H, W)), a pair for each moment."""
+def _held_out(config: ReconstructorConfig) -> list[Windows]:
+    """Windows of other streams at a few moments."""
     seed, spikes = config.seed + VALIDATION_SEED, config.recipe().learns_from
     streams = SimulatedStreams(VALIDATION_STREAMS, config.patch, config.device, seed)
-    rolling, found = RollingWindows(streams, spikes, WINDOW), []
-    for _ in range(VALIDATION_MOMENTS):
-        windows = rolling.advance(FRAMES_BETWEEN_MOMENTS)
-        found.append((windows.spikes[windows.old], windows.light[windows.old, WINDOW // 2, None]))
-    return found
+    rolling = RollingWindows(streams, spikes, WINDOW)
+    return [rolling.advance(FRAMES_BETWEEN_MOMENTS) for _ in range(VALIDATION_MOMENTS)]
 
 
-def validate(network: nn.Module, held_out: list[tuple[Tensor, Tensor]]) -> dict[str, float]:
+def validate(network: nn.Module, held_out: list[Windows]) -> dict[str, float]:
     """Error of the light over held-out windows, as PSNR [dB] against light 1.0: network, TFP 21, TFP 41, TFI."""
     network.eval()
     sums: dict[str, float] = {}
-    for spikes, light in held_out:
+    for windows in held_out:
+        spikes, middle = windows.spikes, WINDOW // 2
         with torch.inference_mode(), torch.autocast(spikes.device.type, torch.bfloat16):
             found = network(spikes.to(torch.bfloat16).contiguous(memory_format=torch.channels_last))
-        middle = spikes.shape[1] // 2
         guesses: Mapping[str, Tensor] = {
             "network": found.clamp(0, 1),
             "tfp21": spikes[:, middle - 10 : middle + 11].float().mean(1, keepdim=True),
@@ -196,10 +193,11 @@ def validate(network: nn.Module, held_out: list[tuple[Tensor, Tensor]]) -> dict[
             "tfi": ssml.interval_rate(spikes, middle),
         }
         for name, guess in guesses.items():
-            sums[f"{name}_db"] = sums.get(f"{name}_db", 0.0) + float((guess - light).square().sum())
+            errors = (guess - windows.light[:, middle, None]).square().mean((1, 2, 3))
+            sums[f"{name}_db"] = sums.get(f"{name}_db", 0.0) + float(errors[windows.old].sum())
     network.train()
-    pixels = sum(light.numel() for _, light in held_out)
-    return {name: round(-10 * math.log10(max(total, 1e-12) / pixels), 3) for name, total in sums.items()}
+    count = sum(int(windows.old.sum()) for windows in held_out)
+    return {name: round(-10 * math.log10(max(total, 1e-12) / max(count, 1)), 3) for name, total in sums.items()}
 
 
 def _save(config: ReconstructorConfig, run: Run) -> Path:
