@@ -84,11 +84,18 @@ class SelfTaught:
         self.networks = nn.ModuleDict({"student": recipe.network(), "blind": ssml.Blind(recipe.width)})
 
     def losses(self, windows: Windows, number_type: torch.dtype) -> Tensor:
-        spikes = _shown(windows.middle(), number_type)
-        blind, student = self.networks["blind"](spikes), self.networks["student"](spikes)
+        blind = self._blind(windows.middle(), number_type)
+        student = self.networks["student"](_shown(windows.middle(), number_type))
         label = ssml.interval_rate(windows.spikes, self.span // 2)
         of_blind = _distance(blind, label) + ssml.BACK_SHARE * _distance(blind, student.detach())
         return of_blind + _distance(student, blind.detach()) + ssml.OWN_SHARE * _distance(student, label)
+
+    def _blind(self, spikes: Tensor, number_type: torch.dtype) -> Tensor:
+        """In float32 on a processor: torch 2.13's gradient of a dilated bfloat16 convolution is NaN for some widths."""
+        if spikes.is_cuda:
+            return self.networks["blind"](_shown(spikes, number_type))
+        with torch.autocast("cpu", enabled=False):
+            return self.networks["blind"](_shown(spikes, torch.float32))
 
 
 def _shown(spikes: Tensor, number_type: torch.dtype) -> Tensor:

@@ -22,8 +22,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from denoiser.block_network import Residual
 from denoiser.network import conv, conv_relu, pad_to_multiple
+from denoiser.stream_network import Residual
 
 WINDOW = 41
 """Frames in (the publication's)."""

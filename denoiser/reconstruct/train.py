@@ -31,7 +31,7 @@ from denoiser.reconstruct.rolling import RollingWindows
 from denoiser.reconstruct.run import Run
 from denoiser.reconstruct.spk2imgnet import WINDOW
 from denoiser.reconstruct.weights import save_reconstructor
-from denoiser.simulated import SimulatedStreams
+from denoiser.simulated import Bank, SimulatedStreams
 from spikecam_env.checked import checked_count, checked_number, checked_seed
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
@@ -41,6 +41,7 @@ WARM_UP_STEPS = 100
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 64
 VALIDATION_MOMENTS = 4
+VALIDATION_TEXTURES, VALIDATION_UNITS = 32, 16
 FRAMES_BETWEEN_MOMENTS = 64
 LARGEST_SEED = 2**62
 """So that the seed of the validation has room above it."""
@@ -121,9 +122,9 @@ def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -
 
 
 def _loop(config: ReconstructorConfig, lesson: Lesson, run: Run, progress: bool) -> Path:
-    streams = SimulatedStreams(config.batch, config.patch, config.device, config.seed + run.step)
-    rolling = RollingWindows(streams, config.recipe().learns_from, lesson.span)
+    rolling = _windows(config, run.step, lesson.span)
     held_out = _held_out(config)
+    rolling.advance(config.frames_a_step)  # the slow first call is none of the run's minutes
     before, began, saved = run.seconds, time.monotonic(), time.monotonic()
     bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
     losses: list[Tensor] = []
@@ -170,11 +171,21 @@ def _set_rate(optimiser: torch.optim.Optimizer, lr: float, step: int, done: floa
         group["lr"] = rate
 
 
+def _windows(config: ReconstructorConfig, step: int, span: int) -> RollingWindows:
+    """Of the streams to learn from; a run that is resumed at `step` meets others."""
+    device = torch.device(config.device)
+    bank = Bank.drawn(config.seed, device)
+    seed, compiled = config.seed + step, device.type == "cuda"
+    streams = SimulatedStreams(config.batch, config.patch, device, seed, bank=bank, compiled=compiled)
+    return RollingWindows(streams, config.recipe().learns_from, span)
+
+
 def _held_out(config: ReconstructorConfig) -> list[Windows]:
     """Windows of other streams at a few moments."""
-    seed, spikes = config.seed + VALIDATION_SEED, config.recipe().learns_from
-    streams = SimulatedStreams(VALIDATION_STREAMS, config.patch, config.device, seed)
-    rolling = RollingWindows(streams, spikes, WINDOW)
+    seed, device = config.seed + VALIDATION_SEED, torch.device(config.device)
+    bank = Bank.drawn(seed, device, textures=VALIDATION_TEXTURES, units=VALIDATION_UNITS)
+    streams = SimulatedStreams(VALIDATION_STREAMS, config.patch, device, seed, bank=bank)
+    rolling = RollingWindows(streams, config.recipe().learns_from, WINDOW)
     return [rolling.advance(FRAMES_BETWEEN_MOMENTS) for _ in range(VALIDATION_MOMENTS)]
 
 

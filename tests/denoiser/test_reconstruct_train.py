@@ -32,7 +32,7 @@ class Part:
 class Flats:
     """Still streams of one light each; noisy spikes are twice as many as clean ones.  Ages are counted in the light."""
 
-    def __init__(self, count=4, patch=16, device="cpu", seed=0):
+    def __init__(self, count=4, patch=16, device="cpu", seed=0, *, bank=None, compiled=False):
         self.draw = torch.Generator().manual_seed(seed)
         self.count, self.patch, self.renewed = count, patch, []
         self.rate = torch.rand(count, 1, 1, 1, generator=self.draw) * 0.4 + 0.05
@@ -46,9 +46,16 @@ class Flats:
         return Part((drawn < 2 * light).byte(), (drawn < light).byte(), light, begins)
 
 
+class NoBank:
+    @classmethod
+    def drawn(cls, seed, device, textures=0, units=0):
+        return cls()
+
+
 @pytest.fixture
 def small(monkeypatch):
     monkeypatch.setattr(training, "SimulatedStreams", Flats)
+    monkeypatch.setattr(training, "Bank", NoBank)
     monkeypatch.setattr(training, "VALIDATION_STREAMS", 2)
     monkeypatch.setattr(training, "VALIDATION_MOMENTS", 1)
 
@@ -110,6 +117,16 @@ def test_ssml_does_not_see_the_light():
     windows = windows_of(lesson.span)
     other = Windows(windows.spikes, torch.rand_like(windows.light), windows.old)
     assert torch.equal(lesson.losses(windows, torch.float32), lesson.losses(other, torch.float32))
+
+
+@pytest.mark.parametrize("width", [12, 24, 36, 48])
+def test_the_gradients_are_finite_in_mixed_precision(width):
+    lesson = lesson_of(reconstructor_recipe("ssml", width))
+    lesson.networks.to(memory_format=torch.channels_last)
+    with torch.autocast("cpu", torch.bfloat16):
+        loss = lesson.losses(windows_of(lesson.span), torch.bfloat16).mean()
+    loss.backward()
+    assert all(bool(torch.isfinite(w.grad).all()) for w in lesson.networks.parameters())
 
 
 def test_the_blind_network_does_not_see_the_pixel_and_sees_its_neighbours():
