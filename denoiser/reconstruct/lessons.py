@@ -70,7 +70,8 @@ class Supervised:
         self.networks = nn.ModuleDict({"student": recipe.network()})
 
     def losses(self, windows: Windows, number_type: torch.dtype) -> Tensor:
-        found, estimates = self.networks["student"].with_estimates(_shown(windows.middle(), number_type))
+        spikes = _shown(windows.middle(), number_type)
+        found, estimates = self.networks["student"].with_estimates(spikes)  # type: ignore[operator]
         of_blocks = _distance(estimates, windows.light[:, list(CENTRES)])
         return _distance(found, windows.light[:, WINDOW // 2, None]) + ESTIMATES_SHARE * of_blocks
 

@@ -46,6 +46,8 @@ GROUPS = 4
 class TemporalFilters(nn.Module):
     """(N, 13 FOLD^2, H, W) a block of spikes -> (N, width, H, W), filtered over every time scale, scales weighed."""
 
+    seen: Tensor
+
     def __init__(self, width: int) -> None:
         super().__init__()
         each = width // 3
@@ -63,6 +65,8 @@ class TemporalFilters(nn.Module):
 
 class Alignment(nn.Module):
     """Features of one block, and of the middle one, (N, width, H, W) each -> the first where the second has them."""
+
+    twice: Tensor
 
     def __init__(self, width: int) -> None:
         super().__init__()

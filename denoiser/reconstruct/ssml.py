@@ -40,6 +40,8 @@ BRANCHES = ((3, 2), (5, 3))
 class Masked(nn.Conv2d):
     """Convolution that keeps the size and does not see the pixel itself."""
 
+    seen: Tensor
+
     def __init__(self, inputs: int, outputs: int, size: int) -> None:
         super().__init__(inputs, outputs, size, padding=size // 2)
         seen = torch.ones(1, 1, size, size)

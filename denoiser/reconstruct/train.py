@@ -107,8 +107,10 @@ class ReconstructorConfig:
 def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -> Path:
     """Train, or go on training; returns the path of the weights.
 
+    `minutes` counts from here, the drawing of textures and compilation included.
     Raises InputError where `out` holds the run of another mode or width, or a damaged one.
     """
+    began = time.monotonic()
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     torch.backends.cudnn.benchmark = True
@@ -118,14 +120,13 @@ def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -
     run = Run.begin(lesson.networks)
     if config.resume and (config.out / "last.pt").exists():
         run.load(config.out / "last.pt")
-    return _loop(config, lesson, run, progress)
+    return _loop(config, lesson, run, began, progress)
 
 
-def _loop(config: ReconstructorConfig, lesson: Lesson, run: Run, progress: bool) -> Path:
+def _loop(config: ReconstructorConfig, lesson: Lesson, run: Run, began: float, progress: bool) -> Path:
     rolling = _windows(config, run.step, lesson.span)
     held_out = _held_out(config)
-    rolling.advance(config.frames_a_step)  # the slow first call is none of the run's minutes
-    before, began, saved = run.seconds, time.monotonic(), time.monotonic()
+    before, saved = run.seconds, time.monotonic()
     bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
     losses: list[Tensor] = []
     while (done := _done(config, run)) < 1.0:
