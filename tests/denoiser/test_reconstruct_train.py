@@ -288,6 +288,24 @@ def test_a_stopped_run_goes_on_from_where_it_was(small, tmp_path, monkeypatch):
     assert float(run.optimiser.state_dict()["state"][0]["step"]) == 5  # the moments came along
 
 
+def test_minutes_end_a_run(small, tmp_path):
+    """A second, of a thousand million steps."""
+    weights_after(tmp_path, "ssml", steps=10**9, minutes=1 / 60)
+    run = Run.begin(lesson_of(reconstructor_recipe("ssml", WIDTH_STEP)).networks)
+    run.load(tmp_path / "last.pt")
+    print(run.step, run.seconds)
+    assert 1 <= run.seconds < 60
+
+
+def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
+    adam = torch.optim.Adam([torch.nn.Parameter(torch.zeros(1))])
+    rates = []
+    for step, done in ((0, 0.0), (99, 0.0), (1000, 0.5), (2000, 1.0)):
+        training._set_rate(adam, 2.0, step, done)
+        rates.append(adam.param_groups[0]["lr"])
+    assert rates == pytest.approx([0.02, 2.0, 1.0, 0.0])
+
+
 def test_the_run_of_another_mode_or_width_is_refused(small, tmp_path):
     weights_after(tmp_path)
     for other in ({"mode": "ssml"}, {"width": 24}):
