@@ -17,6 +17,7 @@ from denoiser.reconstruct.rolling import RollingWindows
 from denoiser.reconstruct.run import Run
 from denoiser.reconstruct.train import ReconstructorConfig, train_reconstructor
 from denoiser.reconstruct.weights import load_reconstructor
+from denoiser.simulated import Bank
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane
 
@@ -259,6 +260,22 @@ def test_a_run_leaves_weights_and_a_curve(small, tmp_path, mode):
     assert (tmp_path / "curve.png").stat().st_size > 0 and (tmp_path / "last.pt").exists()
     training = load_reconstructor(tmp_path / f"{mode}.pt")[2]
     assert training["steps"] == 5 and f"--mode {mode}" in training["command"] and "--width 12" in training["command"]
+
+
+def test_the_denoisers_streams_serve(tmp_path, monkeypatch):
+    """As they are, but of few textures and units."""
+    monkeypatch.setattr(training, "VALIDATION_STREAMS", 2)
+    monkeypatch.setattr(training, "VALIDATION_MOMENTS", 1)
+    few = {"textures": 4, "units": 1}
+
+    class SmallBank(Bank):
+        @classmethod
+        def drawn(cls, seed, device, **_):
+            return super().drawn(seed, device, **few)
+
+    monkeypatch.setattr(training, "Bank", SmallBank)
+    assert all(bool(torch.isfinite(w).all()) for w in weights_after(tmp_path).values())
+    assert 5 < json.loads((tmp_path / "curve.json").read_text())[0]["tfp41_db"] < 60
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device on this machine")
