@@ -45,7 +45,7 @@ class IntervalWindows:
         self.layout, self.taken = layout, taken
         count = pool * taken
         self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled)
-        self._rng = torch.Generator(device).manual_seed(seed + 1)
+        self._next = torch.zeros((), dtype=torch.int64, device=device)  # streams are taken in turn
         span = layout.past + 1 + LOOK_AHEAD
         full = (count, span, patch, patch)
         self._noisy, self._clean = (torch.zeros(full, dtype=torch.uint8, device=device) for _ in range(2))
@@ -75,7 +75,8 @@ class IntervalWindows:
         """(rate, target, light, valid) of each window."""
         layout, device = self.layout, self.streams.device
         for _ in range(passes):
-            rows = torch.randperm(self.streams.count, generator=self._rng, device=device)[: self.taken]
+            rows = torch.remainder(self._next + torch.arange(self.taken, device=device), self.streams.count)
+            self._next += self.taken
             part = self.streams.advance(ADVANCE, rows)
             self._take(rows, part.noisy, part.clean, part.light, part.begins)
             noisy, clean = self._noisy[rows], self._clean[rows]

@@ -80,7 +80,9 @@ class _DeclaredRecipe(Declared):
 RECIPES = {
     "paper": Recipe(WindowLayout(past=20, planes=1, future=20), "clean_inverse_interval", "accumulate"),
     "best": Recipe(
-        WindowLayout(past=16, planes=16, future=16, half_widths=(4, 12, 22), memories=(64.0, 512.0), gain_memory=1024.0),
+        WindowLayout(
+            past=16, planes=16, future=16, half_widths=(4, 12, 22), memories=(64.0, 512.0), gain_memory=1024.0
+        ),
         "light",
         "accumulate",
     ),

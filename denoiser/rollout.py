@@ -71,7 +71,7 @@ class Rollouts:
         self.layout, self.taken = layout, taken
         count = pool * taken
         self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled)
-        self._rng = torch.Generator(device).manual_seed(seed + 1)
+        self._next = torch.zeros((), dtype=torch.int64, device=device)  # streams are taken in turn
         shape = (patch, patch)
         self._windows = Windows.begin(layout, count, shape, device)
         zeros = lambda *size: torch.zeros((count, *size), device=device)  # noqa: E731
@@ -106,7 +106,8 @@ class Rollouts:
     def _passes(self, network: nn.Module, passes: int):
         """(rate, light, last rate and light of the pass before, valid) of each pass of some streams."""
         layout, device = self.layout, self.streams.device
-        rows = torch.randperm(self.streams.count, generator=self._rng, device=device)[: self.taken]
+        rows = torch.remainder(self._next + torch.arange(self.taken, device=device), self.streams.count)
+        self._next += self.taken
         windows = self._windows.rows(rows)
         past = _Past(**{name: value[rows] for name, value in vars(self._past).items()})
         for _ in range(passes):
@@ -132,12 +133,12 @@ class Rollouts:
         """Give the streams that begin a map, or none; in place."""
         gain, dark = self.streams.unit(rows)
         count, device = len(rows), self.streams.device
-        draw = lambda *size: torch.randn(size, generator=self._rng, device=device)  # noqa: E731
+        draw = lambda *size: torch.randn(size, generator=self.streams.rng, device=device)  # noqa: E731
         low, high = map(math.log, MAP_ERRORS)
-        size = torch.exp(low + (high - low) * torch.rand((count, 1, 1), generator=self._rng, device=device))
+        size = torch.exp(low + (high - low) * torch.rand((count, 1, 1), generator=self.streams.rng, device=device))
         wide = begins[:, None, None]
         typical = dark.mean(dim=(1, 2), keepdim=True)
         windows.gain = torch.where(wide, gain * (1 + size * draw(*gain.shape)), windows.gain)
         windows.dark = torch.where(wide, (dark + size * typical * draw(*dark.shape)).clamp(min=0.0), windows.dark)
-        chosen = torch.rand(count, generator=self._rng, device=device) < MAPPED
+        chosen = torch.rand(count, generator=self.streams.rng, device=device) < MAPPED
         windows.mapped = torch.where(begins, chosen.float(), windows.mapped)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,12 +37,14 @@ UNIT_SHAPE = (192, 192)
 AGES = ((96, 0.2), (192, 0.25), (384, 0.25), (960, 0.3))
 """Frames after which a stream begins anew, and how often."""
 
-STILL, SLOW = 0.3, 0.25
-"""Shares of scenes in which nothing moves, and in which nothing moves faster than SLOWER_THAN; the others are fast."""
+STILL = 0.3
+"""Share of scenes in which nothing moves."""
 
-SLOWER_THAN = 0.3
-FASTEST = 3.0
-"""Pixels a frame."""
+SPEEDS = (0.02, 3.0)
+"""Speed of the fastest layer of the others, from least to greatest, even in its logarithm [pixels/frame]."""
+
+STILL_BACKGROUND, STILL_SHAPE = 0.5, 0.15
+"""Shares of backgrounds and of shapes that stay where they are in scenes that move."""
 
 DIM, DIM_LIGHT, LIGHT = 0.3, (0.012, 0.15), (0.15, 1.0)
 """Share of dim scenes; the brightest light of dim and of other scenes [spikes/frame], even in its logarithm."""
@@ -133,7 +135,7 @@ class SimulatedStreams:
         self.device = torch.device(device)
         self.count, self.patch = count, patch
         self.bank = Bank.drawn(seed, self.device) if bank is None else bank
-        self._rng = torch.Generator(self.device).manual_seed(seed)
+        self.rng = torch.Generator(self.device).manual_seed(seed)
         self._background, self._over = _background, _over
         if compiled:
             self._background, self._over = (torch.compile(f, dynamic=False) for f in (_background, _over))
@@ -142,7 +144,7 @@ class SimulatedStreams:
         self._lengths = torch.tensor([float(age) for age, _ in AGES], device=self.device)
         self._shares = torch.tensor([share for _, share in AGES], device=self.device).cumsum(0)[:-1]
         self._state = self._drawn(count)
-        spread = torch.rand(count, generator=self._rng, device=self.device)  # so that not all begin anew together
+        spread = torch.rand(count, generator=self.rng, device=self.device)  # so that not all begin anew together
         self._state["age"] = torch.floor(spread * self._state["length"] / 96) * 96
         self._fresh = torch.ones(count, dtype=torch.bool, device=self.device)
 
@@ -153,7 +155,7 @@ class SimulatedStreams:
         over = mine["age"] >= mine["length"]
         mine = _where(over, self._drawn(len(rows)), mine)
         begins = over | self._fresh[rows]
-        self._fresh[rows] = False
+        self._fresh.index_fill_(0, rows, False)
         times = mine["age"][:, None] + torch.arange(frames + 1, device=self.device)
         pictures = _paint(self.bank.textures, mine, times, self.patch, self._background, self._over)
         noisy = self._exposed(mine, pictures, "noisy")
@@ -177,7 +179,9 @@ class SimulatedStreams:
             law = BatchLaw(mine["gain"], mine["dark"], mine["spread"], mine["polynomial"])
         else:
             nothing = torch.zeros_like(mine["dark"])
-            law = BatchLaw(torch.full_like(nothing, float(GRAINS)), nothing, nothing, torch.zeros_like(mine["polynomial"]))
+            law = BatchLaw(
+                torch.full_like(nothing, float(GRAINS)), nothing, nothing, torch.zeros_like(mine["polynomial"])
+            )
         state = BatchState(law, mine[f"{twin} remaining"], mine[f"{twin} fired"], mine["seeds"])
         spikes = torch.empty((count, keys - 1, light.shape[2]), dtype=torch.uint8, device=self.device)
         for k in range(keys - 1):
@@ -195,15 +199,13 @@ class SimulatedStreams:
         return {"length": self._lengths[chosen], "age": torch.zeros(count, device=self.device)}
 
     def _uniform(self, low: float, high: float, *shape: int) -> Tensor:
-        return low + (high - low) * torch.rand(shape, generator=self._rng, device=self.device)
+        return low + (high - low) * torch.rand(shape, generator=self.rng, device=self.device)
 
     def _scene(self, count: int) -> dict[str, Tensor]:
         """Layer 0 is the background.  All (B, layers) but what is said."""
         layers = SHAPES + 1
-        kind = self._uniform(0, 1, count)
-        slow = torch.exp(self._uniform(math.log(0.02), math.log(SLOWER_THAN), count))
-        fast_ = self._uniform(SLOWER_THAN, FASTEST, count)
-        speed = torch.where(kind < STILL, 0.0, torch.where(kind < STILL + SLOW, slow, fast_))
+        moving = self._uniform(0, 1, count) >= STILL
+        speed = moving * torch.exp(self._uniform(*map(math.log, SPEEDS), count))
         dim = self._uniform(0, 1, count) < DIM
         peak = torch.exp(
             torch.where(
@@ -214,7 +216,8 @@ class SimulatedStreams:
         )
         contrast = torch.exp(self._uniform(*map(math.log, CONTRAST), count))
         levels = torch.exp(-torch.log(contrast)[:, None, None] * self._uniform(0, 1, count, layers, 2))
-        moves = self._uniform(0, 1, count, layers) < 0.85
+        moves = self._uniform(0, 1, count, layers) >= STILL_SHAPE
+        moves[:, 0] = self._uniform(0, 1, count) >= STILL_BACKGROUND
         pace = torch.where(moves, speed[:, None] * self._uniform(0, 1, count, layers), 0.0)
         heading = self._uniform(0, 2 * math.pi, count, layers)
         extent = self._uniform(0.06, 0.5, count, layers, 2) * self.patch
@@ -225,9 +228,7 @@ class SimulatedStreams:
         spin[:, 0] = 0.0
         return {
             "levels": peak[:, None, None] * levels,
-            "texture": torch.randint(
-                len(self.bank.textures), (count, layers), generator=self._rng, device=self.device
-            ),
+            "texture": torch.randint(len(self.bank.textures), (count, layers), generator=self.rng, device=self.device),
             "corner": self._uniform(0, TEXTURE_SIZE, count, layers, 2),
             "zoom": self._uniform(0.5, 1.4, count, layers),
             "centre": self._uniform(0, self.patch, count, layers, 2),
@@ -235,25 +236,25 @@ class SimulatedStreams:
             "angle": self._uniform(0, 2 * math.pi, count, layers),
             "spin": spin,
             "extent": extent,
-            "shape": torch.randint(3, (count, layers), generator=self._rng, device=self.device),
-            "blades": torch.randint(2, 6, (count, layers), generator=self._rng, device=self.device),
+            "shape": torch.randint(3, (count, layers), generator=self.rng, device=self.device),
+            "blades": torch.randint(2, 6, (count, layers), generator=self.rng, device=self.device),
             "shown": self._uniform(0, 1, count, layers) < 0.7,
         }
 
     def _unit(self, count: int) -> dict[str, Tensor]:
         bank, size = self.bank, self.patch
-        chosen = torch.randint(len(bank.gain), (count,), generator=self._rng, device=self.device)
+        chosen = torch.randint(len(bank.gain), (count,), generator=self.rng, device=self.device)
         room = [side - size + 1 for side in bank.gain.shape[1:]]
-        y, x = (torch.randint(n, (count, 1), generator=self._rng, device=self.device) for n in room)
+        y, x = (torch.randint(n, (count, 1), generator=self.rng, device=self.device) for n in room)
         along = torch.arange(size, device=self.device)
         where = (chosen[:, None, None], (y + along)[:, :, None], (x + along)[:, None, :])
         maps = {name: getattr(bank, name)[where].reshape(count, -1) for name in ("gain", "dark", "spread")}
         pixels = size * size
-        phase = torch.rand((count, pixels), generator=self._rng, device=self.device)
-        normal = torch.randn((count, pixels), generator=self._rng, device=self.device)
+        phase = torch.rand((count, pixels), generator=self.rng, device=self.device)
+        normal = torch.randn((count, pixels), generator=self.rng, device=self.device)
         left = (1 - phase) * GRAINS
         zero = torch.zeros((count, pixels), dtype=torch.int32, device=self.device)
-        seeds = torch.randint(-(1 << 31), (1 << 31) - 1, (count, 2), generator=self._rng, device=self.device)
+        seeds = torch.randint(-(1 << 31), (1 << 31) - 1, (count, 2), generator=self.rng, device=self.device)
         return {
             **maps,
             "polynomial": bank.polynomial[chosen],
@@ -273,7 +274,9 @@ def _where(mask: Tensor, new: dict[str, Tensor], old: dict[str, Tensor]) -> dict
 Painter = Callable[[Tensor, dict[str, Tensor], Tensor, int], Tensor]
 
 
-def _paint(textures: Tensor, scene: dict[str, Tensor], times: Tensor, size: int, background: Painter, over: Any) -> Tensor:
+def _paint(
+    textures: Tensor, scene: dict[str, Tensor], times: Tensor, size: int, background: Painter, over: Any
+) -> Tensor:
     """Light (B, K, size, size) of the collages at times (B, K) [frames]."""
     picture = background(textures, _layer(scene, 0), times, size)
     for number in range(1, SHAPES + 1):

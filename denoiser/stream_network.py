@@ -50,7 +50,7 @@ class StreamDnSS(nn.Module):
         layers: int,
         planes: int,
         means: tuple[int, int],
-        widths: tuple[int, int] = (64, 96),
+        widths: tuple[int, int] = (64, 128),
     ) -> None:
         super().__init__()
         fine, coarse = widths

@@ -16,6 +16,7 @@ import json
 import math
 import os
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Protocol
@@ -29,7 +30,7 @@ from denoiser.interval_training import IntervalWindows
 from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.recipe import Recipe, recipe_of
 from denoiser.rollout import Rollouts
-from denoiser.simulated import Bank
+from denoiser.simulated import Bank, SimulatedStreams
 from denoiser.weights import save_weights, write_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
@@ -40,6 +41,8 @@ VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, oth
 VALIDATION_STREAMS = 8
 VALIDATION_PASSES = 24
 WARM_UP_STEPS = 100
+WARM_UPS = 3
+"""Steps taken before one is captured; they are steps like others, but not counted."""
 PASSES = {"best": 4, "paper": 1}
 """Passes of each stream that a step takes."""
 
@@ -120,6 +123,8 @@ def train(config: TrainConfig, *, progress: bool = True) -> Path:
 class Source(Protocol):
     """What a network learns from and is judged by."""
 
+    streams: SimulatedStreams
+
     def loss(self, network: nn.Module, passes: int) -> Tensor:
         """The loss of one step, with gradients."""
 
@@ -147,7 +152,11 @@ class _Run:
     @classmethod
     def begin(cls, config: TrainConfig, recipe: Recipe) -> _Run:
         network = recipe.network().to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
-        optimiser = torch.optim.Adam(network.parameters(), config.lr)
+        on_gpu = torch.device(config.device).type == "cuda"
+        lr = (
+            torch.tensor(config.lr, device=config.device) if on_gpu else config.lr
+        )  # in a graph only a tensor can change
+        optimiser = torch.optim.Adam(network.parameters(), lr, capturable=on_gpu)
         return cls(network, optimiser, 0, 0.0, [], [])
 
     def save(self, path: Path) -> None:
@@ -155,7 +164,7 @@ class _Run:
             path,
             {
                 "network": self.network.state_dict(),
-                "optimiser": self.optimiser.state_dict(),
+                "optimiser": _plain_groups(self.optimiser.state_dict()),
                 "step": self.step,
                 "seconds": self.seconds,
                 "curve": self.curve,
@@ -176,9 +185,16 @@ class _Run:
         except InputError as error:
             raise InputError(f"{error}; it is not a run of this mode: give another --out, or resume=False") from error
         self.network.load_state_dict(parts["network"])
-        self.optimiser.load_state_dict(parts["optimiser"])
+        groups = [dict(group) for group in self.optimiser.state_dict()["param_groups"]]
+        self.optimiser.load_state_dict({**parts["optimiser"], "param_groups": groups})
         self.step, self.seconds, self.curve = progress.step, progress.seconds, [dict(p) for p in progress.curve]
         self.resumed_at = [*progress.resumed_at, self.step]
+
+
+def _plain_groups(state: dict[str, Any]) -> dict[str, Any]:
+    """An optimiser's state with its rates of learning as numbers, as on a processor."""
+    groups = [{**group, "lr": float(group["lr"]), "capturable": False} for group in state["param_groups"]]
+    return {**state, "param_groups": groups}
 
 
 class _Progress(Declared):
@@ -192,7 +208,7 @@ class _Progress(Declared):
 
 def _refuse_other_moments(found: Any, optimiser: torch.optim.Optimizer, where: str) -> None:
     """Raises InputError unless `found` is the state of an Adam of the same parameters."""
-    ours = optimiser.state_dict()["param_groups"]
+    ours = _plain_groups(optimiser.state_dict())["param_groups"]
     groups = found.get("param_groups") if isinstance(found, dict) else None
     settings = [{name: v for name, v in group.items() if name != "lr"} for group in ours]
     if not isinstance(groups, list) or not all(isinstance(group, dict) for group in groups):
@@ -215,14 +231,17 @@ def _loop(config: TrainConfig, recipe: Recipe, run: _Run, progress: bool) -> Pat
     compiled = device.type == "cuda"
     seed = config.seed + run.step  # a resumed run meets other streams
     bank = Bank.drawn(config.seed, device, progress=progress)
-    streams = source(recipe, seed=seed, taken=config.batch, patch=config.patch, device=device, bank=bank, compiled=compiled)
+    streams = source(
+        recipe, seed=seed, taken=config.batch, patch=config.patch, device=device, bank=bank, compiled=compiled
+    )
     judge = Judge(recipe, config.seed + VALIDATION_SEED, device)
     before, began, saved = run.seconds, time.monotonic(), time.monotonic()
     bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
     losses: list[Tensor] = []
+    step = stepper(run, streams, PASSES[config.mode], device)
     while (done := _done(config, run)) < 1.0:
         _set_rate(run.optimiser, config.lr, run.step, done)
-        losses.append(_step(run, streams, PASSES[config.mode]))
+        losses.append(step())
         run.step += 1
         run.seconds = before + time.monotonic() - began
         bar.update()
@@ -249,17 +268,47 @@ def _done(config: TrainConfig, run: _Run) -> float:
 def _set_rate(optimiser: torch.optim.Optimizer, lr: float, step: int, done: float) -> None:
     rate = lr * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
     for group in optimiser.param_groups:
-        group["lr"] = rate
+        if isinstance(group["lr"], Tensor):
+            group["lr"].fill_(rate)
+        else:
+            group["lr"] = rate
 
 
-def _step(run: _Run, streams: Source, passes: int) -> Tensor:
-    """One step of the network; its loss, which a GPU need not have worked out yet."""
-    loss = streams.loss(run.network, passes)
+def stepper(run: _Run, streams: Source, passes: int, device: torch.device) -> Callable[[], Tensor]:
+    """A function that takes one step and returns its loss, which a GPU need not have worked out yet.
+
+    On a GPU the step is captured once and replayed: it is thousands of small kernels, whose launches take twice as long
+    as they do.
+    """
+
+    def step() -> Tensor:
+        run.optimiser.zero_grad(set_to_none=True)
+        loss = streams.loss(run.network, passes)
+        loss.backward()
+        nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
+        run.optimiser.step()
+        return loss.detach()
+
+    if device.type != "cuda":
+        return step
+    torch.backends.cudnn.benchmark = True
+    beside = torch.cuda.Stream()
+    beside.wait_stream(torch.cuda.current_stream())
+    with torch.cuda.stream(beside):
+        for _ in range(WARM_UPS):
+            step()
+    torch.cuda.current_stream().wait_stream(beside)
+    graph = torch.cuda.CUDAGraph()
+    graph.register_generator_state(streams.streams.rng)
     run.optimiser.zero_grad(set_to_none=True)
-    loss.backward()
-    nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
-    run.optimiser.step()
-    return loss.detach()
+    with torch.cuda.graph(graph):
+        captured = step()
+
+    def replay() -> Tensor:
+        graph.replay()
+        return captured.clone()
+
+    return replay
 
 
 class Judge:

@@ -43,7 +43,6 @@ from numpy.typing import NDArray
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 
-
 WINDOW_PRIOR = 2.0
 """Spikes that a pixel's gain of 1 weighs against what the sums say."""
 
@@ -77,7 +76,9 @@ class PixelMap:
             gain, dark = unit
             return cls(np.asarray(gain, np.float32), np.asarray(dark, np.float32))
         except (TypeError, ValueError) as error:
-            raise InputError(f"unit is {type(unit).__name__}; give a PixelMap or a pair of maps (gain, dark)") from error
+            raise InputError(
+                f"unit is {type(unit).__name__}; give a PixelMap or a pair of maps (gain, dark)"
+            ) from error
 
     @cached_property
     def digest(self) -> str:
