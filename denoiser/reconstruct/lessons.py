@@ -40,6 +40,10 @@ class Windows:
     light: Tensor
     old: Tensor
 
+    def copy(self) -> Windows:
+        """The same frames, to keep."""
+        return Windows(self.spikes.clone(), self.light.clone(), self.old)
+
     def middle(self) -> Tensor:
         """(N, 41, H, W) the frames that a reconstructor sees."""
         first = (self.spikes.shape[1] - WINDOW) // 2
@@ -72,7 +76,7 @@ class Supervised:
     def losses(self, windows: Windows, number_type: torch.dtype) -> Tensor:
         spikes = _shown(windows.middle(), number_type)
         found, estimates = self.networks["student"].with_estimates(spikes)  # type: ignore[operator]
-        of_blocks = _distance(estimates, windows.light[:, list(CENTRES)])
+        of_blocks = _distance(estimates, windows.light[:, CENTRES[0] : CENTRES[-1] + 1 : CENTRES[1] - CENTRES[0]])
         return _distance(found, windows.light[:, WINDOW // 2, None]) + ESTIMATES_SHARE * of_blocks
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import torch
+from torch import Tensor
 
 from denoiser.reconstruct.lessons import Windows
 from denoiser.simulated import SimulatedStreams
@@ -11,29 +12,24 @@ from denoiser.simulated import SimulatedStreams
 class RollingWindows:
     """Windows of `span` frames of every stream; a window counts once its stream is that old.
 
-    spikes: "clean" or "noisy".
+    spikes: "clean" or "noisy".  All is kept in place, as `denoiser.captured` wants it.
     """
 
     def __init__(self, streams: SimulatedStreams, spikes: str, span: int) -> None:
-        self._streams, self._spikes, self._span = streams, spikes, span
-        self._windows: Windows | None = None
-        self._age = torch.zeros(0)
+        self.streams, self._kind = streams, spikes
+        shape, device = (streams.count, span, streams.patch, streams.patch), streams.device
+        self._spikes = torch.zeros(shape, dtype=torch.uint8, device=device)
+        self._light = torch.zeros(shape, device=device)
+        self._age = torch.zeros(streams.count, dtype=torch.int64, device=device)
 
     def advance(self, frames: int) -> Windows:
-        """Go on by `frames`; the windows that end there.  The first call goes on until every window is full."""
-        while True:
-            windows = self._advance(frames)
-            if windows.spikes.shape[1] == self._span:
-                return windows
+        """Go on by `frames`; the windows that end there, which the next call overwrites."""
+        part = self.streams.advance(frames)
+        _push(self._spikes, getattr(part, self._kind))
+        _push(self._light, part.light)
+        self._age.copy_(torch.where(part.begins, 0, self._age) + frames)
+        return Windows(self._spikes, self._light, self._age >= self._spikes.shape[1])
 
-    def _advance(self, frames: int) -> Windows:
-        part = self._streams.advance(frames)
-        spikes, light = getattr(part, self._spikes), part.light
-        if self._windows is None:
-            self._age = torch.zeros(len(spikes), device=spikes.device)
-        else:
-            spikes = torch.cat([self._windows.spikes, spikes], dim=1)
-            light = torch.cat([self._windows.light, light], dim=1)
-        self._age = torch.where(part.begins, 0, self._age) + frames
-        self._windows = Windows(spikes[:, -self._span :], light[:, -self._span :], self._age >= self._span)
-        return self._windows
+
+def _push(held: Tensor, new: Tensor) -> None:
+    held.copy_(torch.cat([held, new], dim=1)[:, -held.shape[1] :])

@@ -24,6 +24,7 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from denoiser.captured import captured
 from denoiser.reconstruct import ssml
 from denoiser.reconstruct.lessons import Lesson, Windows, lesson_of
 from denoiser.reconstruct.recipe import ReconstructorRecipe, reconstructor_recipe
@@ -129,9 +130,11 @@ def _loop(config: ReconstructorConfig, lesson: Lesson, run: Run, began: float, p
     before, saved = run.seconds, time.monotonic()
     bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
     losses: list[Tensor] = []
+    run.set_rate(_rate(config.lr, 0, 0.0))  # of the calls that come before a capture
+    step = captured(lambda: _step(config, lesson, run, rolling), torch.device(config.device), rolling.streams.rng)
     while (done := _done(config, run)) < 1.0:
-        _set_rate(run.optimiser, config.lr, run.step, done)
-        losses.append(_step(config, lesson, run, rolling))
+        run.set_rate(_rate(config.lr, run.step, done))
+        losses.append(step())
         run.step += 1
         run.seconds = before + time.monotonic() - began
         bar.update()
@@ -150,11 +153,11 @@ def _loop(config: ReconstructorConfig, lesson: Lesson, run: Run, began: float, p
 
 def _step(config: ReconstructorConfig, lesson: Lesson, run: Run, rolling: RollingWindows) -> Tensor:
     """One step; its loss, which a GPU need not have worked out yet."""
+    run.optimiser.zero_grad(set_to_none=True)
     windows = rolling.advance(config.frames_a_step)
     with torch.autocast(windows.spikes.device.type, torch.bfloat16):
         losses = lesson.losses(windows, torch.bfloat16)
     loss = (losses * windows.old).sum() / windows.old.sum().clamp(min=1)
-    run.optimiser.zero_grad(set_to_none=True)
     loss.backward()
     nn.utils.clip_grad_norm_(run.networks.parameters(), 1.0)
     run.optimiser.step()
@@ -166,10 +169,9 @@ def _done(config: ReconstructorConfig, run: Run) -> float:
     return run.step / config.steps if config.minutes is None else run.seconds / (60 * config.minutes)
 
 
-def _set_rate(optimiser: torch.optim.Optimizer, lr: float, step: int, done: float) -> None:
-    rate = lr * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
-    for group in optimiser.param_groups:
-        group["lr"] = rate
+def _rate(highest: float, step: int, done: float) -> float:
+    """The rate of learning of a step."""
+    return highest * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
 
 
 def _windows(config: ReconstructorConfig, step: int, span: int) -> RollingWindows:
@@ -187,7 +189,7 @@ def _held_out(config: ReconstructorConfig) -> list[Windows]:
     bank = Bank.drawn(seed, device, textures=VALIDATION_TEXTURES, units=VALIDATION_UNITS)
     streams = SimulatedStreams(VALIDATION_STREAMS, config.patch, device, seed, bank=bank)
     rolling = RollingWindows(streams, config.recipe().learns_from, WINDOW)
-    return [rolling.advance(FRAMES_BETWEEN_MOMENTS) for _ in range(VALIDATION_MOMENTS)]
+    return [rolling.advance(FRAMES_BETWEEN_MOMENTS).copy() for _ in range(VALIDATION_MOMENTS)]
 
 
 def validate(network: nn.Module, held_out: list[Windows]) -> dict[str, float]:
