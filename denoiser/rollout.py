@@ -35,7 +35,7 @@ MAP_ERRORS = (0.001, 0.01)
 """Relative error of a map's gains, and of its dark rates, from least to greatest, even in its logarithm; SNEE's maps of
 13 flats of 8000 frames are near the lower end."""
 
-POOL = 4
+POOL = 16
 """Streams for each one that a step takes on."""
 
 

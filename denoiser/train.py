@@ -26,6 +26,7 @@ from pydantic import Field
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from denoiser.captured import captured
 from denoiser.interval_training import IntervalWindows
 from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.recipe import Recipe, recipe_of
@@ -41,9 +42,7 @@ VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, oth
 VALIDATION_STREAMS = 8
 VALIDATION_PASSES = 24
 WARM_UP_STEPS = 100
-WARM_UPS = 3
-"""Steps taken before one is captured; they are steps like others, but not counted."""
-PASSES = {"best": 4, "paper": 1}
+PASSES = {"best": 3, "paper": 1}
 """Passes of each stream that a step takes."""
 
 _COUNTS = {
@@ -230,6 +229,7 @@ def _loop(config: TrainConfig, recipe: Recipe, run: _Run, progress: bool) -> Pat
     device = torch.device(config.device)
     compiled = device.type == "cuda"
     seed = config.seed + run.step  # a resumed run meets other streams
+    torch.backends.cudnn.benchmark = True
     bank = Bank.drawn(config.seed, device, progress=progress)
     streams = source(
         recipe, seed=seed, taken=config.batch, patch=config.patch, device=device, bank=bank, compiled=compiled
@@ -238,7 +238,7 @@ def _loop(config: TrainConfig, recipe: Recipe, run: _Run, progress: bool) -> Pat
     before, began, saved = run.seconds, time.monotonic(), time.monotonic()
     bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
     losses: list[Tensor] = []
-    step = stepper(run, streams, PASSES[config.mode], device)
+    step = stepper(run, streams, PASSES[config.mode])
     while (done := _done(config, run)) < 1.0:
         _set_rate(run.optimiser, config.lr, run.step, done)
         losses.append(step())
@@ -274,12 +274,8 @@ def _set_rate(optimiser: torch.optim.Optimizer, lr: float, step: int, done: floa
             group["lr"] = rate
 
 
-def stepper(run: _Run, streams: Source, passes: int, device: torch.device) -> Callable[[], Tensor]:
-    """A function that takes one step and returns its loss, which a GPU need not have worked out yet.
-
-    On a GPU the step is captured once and replayed: it is thousands of small kernels, whose launches take twice as long
-    as they do.
-    """
+def stepper(run: _Run, streams: Source, passes: int) -> Callable[[], Tensor]:
+    """A function that takes one step and returns its loss, which a GPU need not have worked out yet."""
 
     def step() -> Tensor:
         run.optimiser.zero_grad(set_to_none=True)
@@ -289,26 +285,7 @@ def stepper(run: _Run, streams: Source, passes: int, device: torch.device) -> Ca
         run.optimiser.step()
         return loss.detach()
 
-    if device.type != "cuda":
-        return step
-    torch.backends.cudnn.benchmark = True
-    beside = torch.cuda.Stream()
-    beside.wait_stream(torch.cuda.current_stream())
-    with torch.cuda.stream(beside):
-        for _ in range(WARM_UPS):
-            step()
-    torch.cuda.current_stream().wait_stream(beside)
-    graph = torch.cuda.CUDAGraph()
-    graph.register_generator_state(streams.streams.rng)
-    run.optimiser.zero_grad(set_to_none=True)
-    with torch.cuda.graph(graph):
-        captured = step()
-
-    def replay() -> Tensor:
-        graph.replay()
-        return captured.clone()
-
-    return replay
+    return captured(step, streams.streams.device, streams.streams.rng)
 
 
 class Judge:
