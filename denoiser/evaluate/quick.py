@@ -255,12 +255,3 @@ def _write(folder: Path, result: dict[str, Any]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in (("evaluate.json", json.dumps(result, indent=1)), ("evaluate.txt", report(result))):
         write_text_whole(folder / name, text)
-
-
-def main() -> None:
-    """`python -m denoiser.evaluate`: the quick evaluation, printed."""
-    print(report(evaluate_quick()))
-
-
-if __name__ == "__main__":
-    main()
