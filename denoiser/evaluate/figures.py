@@ -28,6 +28,8 @@ PLANES_DB, PLANES_SSIM = 34.0, 0.970
 MOST_BIAS, MOST_FLICKER, LEAST_TEXTURE = 0.005, 1.1, 0.75
 STILL_DB = 40.0
 """Of the mean of 400 frames, with a calibration."""
+GAIN_DB, STILL_GAIN_DB = 1.2, 1.5
+"""Of the rate planes over those of earlier weights, on PHM_N and at rest."""
 
 
 def figures(table: str, groups: Sequence[Group], records: Sequence[Record]) -> list[Figure]:
@@ -100,6 +102,7 @@ def _planes(group: Group, _: Sequence[Record]) -> list[Figure]:
     return [
         _figure("best, rate planes: mean [dB]", f">= {PLANES_DB}", db, _least(db, PLANES_DB)),
         _figure("best, rate planes: mean SSIM", f">= {PLANES_SSIM}", ssim, _least(ssim, PLANES_SSIM), 3),
+        *_over_before(group, "mean_plane", GAIN_DB),
         *_faithful(best),
     ]
 
@@ -149,10 +152,21 @@ def _ablation(group: Group, _: Sequence[Record]) -> list[Figure]:
 WITH = {"MUS": ("with refine", "without refine"), "refine": ("accumulated", "with MUS")}
 
 
+def _over_before(group: Group, measure: str, wanted: float) -> list[Figure]:
+    """What `best` gains over earlier weights; nothing where none were given."""
+    found = [group["rows"].get(row, {}).get(measure) for row in ("best", "before")]
+    if None in found:
+        return []
+    ours, theirs = (f["db"] if isinstance(f, dict) else f for f in found)
+    gain = _less(ours, theirs)
+    return [_figure("best, rate planes: over earlier weights [dB]", f">= {wanted}", gain, _least(gain, wanted))]
+
+
 def _at_rest(group: Group, _: Sequence[Record]) -> list[Figure]:
     noisy, best, mapped = (group["rows"].get(row, {}).get("mean_db") for row in ("noisy", "best", "best-map"))
     return [
         _figure("best over noisy, mean of all frames [dB]", "> 0", _less(best, noisy), _least(_less(best, noisy), 0)),
+        *_over_before(group, "mean_db", STILL_GAIN_DB),
         _figure("best with calibration, mean of all frames [dB]", f">= {STILL_DB}", mapped, _least(mapped, STILL_DB)),
     ]
 

@@ -55,12 +55,12 @@ def dataset_cases(folder: str | Path) -> list[Case]:
 
     Raises InputError for a folder that holds none, and for one whose files are not done.
     """
-    manifest = Manifest.read(Path(folder))
+    manifest = Manifest.read(Path(folder)).without_lost(Path(folder))
     settings = manifest.settings
     rows, columns = settings["shape"]
     for file in manifest.files:
         if file["sha256"] is None:
-            raise InputError(f"{folder} has no {file['path']} yet; run `spikecam dataset` again to make it")
+            raise InputError(f"{folder} has no whole {file['path']}; run `spikecam dataset` again to make it")
     return [
         Case(
             "phm",

@@ -27,11 +27,13 @@ from denoiser import accumulate, mus
 from denoiser.evaluate import still
 from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed, Planes, Spikes, film
 from denoiser.online import OnlineDnSS
-from spikecam_env.errors import InputError
+from spikecam_env.untrusted import existing_file
 
 DECODERS: dict[str, Any] = {"mus": mus, "accumulate": accumulate}
 CHUNK = 32
 """Frames pushed at a time."""
+BEFORE = "before"
+"""Weights to compare with: none are shipped under this name."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,19 @@ ROWS: dict[str, Row] = {
     "paper-mus": Row("paper, MUS", "paper", "mus"),
     "paper": Row("paper, accumulated", "paper", "accumulate", True),
     "best": Row("best", "best", "accumulate", True),
+    "before": Row("best, earlier weights", "before", "accumulate", True),
     "best-map": Row("best with calibration", "best-map", "accumulate", True),
     "clean": Row("clean twin", "clean"),
     "light-mus": Row("true light, MUS", "light", "mus"),
     "light": Row("true light, accumulated", "light", "accumulate"),
 }
-NETWORKS = {"paper": "paper", "paper-no-refine": "paper-no-refine", "best": "best", "best-map": "best"}
+NETWORKS = {
+    "paper": "paper",
+    "paper-no-refine": "paper-no-refine",
+    "best": "best",
+    "best-map": "best",
+    "before": BEFORE,
+}
 """Weights of the sources that are denoisers."""
 PIPELINES = ("tfp41", "ssml", "spk2img-clean", "spk2img-noisy")
 
@@ -76,10 +85,13 @@ class Weights:
         """Where weights of a name are, or would be."""
         return self.files.get(name) or Path(str(resources.files("denoiser") / "weights" / f"{name}.pt"))
 
+    def check(self) -> None:
+        """Raises InputError for a file that was asked for and is not there."""
+        for path in self.files.values():
+            existing_file(path)
+
     def missing(self, name: str) -> str:
-        """Why there are none, or "".  Raises InputError for a file that was asked for and is not there."""
-        if name in self.files and not self.files[name].is_file():
-            raise InputError(f"there is no file {self.files[name]}")
+        """Why there are none, or ""."""
         return "" if self.path(name).is_file() else f"no weights are shipped yet: {self.path(name).name}"
 
     def digest(self, name: str) -> str | None:

@@ -28,11 +28,11 @@ from denoiser.evaluate.figures import figures
 from denoiser.evaluate.judge import COLUMNS, Record
 from denoiser.evaluate.page import write_page
 from denoiser.evaluate.report import report
-from denoiser.evaluate.rows import ROWS, Weights, why_not
+from denoiser.evaluate.rows import BEFORE, ROWS, Weights, why_not
 from denoiser.evaluate.summary import groups
 from denoiser.evaluate.work import Results, tasks, undone, work
 from scenes.catalogue import SCENES
-from spikecam_env.checked import checked_count, checked_shape
+from spikecam_env.checked import checked_count, checked_memory, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.whole import made_folder, write_text_whole
 
@@ -40,6 +40,8 @@ ABLATION = ("noisy", "baseline", "baseline-mus", "paper", "paper-mus", "clean", 
 METHODS = ("noisy", "tfp", "ssml", "spk2img-clean", "spk2img-noisy", "paper-mus", "paper", "best", "clean", "light")
 REAL_METHODS = METHODS[:-2]
 REAL_ABLATION = ABLATION[:-3]
+BYTES = 12
+"""A frame and pixel: noisy, clean and decoded spikes, rates and light in float32, and one byte to spare."""
 LEAST_FRAMES = 2 * phm.WARM_UP
 
 
@@ -97,7 +99,9 @@ def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = Fa
         raise unknown_name("table", name, TABLES)
     table, asked = TABLES[name], asked or Asked()
     rows = _rows(table, asked)
+    asked.weights.check()
     cases, missing = _cases(table, asked)
+    _check_memory(cases)
     missing |= {row: why for row in rows if (why := why_not(ROWS[row].source, asked.weights))}
     missing |= {c: why for c in COLUMNS if c not in CLASSICAL and (why := asked.weights.missing(c))}
     here = [row for row in rows if row not in missing]
@@ -123,8 +127,8 @@ def _rows(table: Table, asked: Asked) -> list[str]:
             raise unknown_name("row", row, ROWS)
     if table.kind == "real" and (lightless := [r for r in asked.rows if ROWS[r].source in ("clean", "light")]):
         raise InputError(f"row {lightless[0]!r} needs the true light, which real recordings do not have")
-    rows = [row for row in ROWS if row in (asked.rows or table.rows)]
-    return rows if "noisy" in rows else ["noisy", *rows]
+    wanted = {"noisy", *(asked.rows or table.rows), *({BEFORE} & set(asked.weights.files))}
+    return [row for row in ROWS if row in wanted]
 
 
 def _cases(table: Table, asked: Asked) -> tuple[list[Case], dict[str, str]]:
@@ -147,6 +151,13 @@ def _cases(table: Table, asked: Asked) -> tuple[list[Case], dict[str, str]]:
         Case("phm", scene, seed, checked_shape(asked.shape or (250, 400)), _frames(asked, interval), interval, speed)
         for interval, speed, scene, seed in product(asked.intervals, asked.speeds, asked.scenes, range(asked.seeds))
     ], {}
+
+
+def _check_memory(cases: list[Case]) -> None:
+    """Raises InputError where a stream and what is made of it are more than the memory."""
+    for case in cases:
+        size = case.frames * case.shape[0] * case.shape[1] * BYTES
+        checked_memory(size, f"{case.scene}, {case.frames} frames of {case.shape[0]} x {case.shape[1]},")
 
 
 def _frames(asked: Asked, interval: float) -> int:

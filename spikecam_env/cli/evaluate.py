@@ -5,12 +5,13 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from spikecam_env.checked import checked_count, checked_number
 from spikecam_env.cli.options import Checked, Count, Seed, Size, Workers
+from spikecam_env.errors import InputError
 
 if TYPE_CHECKING:
     from denoiser.evaluate.rows import Weights
@@ -21,10 +22,13 @@ SHORTEST, LONGEST = 1.0, 1e4
 FASTEST = 100.0
 """Pixels a frame; a picture of 400 is crossed in 4 frames."""
 
-RowName = Literal[
-    "noisy", "tfp", "ssml", "spk2img-clean", "spk2img-noisy", "baseline", "baseline-mus", "paper-mus", "paper", "best",
-    "best-map", "clean", "light-mus", "light",
-]  # fmt: skip
+
+def _each(values: tuple[float, ...], name: str, least: float, most: float) -> None:
+    """Raises InputError for no numbers, and for one that is out of range."""
+    if not values:
+        raise InputError(f"{name} has no value; give one or more")
+    for value in values:
+        checked_number(value, name, least, most)
 
 
 @dataclass
@@ -63,16 +67,17 @@ class Making:
 
     out: Path | None = None
     """Folder for the table as text, JSON and a page of pictures; a run that was stopped goes on in it."""
-    rows: Annotated[
-        tuple[RowName, ...], tyro.conf.arg(metavar="ROW...", help_behavior_hint="(default: the table's)")
-    ] = ()
-    """Rows to show; noisy is always there."""
+    rows: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROW...", help_behavior_hint="(default: the table's)")] = ()
+    """Rows to show, of noisy, tfp, ssml, spk2img-clean, spk2img-noisy, baseline, baseline-mus, paper-mus, paper, best,
+    best-map, before, clean, light-mus, light; noisy is always there."""
     paper: Path | None = None
     """Weights of `paper` to evaluate instead of the shipped ones."""
     no_refine: Path | None = None
     """Weights of `paper` without its refine module, instead of the shipped ones."""
     best: Path | None = None
     """Weights of `best` to evaluate instead of the shipped ones."""
+    before: Path | None = None
+    """Earlier weights of `best`, as a row to compare with."""
     jobs: Workers = 1
     """Worker processes, one thread each; 1 works in this one, with all threads."""
 
@@ -80,7 +85,7 @@ class Making:
         """The files that were given."""
         from denoiser.evaluate.rows import Weights
 
-        given = {"paper": self.paper, "paper-no-refine": self.no_refine, "best": self.best}
+        given = {"paper": self.paper, "paper-no-refine": self.no_refine, "best": self.best, "before": self.before}
         return Weights({name: path for name, path in given.items() if path is not None})
 
     def show(self, table: str, **options: Any) -> None:
@@ -104,9 +109,9 @@ class OnScenes(Making):
     """Rows and columns."""
     seeds: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 3
     """Cameras before each scene, each with a fixed pattern and noise of its own; their spread is printed."""
-    intervals: tuple[Annotated[float, Checked(checked_number, least=SHORTEST, most=LONGEST)], ...] = (10.0,)
+    intervals: Annotated[tuple[float, ...], Checked(_each, least=SHORTEST, most=LONGEST)] = (10.0,)
     """Mean frames between spikes, a group of the table each; 3 10 40 100 go from bright to dim."""
-    speeds: tuple[Annotated[float, Checked(checked_number, least=0.0, most=FASTEST)], ...] = (0.0,)
+    speeds: Annotated[tuple[float, ...], Checked(_each, least=0.0, most=FASTEST)] = (0.0,)
     """Speed of the motion [pixels a frame], a group each; 0: as the scene has it."""
     frames: Count | None = None
     """Frames of each stream, whose middle one is the picture; by default as many as the interval asks for."""

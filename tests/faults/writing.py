@@ -138,6 +138,11 @@ WRITINGS: dict[str, Writing] = {
     "dataset": Writing(f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}),
     "train": Writing("train --out {out} --steps 2 --batch 2", "run", TRAINING),
     "evaluate": Writing("evaluate quick --out {out}", "evaluation", EVALUATION),
+    "evaluate table": Writing(
+        f"evaluate table1 --out {{out}} --rows noisy --scenes disk --seeds 1 --frames 200 {' '.join(SMALL)}",
+        "table",
+        {},
+    ),
     "calibrate": Writing("calibrate {campaign} --out {out}", "calibrated", CALIBRATION),
     "campaign simulate": Writing(
         "campaign simulate {out} --shape 16 16 --frames 400 --recording flat:radiance=0.3", "campaign", {}

@@ -346,7 +346,7 @@ def test_a_malformed_manifest_is_refused(data: bytes, tmp_path: Path, meets) -> 
         ("spikes .dat (denoise)", ("denoise", "{bad}.dat", "--out", "{out}")),
         ("spikes .npz (denoise)", ("denoise", "{bad}.npz", "--out", "{out}")),
         ("dataset.json (dataset verify)", ("dataset", "verify", "{bad}")),
-        ("weights .pt (evaluate)", ("evaluate", "--best", "{bad}.pt", "--out", "{out}")),
+        ("weights .pt (evaluate)", ("evaluate", "quick", "--best", "{bad}.pt", "--out", "{out}")),
     ],
 )
 def test_what_is_no_file_is_refused(kind: str, target: str, args: tuple, tmp_path: Path, meets) -> None:

@@ -196,7 +196,33 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--device": ("", "gpu", "cuda:99", "\x00"),
         },
     ),
-    "evaluate": (("evaluate", "--out", "{out}"), {"--seed": SEEDS, "--scenes": COUNTS, "--best": ("{here}/a.dat",)}),
+    "evaluate quick": (
+        ("evaluate", "quick", "--out", "{out}"),
+        {"--seed": SEEDS, "--scenes": COUNTS, "--best": ("{here}/a.dat",)},
+    ),
+    "evaluate table1": (
+        ("evaluate", "table1", "--out", "{out}", "--rows", "noisy", "--scenes", "disk"),
+        {
+            "--rows": ("", "bests", "\x00"),
+            "--scenes": ("", "disks", "\x00"),
+            "--size": SIZES,
+            "--seeds": COUNTS,
+            "--intervals": (*FLOATS, "0.5", "1e5", ("10", "nan")),
+            "--speeds": ("nan", "inf", "-inf", "-1", "1e400", "1e3"),
+            "--frames": (*COUNTS, 199),
+            "--jobs": WORKERS,
+            "--paper": ("{here}/none.pt",),
+            "--data": ("{here}", "{here}/none"),
+        },
+    ),
+    "evaluate table2": (
+        ("evaluate", "table2", "--out", "{out}"),
+        {"--rows": ("clean", "light"), "--jobs": WORKERS, "--best": ("{here}/none.pt",)},
+    ),
+    "evaluate still": (
+        ("evaluate", "still", "--out", "{out}", "--rows", "noisy"),
+        {"--scenes": COUNTS, "--size": SIZES, "--seeds": COUNTS, "--frames": (*COUNTS, 10**15), "--jobs": WORKERS},
+    ),
     "blind-trial": (
         ("blind-trial", "--out", "{out}"),
         {"--jobs": WORKERS, "--threads": WORKERS, "--limit": COUNTS, "--world": ("{here}",), "--only": ("easy",)},

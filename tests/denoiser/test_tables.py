@@ -1,0 +1,243 @@
+"""The tables: rows that are there, rows that are not, going on after a stop, and the figures beside the wanted ones."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from denoiser.evaluate import tables, work
+from denoiser.evaluate.figures import figures
+from denoiser.evaluate.judge import Record, Score
+from denoiser.evaluate.report import report
+from denoiser.evaluate.rows import ROWS, Weights
+from denoiser.evaluate.summary import groups, mean_and_spread
+from denoiser.evaluate.tables import TABLES, Asked, evaluate_table
+from spikecam_env.datasets import build, phm_n
+from spikecam_env.errors import InputError
+
+SMALL = Asked(
+    scenes=("disk",), shape=(32, 48), seeds=2, frames=200, rows=("noisy", "tfp", "clean", "light", "light-mus")
+)
+CLASSICAL = ("tfp21", "tfp41", "tfi")
+
+
+@pytest.fixture(scope="module")
+def result() -> dict:
+    return evaluate_table("table1", SMALL)
+
+
+def test_noisy_is_at_0_and_clean_at_1_and_the_light_through_the_ideal_pixel_is_no_better(result: dict) -> None:
+    (group,) = result["groups"]
+    for column in CLASSICAL:
+        db = {row: found["pictures"][column]["db"] for row, found in group["rows"].items()}
+        gap = {row: found["pictures"][column].get("gap_closed") for row, found in group["rows"].items()}
+        print(column, db, gap)
+        assert db["noisy"] < db["clean"]
+        assert (gap["noisy"], gap["clean"]) in ((0, 1), (None, None))  # none where clean gains under half a dB
+        assert abs(db["light"] - db["clean"]) < 0.5
+    assert group["seeds"] == 2 and group["rows"]["clean"]["pictures"]["tfi"]["db_spread"] > 0
+
+
+def test_the_multi_stage_update_of_the_true_light_is_worse_than_its_accumulation(result: dict) -> None:
+    rows = result["groups"][0]["rows"]
+    for column in CLASSICAL:
+        by_mus, summed = (rows[row]["pictures"][column]["db"] for row in ("light-mus", "light"))
+        print(f"{column}: true light by MUS {by_mus:.2f} dB, accumulated {summed:.2f} dB")
+        assert by_mus < summed
+
+
+def test_rows_without_weights_are_named_with_the_reason(tmp_path: Path) -> None:
+    found = evaluate_table("table3", replace(SMALL, seeds=1, rows=("baseline", "clean"), out=tmp_path / "out"))
+    text = report(found)
+    if "baseline" not in found["missing"]:
+        pytest.skip("weights without the refine module are shipped")
+    assert "paper-no-refine.pt" in found["missing"]["baseline"]
+    assert "baseline: no weights are shipped yet" in text
+    line = next(line for line in text.splitlines() if line.startswith("paper without refine"))
+    assert set(line.removeprefix("paper without refine")) <= set(" -|")
+    with pytest.raises(InputError, match=r"there is no file .*none\.pt"):
+        evaluate_table(
+            "table3", replace(SMALL, weights=Weights({"paper-no-refine": tmp_path / "none.pt"}), rows=("baseline",))
+        )
+
+
+def test_the_folder_has_text_json_lines_and_a_page(tmp_path: Path, result: dict) -> None:
+    found = evaluate_table("table1", replace(SMALL, out=tmp_path))
+    assert found["scenes"] == result["scenes"]
+    assert json.loads((tmp_path / "table1.json").read_text())["scenes"] == found["scenes"]
+    assert (tmp_path / "table1.txt").read_text() == report(found)
+    assert len((tmp_path / "table1.jsonl").read_text().splitlines()) == 1 + 2 * 5
+    assert {"disk-noisy-tfp21.png", "disk-light-light.png"} <= {p.name for p in (tmp_path / "pictures").iterdir()}
+    assert (tmp_path / "table1.png").stat().st_size > 1000
+
+
+class Counted:
+    """Stands in for `work.do`: counts tasks, and fails at one of them."""
+
+    def __init__(self, fail_at: int | None = None) -> None:
+        self.tasks: list[tuple[str, int, str]] = []
+        self.fail_at = fail_at
+
+    def __call__(self, task: work.Task) -> list[Record]:
+        if len(self.tasks) == self.fail_at:
+            raise KeyboardInterrupt
+        self.tasks.append((task.case.scene, task.case.seed, task.source))
+        return DO(task)
+
+
+DO = work.do
+
+
+def run(monkeypatch: pytest.MonkeyPatch, asked: Asked, fail_at: int | None = None) -> list[tuple[str, int, str]]:
+    """The tasks that were done for a table."""
+    counted = Counted(fail_at)
+    monkeypatch.setattr(work, "do", counted)
+    if fail_at is None:
+        evaluate_table("table1", asked)
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            evaluate_table("table1", asked)
+    return counted.tasks
+
+
+def test_a_table_that_was_stopped_goes_on_where_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: dict
+) -> None:
+    asked = replace(SMALL, out=tmp_path / "out")
+    done = run(monkeypatch, asked, fail_at=3)
+    rest = run(monkeypatch, asked)
+    assert len(done) == 3 and not set(done) & set(rest)
+    assert {*done, *rest} == {("disk", seed, s) for seed in (0, 1) for s in ("noisy", "tfp41", "clean", "light")}
+    assert json.loads((tmp_path / "out" / "table1.json").read_text())["scenes"] == result["scenes"]
+    assert run(monkeypatch, asked) == []
+
+
+def test_more_scenes_seeds_and_intervals_are_added_to_what_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = replace(SMALL, seeds=1, rows=("noisy",), out=tmp_path)
+    assert run(monkeypatch, asked) == [("disk", 0, "noisy")]
+    more = replace(asked, seeds=2, scenes=("disk", "collage"), rows=("noisy", "clean"))
+    assert len(run(monkeypatch, more)) == 2 * 2 * 2 - 1
+    assert len(run(monkeypatch, replace(more, intervals=(10.0, 20.0)))) == 2 * 2 * 2
+
+
+def test_other_weights_are_measured_again_and_other_settings_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = replace(SMALL, seeds=1, rows=("noisy", "best"), out=tmp_path)
+    assert len(run(monkeypatch, asked)) == 2
+    copy = tmp_path / "best.pt"
+    copy.write_bytes(Weights().path("best").read_bytes())
+    same = replace(asked, weights=Weights({"best": copy}))
+    assert run(monkeypatch, same) == []
+    monkeypatch.setattr(Weights, "digest", lambda self, name: "other")
+    assert run(monkeypatch, same) == [("disk", 0, "best")]
+    for other in (replace(asked, shape=(32, 40)), replace(asked, frames=210)):
+        with pytest.raises(InputError, match="other settings"):
+            evaluate_table("table1", other)
+
+
+def test_two_processes_find_what_one_does(result: dict) -> None:
+    asked = replace(SMALL, rows=("noisy", "clean"), jobs=2)
+    rows = [r for r in result["scenes"] if r["row"] in asked.rows]
+    assert evaluate_table("table1", asked)["scenes"] == rows
+
+
+def test_rate_planes_are_judged_beside_spikes() -> None:
+    found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("best", "paper-mus"), shape=(24, 32)))
+    best, mus = (found["groups"][0]["rows"][row] for row in ("best", "paper-mus"))
+    assert best["pictures"]["plane"]["db"] > 10 and "plane" not in mus["pictures"]
+    assert len(best["db_by_place"]) > 1 and np.isfinite(best["flicker"])
+    assert abs(best["lag"]) < 6 and abs(best["bias"]) < 0.2
+
+
+def test_streams_come_from_a_dataset_too(tmp_path: Path) -> None:
+    """Seed 0 is the dataset's camera: the same streams, so the same figures."""
+    plan = phm_n(scenes=("disk",), shape=(32, 48), frames=264)
+    build(plan, tmp_path / "data")
+    asked = replace(SMALL, seeds=1, frames=264, rows=("noisy", "clean"))
+    simulated = evaluate_table("table1", asked)
+    assert evaluate_table("table1", replace(asked, data=tmp_path / "data"))["groups"] == simulated["groups"]
+    (tmp_path / "data" / "test" / "disk.h5").unlink()
+    with pytest.raises(InputError, match=r"disk\.h5"):
+        evaluate_table("table1", replace(asked, data=tmp_path / "data"))
+
+
+def test_real_recordings_are_judged_by_niqe_or_named_as_absent(tmp_path: Path) -> None:
+    spikes = (np.random.default_rng(0).random((120, 250, 400)) < 0.3).astype(np.uint8)
+    np.savez(tmp_path / "wall.npz", arr_0=spikes)
+    found = evaluate_table("table2", replace(SMALL, rows=("noisy",), real=tmp_path))
+    (group,) = found["groups"]
+    assert group["scenes"] == ["wall.npz"] and group["rows"]["noisy"]["pictures"]["tfp41"]["niqe"] > 0
+    assert "helicopter_low_light.npz" in found["missing"] and "there is no recording" in report(found)
+    with pytest.raises(InputError, match="true light"):
+        evaluate_table("table2", replace(SMALL, rows=("clean",), real=tmp_path))
+
+
+def test_at_rest_the_mean_of_clean_frames_is_the_light_and_that_of_noisy_ones_has_the_fixed_pattern() -> None:
+    found = evaluate_table("still", Asked(still_scenes=1, seeds=1, shape=(40, 40), rows=("noisy", "clean")))
+    rows = found["groups"][0]["rows"]
+    print({row: m["mean_db"] for row, m in rows.items()})
+    assert rows["clean"]["mean_db"] > 45 > 35 > rows["noisy"]["mean_db"]
+    assert rows["clean"]["lag"] is None
+
+
+def test_unknown_names_and_short_streams_are_refused() -> None:
+    for asked, why in (
+        (replace(SMALL, scenes=("disks",)), "disk"),
+        (replace(SMALL, rows=("bests",)), "best"),
+        (replace(SMALL, frames=150), "200"),
+        (replace(SMALL, seeds=0), "seeds"),
+    ):
+        with pytest.raises(InputError, match=why):
+            evaluate_table("table1", asked)
+    with pytest.raises(InputError, match="table1"):
+        evaluate_table("table9")
+
+
+def test_every_table_has_rows_that_there_are() -> None:
+    for table in TABLES.values():
+        assert set(table.rows) <= set(ROWS) and table.rows[0] == "noisy"
+    assert set(tables.ABLATION) >= {"baseline", "baseline-mus", "paper", "paper-mus"}
+
+
+def test_the_spread_is_over_seeds_of_the_mean_over_scenes() -> None:
+    assert mean_and_spread([(0, 1.0), (0, 3.0), (1, 3.0), (1, 5.0), (1, None)]) == (
+        3.0,
+        pytest.approx(2**0.5, abs=1e-4),
+    )
+    assert mean_and_spread([(0, 1.0)]) == (1.0, None)
+    assert mean_and_spread([(0, None)]) == (None, None)
+
+
+def record(row: str, scene: str, db: dict[str, float], **measures: float) -> Record:
+    pictures = {column: Score(db=level, ssim=0.5) for column, level in db.items()}
+    return Record(
+        scene=scene, seed=0, interval=10.0, speed=0.0, row=row, weights={}, pictures=pictures, **measures
+    )  # fmt: skip
+
+
+def test_the_figures_name_what_holds_and_what_does_not() -> None:
+    noisy, best, clean = {"spk2img-clean": 20.0, "tfp21": 20.0}, {"spk2img-clean": 21.0, "tfp21": 21.8}, {"tfp21": 22.0}
+    worse = best | {"spk2img-clean": 19.9}
+    records = [
+        *(record(row, "a", db) for row, db in (("noisy", noisy), ("clean", clean))),
+        record("best", "a", best, bias=-0.02, flicker=1.05, texture=0.8),
+        *(record(row, "b", db) for row, db in (("noisy", noisy), ("clean", clean), ("best", worse))),
+    ]
+    found = {f["what"]: f for f in figures("table1", groups(records), records)}
+    mean = found["best, Spk2Img, clean: mean over noisy [dB]"]
+    assert (mean["found"], mean["holds"]) == (0.45, False)
+    least = found["best, Spk2Img, clean: least over noisy of any scene [dB]"]
+    assert (least["found"], least["holds"]) == (-0.1, False)
+    gap = found["best, TFP 21: share of the gap closed"]
+    assert (gap["found"], gap["holds"]) == (0.9, True)
+    assert found["best: bias"]["holds"] is False
+    assert found["best: frame-to-frame error across passes / within"]["holds"] is True
+    assert found["best: slope of low-contrast texture"]["holds"] is True
+    assert found["best, rate planes: mean [dB]"]["holds"] is None
