@@ -43,7 +43,6 @@ class Exposed:
 
     clean, light: of the noise-free twin, and true light (stop - first, H, W) in [0, 1] [spikes/frame]; None where they
     are unknown.  middle: frame of the pictures.  white: light that is shown white, and from which PSNR counts.
-    unit: calibration of the camera, for a denoiser that takes one.
     """
 
     noisy: Spikes
@@ -53,7 +52,6 @@ class Exposed:
     stop: int
     middle: int
     white: float
-    unit: Any = None
 
     def judged(self, stream: Spikes) -> Spikes:
         """The frames that are judged, of a stream from frame 0 on."""

@@ -181,7 +181,7 @@ def _network(name: str) -> Callable[[Case, Exposed, Weights], Planes]:
 
 
 def _calibrated(case: Case, exposed: Exposed, weights: Weights) -> Planes:
-    options: dict[str, Any] = {"unit": still.calibration(case)}
+    options: dict[str, Any] = {"unit": still.calibrated(case)}
     return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", **options), exposed)
 
 

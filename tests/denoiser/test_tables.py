@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from denoiser.evaluate import tables, work
+from denoiser.evaluate import still, tables, work
+from denoiser.evaluate.exposed import Case
 from denoiser.evaluate.figures import figures
 from denoiser.evaluate.judge import Record, Score
 from denoiser.evaluate.report import report
@@ -18,6 +19,7 @@ from denoiser.evaluate.summary import groups, mean_and_spread
 from denoiser.evaluate.tables import TABLES, Asked, evaluate_table
 from spikecam_env.datasets import build, phm_n
 from spikecam_env.errors import InputError
+from spikecam_env.sensor import SensorModel, SpikeSensor
 
 SMALL = Asked(
     scenes=("disk",), shape=(32, 48), seeds=2, frames=200, rows=("noisy", "tfp", "clean", "light", "light-mus")
@@ -241,3 +243,14 @@ def test_the_figures_name_what_holds_and_what_does_not() -> None:
     assert found["best: frame-to-frame error across passes / within"]["holds"] is True
     assert found["best: slope of low-contrast texture"]["holds"] is True
     assert found["best, rate planes: mean [dB]"]["holds"] is None
+
+
+def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:
+    """Against the rates of the same camera before even light: its gain and dark explain nearly all of their spread."""
+    case = Case("still", "bright 0", 3, (24, 32), 400)
+    gain, dark = still.calibrated(case)
+    camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, still.unit_seed(case))
+    rate = camera.step(np.full(case.shape, 0.3, np.float32), 4000).mean(axis=0)
+    left = np.std(rate - (0.3 * gain + dark)) / np.std(rate)
+    print(f"spread of the rates that the maps leave: {left:.3f}")
+    assert left < 0.1
