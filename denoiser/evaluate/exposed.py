@@ -21,7 +21,7 @@ class Case:
 
     kind      "phm", a catalogue scene; "still", a collage that does not move; "real", a recording
     scene     name in the catalogue, number of the collage with its light, or the recording's file
-    seed      of the camera: fixed pattern, starting phases, noise
+    seed      of the camera: fixed pattern, starting phases, noise; of a recording, number of the instant
     interval  mean frames between spikes over the picture; speed  [pixels/frame], 0: as the scene has it
     shape     (rows, columns); frames  of the stream, whose middle frame is the picture; folder  of real recordings or
               of a dataset, "" where the scene is simulated

@@ -22,6 +22,11 @@ PAPER_MUS_DB, PAPER_REFINE_DB = 0.5, 0.45
 LEARNED = ("spk2img-clean", "spk2img-noisy")
 SPIKES_OF_BEST = {"spk2img-clean": 0.7, "spk2img-noisy": 0.0}
 """Least mean gain of `best` spikes over noisy [dB]."""
+PAPER_NIQE = {"paper-mus": -0.31}
+"""Of DnSS over noisy: 3.76 and 4.07, table 2."""
+PAPER_MUS_NIQE = {"paper": -0.04, "baseline": -0.01}
+PAPER_REFINE_NIQE = {"paper": -0.35, "paper-mus": -0.38}
+"""Table 4: 4.15 without both, 4.14 with MUS, 3.80 with the refine module, 3.76 with both."""
 GAP = 0.85
 PLANES_DB, PLANES_SSIM = 34.0, 0.970
 """Mean of `best`'s rate planes on PHM_N, at mean interval 10."""
@@ -37,6 +42,8 @@ def figures(table: str, groups: Sequence[Group], records: Sequence[Record]) -> l
     makers: dict[str, list[Callable[[Group, Sequence[Record]], list[Figure]]]] = {
         "table1": [_gains_of_paper, _spikes_of_best, _spikes_of_paper, _planes, _never_below],
         "table3": [_ablation],
+        "table2": [_naturalness],
+        "table4": [_natural_ablation],
         "still": [_at_rest, _planes_at_rest],
     }
     found = []
@@ -150,6 +157,37 @@ def _ablation(group: Group, _: Sequence[Record]) -> list[Figure]:
 
 
 WITH = {"MUS": ("with refine", "without refine"), "refine": ("accumulated", "with MUS")}
+
+
+def _naturalness(group: Group, _: Sequence[Record]) -> list[Figure]:
+    """Lower is better."""
+    return [
+        _niqe_figure(group, f"{row} over noisy", row, "noisy", column, PAPER_NIQE.get(row))
+        for column in ("tfi", *LEARNED)
+        for row in ("paper-mus", "paper", "best")
+    ]
+
+
+def _natural_ablation(group: Group, _: Sequence[Record]) -> list[Figure]:
+    return [
+        *(
+            _niqe_figure(group, f"MUS over none, {row}", f"{row}-mus", row, column, paper)
+            for column in ("tfi", *LEARNED)
+            for row, paper in PAPER_MUS_NIQE.items()
+        ),
+        *(
+            _niqe_figure(group, f"refine over none, {row}", row, row.replace("paper", "baseline"), column, paper)
+            for column in ("tfi", *LEARNED)
+            for row, paper in PAPER_REFINE_NIQE.items()
+        ),
+    ]
+
+
+def _niqe_figure(group: Group, what: str, row: str, over: str, column: str, paper: float | None) -> Figure:
+    less = _less(_score(group, row, column).get("niqe"), _score(group, over, column).get("niqe"))
+    wanted = "< 0" if paper is None else f"paper {paper:+}"
+    holds = None if less is None else less <= (0.0 if paper is None else paper)
+    return _figure(f"{COLUMNS[column]}: {what} [NIQE]", wanted, less, holds)
 
 
 def _over_before(group: Group, measure: str, wanted: float) -> list[Figure]:

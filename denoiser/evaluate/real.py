@@ -16,24 +16,26 @@ from spikecam_env.streams import read_recording
 RECORDINGS = ("wall.npz", "helicopter_low_light.npz")
 """Files of the data that lies beside a checkout; the paper's five recordings are not among them."""
 FOLDER = Path(spikecam_env.__file__).resolve().parents[2] / "shared" / "data" / "real"
+INSTANTS = 3
+"""Pictures of a recording, evenly spread over it; NIQE differs from one to the next by a few tenths."""
 WHITE = 99.5
 """Percentile of the mean rate that is shown white."""
 
 
-def real_case(path: Path) -> Case:
-    """A recording as a case; its middle frame is the picture.  Raises InputError where it cannot be read."""
+def real_cases(path: Path) -> list[Case]:
+    """A recording as cases, one an instant, whose number is the seed.  Raises InputError where it cannot be read."""
     spikes = _spikes(path)
-    interval = 1 / max(float(spikes.mean()), 1e-6)
+    interval = round(1 / max(float(spikes.mean()), 1e-6), 1)
     shape = (spikes.shape[1], spikes.shape[2])
-    return Case("real", path.name, 0, shape, len(spikes), round(interval, 1), folder=str(path.parent))
+    return [Case("real", path.name, i, shape, len(spikes), interval, folder=str(path.parent)) for i in range(INSTANTS)]
 
 
 def expose(case: Case) -> Exposed:
-    """The recording; what is judged are the frames about its middle."""
+    """The recording; what is judged are the frames about one of its instants, as far as it goes."""
     noisy = _spikes(Path(case.folder) / case.scene)
-    middle = case.frames // 2
-    around = min(reach(case.interval), middle)
-    first, stop = middle - around, min(middle + around + 1, len(noisy))
+    middle = (case.seed + 1) * case.frames // (INSTANTS + 1)
+    around = min(reach(case.interval), middle, len(noisy) - 1 - middle)
+    first, stop = middle - around, middle + around + 1
     white = float(np.percentile(noisy.mean(axis=0), WHITE)) or 1.0
     return Exposed(noisy[: stop + AHEAD], None, None, first, stop, middle, white)
 

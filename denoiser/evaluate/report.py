@@ -17,7 +17,7 @@ def report(result: dict[str, Any]) -> str:
     of = _of(result["settings"]) if result["groups"] else "nothing to judge"
     parts = [f"{result['title']}\n{of}"]
     for group in result["groups"]:
-        parts += [_pictures(group, result["rows"], result["missing"]), *_measures(group, result["rows"])]
+        parts += [_pictures(group, result["rows"]), *_measures(group, result["rows"])]
     if result["figures"]:
         parts.append(_figures(result["figures"]))
     if result["missing"]:
@@ -28,10 +28,15 @@ def report(result: dict[str, Any]) -> str:
 def _of(settings: dict[str, Any]) -> str:
     shapes = ", ".join(f"{rows} x {columns}" for rows, columns in settings["shapes"])
     frames = ", ".join(map(str, settings["frames"]))
-    return f"{', '.join(settings['scenes'])}; {shapes}; {frames} frames; seeds: {settings['seeds']}"
+    return f"{', '.join(settings['scenes'])}; {shapes}; {frames} frames; {_repeated(settings)}"
 
 
-def _pictures(group: dict[str, Any], rows: Sequence[str], missing: dict[str, str]) -> str:
+def _repeated(counted: dict[str, Any]) -> str:
+    """What the spreads are over."""
+    return f"{counted['seeds']} instants" if counted["seeds_are_instants"] else f"seeds: {counted['seeds']}"
+
+
+def _pictures(group: dict[str, Any], rows: Sequence[str]) -> str:
     columns = [*COLUMNS, PLANE]
     titles = [*COLUMNS.values(), "rate plane"]
     by_niqe = any(s["niqe"] is not None for row in group["rows"].values() for s in row["pictures"].values())
@@ -48,10 +53,10 @@ def _pictures(group: dict[str, Any], rows: Sequence[str], missing: dict[str, str
 
 
 def _named(group: dict[str, Any]) -> str:
-    interval = f"mean interval {group['interval']:g} frames, " if group["interval"] else ""
-    speed = f"{group['speed']:g} pixels a frame" if group["speed"] else "the scenes' own speed"
+    light = [f"mean interval {group['interval']:g} frames"] if group["interval"] else []
+    speed = [f"{group['speed']:g} pixels a frame"] if group["speed"] else []
     scenes = group["scenes"]
-    return f"{interval}{speed}: {scenes[0] if len(scenes) == 1 else f'{len(scenes)} scenes'}, seeds: {group['seeds']}"
+    return ", ".join([*light, *speed, scenes[0] if len(scenes) == 1 else f"{len(scenes)} scenes"])
 
 
 def _measures(group: dict[str, Any], rows: Sequence[str]) -> list[str]:

@@ -136,7 +136,7 @@ def _cases(table: Table, asked: Asked) -> tuple[list[Case], dict[str, str]]:
     if table.kind == "real":
         paths = [asked.real / name for name in real.RECORDINGS]
         missing = {path.name: f"there is no recording {path}" for path in paths if not path.is_file()}
-        return [real.real_case(path) for path in paths if path.is_file()], missing
+        return [case for path in paths if path.is_file() for case in real.real_cases(path)], missing
     checked_count(asked.seeds, "seeds")
     if table.kind == "still":
         shape, frames = checked_shape(asked.shape or still.SHAPE), checked_count(asked.frames or still.FRAMES)
@@ -218,6 +218,7 @@ def _result(
         "settings": {
             "scenes": list(dict.fromkeys(case.scene for case in cases)),
             "seeds": len({case.seed for case in cases}),
+            "seeds_are_instants": TABLES[name].kind == "real",
             "shapes": [list(shape) for shape in dict.fromkeys(case.shape for case in cases)],
             "frames": list(dict.fromkeys(case.frames for case in cases)),
             "data": sorted({case.folder for case in cases if case.folder}),

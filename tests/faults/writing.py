@@ -113,6 +113,7 @@ TRAINING: Work = {
 EVALUATION: Work = {
     "denoiser.evaluate:evaluate_quick": _evaluation,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,
+    "denoiser.evaluate.quick:report": lambda _: "figures\n" * 200,
 }
 CALIBRATION: Work = {"spikecam_env.calibration:calibrate": cache(calibrate)}
 DIAGNOSIS: Work = {"spikecam_env.gap.diagnose:diagnose": lambda *_, **__: made_up._plain("none", "No gap.")}
