@@ -27,6 +27,7 @@ from denoiser import accumulate, mus
 from denoiser.evaluate import still
 from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed, Planes, Spikes, film
 from denoiser.online import OnlineDnSS
+from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file
 
 DECODERS: dict[str, Any] = {"mus": mus, "accumulate": accumulate}
@@ -113,10 +114,17 @@ def weights_of(source: str) -> str | None:
 
 
 def why_not(source: str, weights: Weights) -> str:
-    """Why a source cannot be had, or ""."""
+    """Why a source cannot be had, or "".  Raises InputError for a file that was asked for and cannot be read."""
     name = weights_of(source)
     if name is not None and (why := weights.missing(name)):
         return why
+    if source in NETWORKS:
+        try:
+            planes_a_pass(source, weights)
+        except InputError as error:
+            if name in weights.files:
+                raise
+            return str(error)
     if source == "best-map" and not _takes_unit():
         return "this OnlineDnSS takes no calibration"
     return ""

@@ -67,6 +67,19 @@ def test_rows_without_weights_are_named_with_the_reason(tmp_path: Path) -> None:
         )
 
 
+def test_shipped_weights_of_another_network_are_a_reason_and_given_ones_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    damaged = tmp_path / "best.pt"
+    damaged.write_bytes(b"no weights")
+    with monkeypatch.context() as patch:
+        patch.setattr(Weights, "path", lambda self, name: damaged)
+        found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("best",)))
+    assert "best.pt" in found["missing"]["best"] and "noisy" in found["groups"][0]["rows"]
+    with pytest.raises(InputError, match=r"best\.pt"):
+        evaluate_table("table1", replace(SMALL, seeds=1, rows=("best",), weights=Weights({"best": damaged})))
+
+
 def test_the_folder_has_text_json_lines_and_a_page(tmp_path: Path, result: dict) -> None:
     found = evaluate_table("table1", replace(SMALL, out=tmp_path))
     assert found["scenes"] == result["scenes"]
