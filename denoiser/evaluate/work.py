@@ -21,7 +21,7 @@ from denoiser.evaluate import phm, real, still
 from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed
 from denoiser.evaluate.judge import Record, display, judged, pictures_of
 from denoiser.evaluate.rows import ROWS, Weights, planes_a_pass, streams, weights_of
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, shown
 from spikecam_env.stopping import without_interrupts
 from spikecam_env.untrusted import declared, parse_json, read_text
 from spikecam_env.whole import whole_file, write_text_whole
@@ -58,12 +58,12 @@ class Results:
         """What is in the file; nothing where it is not there yet."""
         if path is None or not path.exists():
             return cls(path, settings, {})
-        head, *lines = read_text(path).splitlines() or [""]
+        head, *lines = read_text(path).rstrip("\n").split("\n")
         found = parse_json(head, str(path))
         if not isinstance(found, dict) or found.get("format") != FORMAT:
             raise InputError(f"{path} is no {FORMAT} file; choose another folder")
         if different := [name for name in settings if found.get(name) != settings[name]]:
-            was = ", ".join(f"{name} {found.get(name)} (asked: {settings[name]})" for name in different)
+            was = ", ".join(f"{name} {shown(found.get(name))} (asked: {settings[name]})" for name in different)
             raise InputError(f"{path} holds results of other settings: {was}; ask for the same, or another folder")
         records = [
             declared(Record, parse_json(line, str(path)), f"{path}, line {i}") for i, line in enumerate(lines, 2)

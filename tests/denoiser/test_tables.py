@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from denoiser.evaluate import still, tables, work
+from denoiser.evaluate import exposed, still, tables, work
 from denoiser.evaluate.exposed import Case
 from denoiser.evaluate.figures import figures
 from denoiser.evaluate.judge import Record, Score
@@ -20,6 +21,7 @@ from denoiser.evaluate.tables import TABLES, Asked, evaluate_table
 from spikecam_env.datasets import build, phm_n
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
+from spikecam_env.streams import middleTFP
 
 SMALL = Asked(
     scenes=("disk",), shape=(32, 48), seeds=2, frames=200, rows=("noisy", "tfp", "clean", "light", "light-mus")
@@ -73,7 +75,7 @@ def test_shipped_weights_of_another_network_are_a_reason_and_given_ones_an_error
     damaged = tmp_path / "best.pt"
     damaged.write_bytes(b"no weights")
     with monkeypatch.context() as patch:
-        patch.setattr(Weights, "path", lambda self, name: damaged)
+        patch.setattr(Weights, "path", lambda self, name: damaged if name == "best" else tmp_path / "none.pt")
         found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("best",)))
     assert "best.pt" in found["missing"]["best"] and "noisy" in found["groups"][0]["rows"]
     with pytest.raises(InputError, match=r"best\.pt"):
@@ -158,7 +160,7 @@ def test_other_weights_are_measured_again_and_other_settings_are_refused(
 
 
 def test_two_processes_find_what_one_does(result: dict) -> None:
-    asked = replace(SMALL, rows=("noisy", "clean"), jobs=2)
+    asked = replace(SMALL, rows=("noisy",), jobs=2)
     rows = [r for r in result["scenes"] if r["row"] in asked.rows]
     assert evaluate_table("table1", asked)["scenes"] == rows
 
@@ -169,6 +171,25 @@ def test_rate_planes_are_judged_beside_spikes() -> None:
     assert best["pictures"]["plane"]["db"] > 10 and "plane" not in mus["pictures"]
     assert len(best["db_by_place"]) > 1 and np.isfinite(best["flicker"])
     assert abs(best["lag"]) < 6 and abs(best["bias"]) < 0.2
+
+
+def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """TFP 41 stands in for them: their columns and rows are then its own."""
+    shipped = tmp_path / "weights.pt"
+    shipped.write_bytes(b"trained")
+    stand_in = SimpleNamespace(
+        reconstruct=lambda name, spikes, t: middleTFP(spikes, t, 41),
+        reconstruct_many=lambda name, spikes, frames: np.stack([middleTFP(spikes, t, 41) for t in frames]),
+    )
+    monkeypatch.setattr(exposed, "_reconstruction", lambda: stand_in)
+    monkeypatch.setattr(Weights, "path", lambda self, name: shipped)
+    found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy")))
+    rows = found["groups"][0]["rows"]
+    assert rows["ssml"] == rows["tfp"] == rows["spk2img-noisy"]
+    pictures = rows["noisy"]["pictures"]
+    assert pictures["spk2img-clean"] == pictures["spk2img-noisy"] == pictures["tfp41"]
+    weights = next(r["weights"] for r in found["scenes"] if r["row"] == "ssml")
+    assert set(weights) == {"ssml", "spk2img-clean", "spk2img-noisy"} and None not in weights.values()
 
 
 def test_streams_come_from_a_dataset_too(tmp_path: Path) -> None:

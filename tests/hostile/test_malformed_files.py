@@ -13,6 +13,7 @@ import pytest
 from mutations import damaged, json_files, npz, npz_files, toml_files
 from tally import reads_or_refuses
 
+from denoiser.evaluate.work import FORMAT, Results
 from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.calibration import read_campaign, write_flats
 from spikecam_env.calibration.campaign_files import save_rates
@@ -68,6 +69,21 @@ SPIKES = (RNG.random((FRAMES, *SHAPE)) < 0.3).astype(np.uint8)
 STREAM = {"spikes": SPIKES, "time_axis": np.array(0)}
 MAPS = {"D_light": np.full(SHAPE, 3.0), "Nd": np.full(SHAPE, 2.0)}
 PACKED = {"seq": np.packbits(SPIKES[:40], axis=0, bitorder="big"), "length": np.array(40)}
+
+
+EVALUATION = {"shape": [8, 8], "frames": 200, "data": None}
+RESULT = {
+    "scene": "disk",
+    "seed": 0,
+    "interval": 10.0,
+    "speed": 0.0,
+    "row": "best",
+    "weights": {"best": "0" * 64, "spk2img-clean": None},
+    "pictures": {"tfi": {"db": 20.0, "ssim": 0.5, "niqe": None}},
+    "mean_plane": {"db": 30.0, "ssim": 0.9, "niqe": None},
+    "bias": 0.01,
+    "db_by_place": [30.0, None],
+}
 
 
 def cases(files):
@@ -373,6 +389,20 @@ def test_the_good_ones_are_good(campaign: Path, recordings: Path, tmp_path: Path
     assert imported(meets, "good files", recordings, tmp_path / "out", "maps.npz=relative") == 0
     (tmp_path / "dataset.json").write_text(json.dumps(DATASET))
     assert len(Manifest.read(tmp_path).files) == 2
+
+
+@pytest.mark.parametrize("data", cases(json_files({"format": FORMAT, **EVALUATION})))
+def test_a_malformed_head_of_results_is_refused(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "table1.jsonl"
+    path.write_bytes(data.replace(b"\n", b" ") + b"\n" + json.dumps(RESULT).encode())
+    reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+
+
+@pytest.mark.parametrize("data", cases(json_files(RESULT, within=2)))
+def test_a_malformed_result_is_refused(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "table1.jsonl"
+    path.write_bytes(json.dumps({"format": FORMAT, **EVALUATION}).encode() + b"\n" + data.replace(b"\n", b" "))
+    reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
 
 
 @pytest.mark.parametrize("data", cases(damaged(pretrained_path("paper").read_bytes())))
