@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -62,20 +63,23 @@ CLASSICAL = {"tfp21": 21, "tfp41": 41, "tfi": 1}
 """Pictures that need no network: frames in the window."""
 
 
-def picture(name: str, spikes: Spikes, t: int) -> Planes:
-    """(H, W) picture [spikes/frame] of the stream at frame t, by a name of `denoiser.reconstruct.RECONSTRUCTORS`."""
+def picture(name: str, spikes: Spikes, t: int, weights: Path | None = None) -> Planes:
+    """(H, W) picture [spikes/frame] of the stream at frame t, by a name of `denoiser.reconstruct.RECONSTRUCTORS`.
+
+    weights: file of a learned one's, default the shipped ones.
+    """
     if name == "tfi":
         return isi_plane(spikes, t, normalised=True)
     if name in CLASSICAL:
         return middleTFP(spikes, t, CLASSICAL[name])
-    return _reconstruction().reconstruct(name, spikes, t)  # type: ignore[no-any-return]
+    return _reconstruction().reconstruct(name, spikes, t, weights=weights)  # type: ignore[no-any-return]
 
 
-def film(name: str, spikes: Spikes, frames: range) -> Planes:
-    """(len(frames), H, W) pictures [spikes/frame] at many frames of the stream."""
+def film(name: str, spikes: Spikes, frames: range, weights: Path | None = None) -> Planes:
+    """(len(frames), H, W) pictures [spikes/frame] at many frames of the stream; weights as for `picture`."""
     if name in CLASSICAL:
         return np.stack([picture(name, spikes, t) for t in frames])
-    return np.asarray(_reconstruction().reconstruct_many(name, spikes, list(frames)), np.float32)
+    return np.asarray(_reconstruction().reconstruct_many(name, spikes, list(frames), weights=weights), np.float32)
 
 
 def _reconstruction() -> Any:

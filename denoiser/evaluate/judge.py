@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,10 +76,13 @@ def display(radiance: Planes, white: float) -> np.ndarray:
     return np.clip(np.asarray(radiance, np.float64) / white, 0, 1) ** (1 / 2.2)
 
 
-def pictures_of(spikes: Spikes, planes: Planes | None, exposed: Exposed, columns: list[str]) -> dict[str, Planes]:
-    """By column: the row's pictures at the middle frame, and its rate plane there."""
+def pictures_of(
+    spikes: Spikes, planes: Planes | None, exposed: Exposed, columns: Mapping[str, Path]
+) -> dict[str, Planes]:
+    """By column: the row's pictures at the middle frame, and its rate plane there.  columns: file of weights of each,
+    which those that need none ignore."""
     middle = exposed.middle - exposed.first
-    shown = {column: picture(column, spikes, middle) for column in columns}
+    shown = {column: picture(column, spikes, middle, weights) for column, weights in columns.items()}
     return shown if planes is None else shown | {PLANE: planes[middle]}
 
 

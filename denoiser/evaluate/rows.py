@@ -74,6 +74,8 @@ NETWORKS = {
 }
 """Weights of the sources that are denoisers."""
 PIPELINES = ("tfp41", "ssml", "spk2img-clean", "spk2img-noisy")
+NAMES = (*dict.fromkeys(NETWORKS.values()), *(name for name in PIPELINES if name not in CLASSICAL))
+"""Of all weights that a table can use."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,12 @@ class Weights:
     """Files of weights by name, instead of those that are shipped."""
 
     files: Mapping[str, Path] = field(default_factory=dict)
+
+    @classmethod
+    def found(cls, folder: Path | None, files: Mapping[str, Path]) -> Weights:
+        """The files, and of names that have none NAME.pt in a folder, where it is there."""
+        there = {} if folder is None else {n: folder / f"{n}.pt" for n in NAMES if (folder / f"{n}.pt").is_file()}
+        return cls(there | dict(files))
 
     def path(self, name: str) -> Path:
         """Where weights of a name are, or would be."""
@@ -194,7 +202,9 @@ def _calibrated(case: Case, exposed: Exposed, weights: Weights) -> Planes:
 
 
 def _pipeline(name: str) -> Callable[[Case, Exposed, Weights], Planes]:
-    return lambda case, exposed, weights: film(name, exposed.noisy, range(exposed.first, exposed.stop))
+    return lambda case, exposed, weights: film(
+        name, exposed.noisy, range(exposed.first, exposed.stop), weights.path(name)
+    )
 
 
 def _light(case: Case, exposed: Exposed, weights: Weights) -> Planes:

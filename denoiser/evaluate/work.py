@@ -120,10 +120,11 @@ def do(task: Task) -> list[Record]:
     """One task, done here."""
     exposed = _EXPOSE[task.case.kind](task.case)
     made = streams(task.source, list(task.rows), task.case, exposed, task.weights)
+    columns = {column: task.weights.path(column) for column in task.columns}
     records = []
     for row, (spikes, planes) in made.items():
         planes = planes if ROWS[row].shows_planes else None
-        shown = pictures_of(spikes, planes, exposed, list(task.columns))
+        shown = pictures_of(spikes, planes, exposed, columns)
         passes = planes_a_pass(task.source, task.weights)
         found = judged(shown, spikes, planes, exposed, passes, still=task.case.kind == "still")
         records.append(Record(**_key(task.case), row=row, weights=_identity(task), **found))

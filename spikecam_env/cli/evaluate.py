@@ -70,6 +70,9 @@ class Making:
     rows: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROW...", help_behavior_hint="(default: the table's)")] = ()
     """Rows to show, of noisy, tfp, ssml, spk2img-clean, spk2img-noisy, baseline, baseline-mus, paper-mus, paper, best,
     best-map, before, clean, light-mus, light; noisy is always there."""
+    weights: Path | None = None
+    """Folder whose paper.pt, paper-no-refine.pt, best.pt, spk2img-clean.pt, spk2img-noisy.pt and ssml.pt count before
+    the shipped ones."""
     paper: Path | None = None
     """Weights of `paper` to evaluate instead of the shipped ones."""
     no_refine: Path | None = None
@@ -81,19 +84,21 @@ class Making:
     jobs: Workers = 1
     """Worker processes, one thread each; 1 works in this one, with all threads."""
 
-    def weights(self) -> Weights:
+    def given(self) -> Weights:
         """The files that were given."""
         from denoiser.evaluate.rows import Weights
 
         given = {"paper": self.paper, "paper-no-refine": self.no_refine, "best": self.best, "before": self.before}
-        return Weights({name: path for name, path in given.items() if path is not None})
+        if self.weights is not None and not self.weights.is_dir():
+            raise InputError(f"--weights {self.weights}: there is no such folder")
+        return Weights.found(self.weights, {name: path for name, path in given.items() if path is not None})
 
     def show(self, table: str, **options: Any) -> None:
         """Make a table and print it."""
         from denoiser.evaluate.report import report
         from denoiser.evaluate.tables import Asked, evaluate_table
 
-        asked = Asked(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.weights(), **options)
+        asked = Asked(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
         print(report(evaluate_table(table, asked, progress=True)), end="")
         if self.out is not None:
             print(f"wrote {table}.txt, {table}.json and {table}.png in {self.out}")

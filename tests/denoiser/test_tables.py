@@ -175,15 +175,15 @@ def test_rate_planes_are_judged_beside_spikes() -> None:
 
 def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """TFP 41 stands in for them: their columns and rows are then its own."""
-    shipped = tmp_path / "weights.pt"
-    shipped.write_bytes(b"trained")
+    for name in ("ssml", "spk2img-clean", "spk2img-noisy"):
+        (tmp_path / f"{name}.pt").write_bytes(name.encode())
     stand_in = SimpleNamespace(
-        reconstruct=lambda name, spikes, t: middleTFP(spikes, t, 41),
-        reconstruct_many=lambda name, spikes, frames: np.stack([middleTFP(spikes, t, 41) for t in frames]),
+        reconstruct=lambda name, spikes, t, weights: middleTFP(spikes, t, 41),
+        reconstruct_many=lambda name, spikes, frames, weights: np.stack([middleTFP(spikes, t, 41) for t in frames]),
     )
     monkeypatch.setattr(exposed, "_reconstruction", lambda: stand_in)
-    monkeypatch.setattr(Weights, "path", lambda self, name: shipped)
-    found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy")))
+    asked = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
+    found = evaluate_table("table1", replace(asked, weights=Weights.found(tmp_path, {})))
     rows = found["groups"][0]["rows"]
     assert rows["ssml"] == rows["tfp"] == rows["spk2img-noisy"]
     pictures = rows["noisy"]["pictures"]

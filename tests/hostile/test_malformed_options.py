@@ -212,6 +212,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--frames": (*COUNTS, 199),
             "--jobs": WORKERS,
             "--paper": ("{here}/none.pt",),
+            "--weights": ("{here}/none", "\x00"),
             "--data": ("{here}", "{here}/none"),
         },
     ),
