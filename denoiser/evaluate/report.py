@@ -8,8 +8,8 @@ from typing import Any
 from denoiser.evaluate.judge import COLUMNS, PLANE
 from denoiser.evaluate.rows import ROWS
 
-WIDTH = 32
-"""Of the column of rows."""
+WIDTH = 41
+"""Of the column of rows: the longest title with the size of its network."""
 
 
 def report(result: dict[str, Any]) -> str:
@@ -17,7 +17,7 @@ def report(result: dict[str, Any]) -> str:
     of = _of(result["settings"]) if result["groups"] else "nothing to judge"
     parts = [f"{result['title']}\n{of}"]
     for group in result["groups"]:
-        parts += [_pictures(group, result["rows"]), *_measures(group, result["rows"])]
+        parts += [_pictures(group, result["rows"], result["parameters"]), *_measures(group, result["rows"])]
     if result["figures"]:
         parts.append(_figures(result["figures"]))
     if result["missing"]:
@@ -36,7 +36,7 @@ def _repeated(counted: dict[str, Any]) -> str:
     return f"{counted['seeds']} instants" if counted["seeds_are_instants"] else f"seeds: {counted['seeds']}"
 
 
-def _pictures(group: dict[str, Any], rows: Sequence[str]) -> str:
+def _pictures(group: dict[str, Any], rows: Sequence[str], parameters: dict[str, int | None]) -> str:
     columns = [*COLUMNS, PLANE]
     titles = [*COLUMNS.values(), "rate plane"]
     by_niqe = any(s["niqe"] is not None for row in group["rows"].values() for s in row["pictures"].values())
@@ -48,7 +48,9 @@ def _pictures(group: dict[str, Any], rows: Sequence[str]) -> str:
     ]
     for row in rows:
         scores = group["rows"].get(row, {}).get("pictures", {})
-        lines.append(f"{ROWS[row].title:{WIDTH}}" + "".join(f"| {shown(scores.get(c)):24}" for c in columns).rstrip())
+        size = parameters.get(row)
+        title = ROWS[row].title + ("" if size is None else f", {size / 1e6:.2f} M")
+        lines.append(f"{title:{WIDTH}}" + "".join(f"| {shown(scores.get(c)):24}" for c in columns).rstrip())
     return "\n".join(lines)
 
 

@@ -27,6 +27,7 @@ from denoiser import accumulate, mus
 from denoiser.evaluate import still
 from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed, Planes, Spikes, film
 from denoiser.online import OnlineDnSS
+from denoiser.plain_torch import read_plain
 from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file
 
@@ -181,6 +182,17 @@ def _passes(path: Path) -> int:
     from denoiser.weights import load_weights
 
     return load_weights(path)[0].layout.planes
+
+
+def parameters(source: str, weights: Weights) -> int | None:
+    """How many weights a source's network has; None for a source without one."""
+    name = weights_of(source)
+    return None if name is None else _count(weights.path(name))
+
+
+@lru_cache(maxsize=16)
+def _count(path: Path) -> int:
+    return sum(tensor.numel() for tensor in read_plain(path)["state_dict"].values())
 
 
 def _takes_unit() -> bool:

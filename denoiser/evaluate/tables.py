@@ -28,7 +28,7 @@ from denoiser.evaluate.figures import figures
 from denoiser.evaluate.judge import COLUMNS, Record
 from denoiser.evaluate.page import write_page
 from denoiser.evaluate.report import report
-from denoiser.evaluate.rows import BEFORE, ROWS, Weights, why_not
+from denoiser.evaluate.rows import BEFORE, ROWS, Weights, parameters, why_not
 from denoiser.evaluate.summary import groups
 from denoiser.evaluate.work import Results, tasks, undone, work
 from scenes.catalogue import SCENES
@@ -91,8 +91,9 @@ class Asked:
 def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = False) -> dict[str, Any]:
     """A table of `TABLES`; `report` shows the result as text.
 
-    Returns table, settings, groups (see `summary.groups`), scenes (every record), missing (why rows, columns or
-    recordings are not there) and figures (see `figures.figures`).
+    Returns table, title, rows, settings, groups (see `summary.groups`), scenes (every record), missing (why rows,
+    columns or recordings are not there), parameters (weights of the rows' networks) and figures (see
+    `figures.figures`).
     Raises InputError for unknown names, too few frames, and a folder that holds results of other settings.
     """
     if name not in TABLES:
@@ -106,15 +107,16 @@ def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = Fa
     missing |= {c: why for c in COLUMNS if c not in CLASSICAL and (why := asked.weights.missing(c))}
     here = [row for row in rows if row not in missing]
     columns = [column for column in COLUMNS if column not in missing]
+    sizes = {row: parameters(ROWS[row].source, asked.weights) for row in here}
     if asked.out is None:
         records = _made(cases, here, columns, asked, Results.opened(None, {}), None, progress)
-        return _result(name, rows, cases, records, missing)
+        return _result(name, rows, cases, records, missing, sizes)
     with made_folder(asked.out) as folder:
         results = Results.opened(folder / f"{name}.jsonl", _settings(asked))
         pictures = folder / "pictures"
         pictures.mkdir(exist_ok=True)
         records = _made(cases, here, columns, asked, results, pictures, progress)
-        result = _result(name, rows, cases, records, missing)
+        result = _result(name, rows, cases, records, missing, sizes)
         write_text_whole(folder / f"{name}.json", json.dumps(result, indent=1) + "\n")
         write_text_whole(folder / f"{name}.txt", report(result))
         write_page(folder / f"{name}.png", pictures, cases, rows, records)
@@ -208,7 +210,12 @@ def _made(
 
 
 def _result(
-    name: str, rows: list[str], cases: list[Case], records: list[Record], missing: dict[str, str]
+    name: str,
+    rows: list[str],
+    cases: list[Case],
+    records: list[Record],
+    missing: dict[str, str],
+    sizes: dict[str, int | None],
 ) -> dict[str, Any]:
     grouped = groups(records)
     return {
@@ -224,6 +231,7 @@ def _result(
             "data": sorted({case.folder for case in cases if case.folder}),
         },
         "missing": missing,
+        "parameters": sizes,
         "groups": grouped,
         "figures": figures(name, grouped, records),
         "scenes": [record.model_dump() for record in records],

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 
 from denoiser.evaluate import exposed, still, tables, work
 from denoiser.evaluate.exposed import Case
@@ -176,7 +177,7 @@ def test_rate_planes_are_judged_beside_spikes() -> None:
 def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """TFP 41 stands in for them: their columns and rows are then its own."""
     for name in ("ssml", "spk2img-clean", "spk2img-noisy"):
-        (tmp_path / f"{name}.pt").write_bytes(name.encode())
+        torch.save({"state_dict": {"weight": torch.zeros(3, 4)}}, tmp_path / f"{name}.pt")
     stand_in = SimpleNamespace(
         reconstruct=lambda name, spikes, t, weights: middleTFP(spikes, t, 41),
         reconstruct_many=lambda name, spikes, frames, weights: np.stack([middleTFP(spikes, t, 41) for t in frames]),
@@ -185,6 +186,8 @@ def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monke
     asked = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
     found = evaluate_table("table1", replace(asked, weights=Weights.found(tmp_path, {})))
     rows = found["groups"][0]["rows"]
+    assert found["parameters"] == {"noisy": None, "tfp": None, "ssml": 12, "spk2img-noisy": 12}
+    assert "SSML, then spikes, 0.00 M" in report(found)
     assert rows["ssml"] == rows["tfp"] == rows["spk2img-noisy"]
     pictures = rows["noisy"]["pictures"]
     assert pictures["spk2img-clean"] == pictures["spk2img-noisy"] == pictures["tfp41"]
@@ -251,8 +254,9 @@ def test_the_spread_is_over_seeds_of_the_mean_over_scenes() -> None:
     assert mean_and_spread([(0, None)]) == (None, None)
 
 
-def record(row: str, scene: str, db: dict[str, float], **measures: float) -> Record:
+def record(row: str, scene: str, db: dict[str, float], niqe: float | None = None, **measures: float) -> Record:
     pictures = {column: Score(db=level, ssim=0.5) for column, level in db.items()}
+    pictures |= {} if niqe is None else {"tfi": Score(niqe=niqe)}
     return Record(
         scene=scene, seed=0, interval=10.0, speed=0.0, row=row, weights={}, pictures=pictures, **measures
     )  # fmt: skip
@@ -277,6 +281,20 @@ def test_the_figures_name_what_holds_and_what_does_not() -> None:
     assert found["best: frame-to-frame error across passes / within"]["holds"] is True
     assert found["best: slope of low-contrast texture"]["holds"] is True
     assert found["best, rate planes: mean [dB]"]["holds"] is None
+    dim = [r.model_copy(update={"interval": 40.0}) for r in records]
+    assert all("over noisy (" in f["what"] or "worst" in f["what"] for f in figures("table1", groups(dim), dim))
+
+
+def test_naturalness_counts_downwards() -> None:
+    records = [record(row, "a", {}, niqe=niqe) for row, niqe in (("noisy", 5.0), ("paper", 4.6), ("paper-mus", 4.5))]
+    found = {f["what"]: f for f in figures("table2", groups(records), records)}
+    assert (found["TFI: paper-mus over noisy [NIQE]"]["found"], found["TFI: paper-mus over noisy [NIQE]"]["holds"]) == (
+        -0.5,
+        True,
+    )
+    ablation = {f["what"]: f for f in figures("table4", groups(records), records)}
+    assert (ablation["TFI: MUS over none, paper [NIQE]"]["found"]) == -0.1
+    assert ablation["TFI: refine over none, paper [NIQE]"]["holds"] is None
 
 
 def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:
