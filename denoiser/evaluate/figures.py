@@ -28,7 +28,7 @@ SPIKES_OF_BEST = {"spk2img-clean": 0.7, "spk2img-noisy": 0.0}
 PAPER_NIQE = {"paper-mus": -0.31}
 """Of DnSS over noisy: 3.76 and 4.07, table 2."""
 PAPER_MUS_NIQE = {"paper": -0.04, "baseline": -0.01}
-PAPER_REFINE_NIQE = {"paper": -0.35, "paper-mus": -0.38}
+PAPER_REFINE_NIQE = {"held": -0.35, "mus": -0.38}
 """Table 4: 4.15 without both, 4.14 with MUS, 3.80 with the refine module, 3.76 with both."""
 GAP = 0.85
 PLANES_DB, PLANES_SSIM = 34.0, 0.970
@@ -148,22 +148,28 @@ def _never_below(group: Group, records: Sequence[Record]) -> list[Figure]:
 
 
 def _ablation(group: Group, _: Sequence[Record]) -> list[Figure]:
+    """The paper's two parts, each with and without the other; then what accumulation does in the place of MUS, and both
+    decoders on the true light, where no network errs."""
     found = []
     for column in ("tfi", *LEARNED):
-        db = {row: _score(group, row, column).get("db") for row in ("baseline", "baseline-mus", "paper", "paper-mus")}
-        mus = [_less(db["paper-mus"], db["paper"]), _less(db["baseline-mus"], db["baseline"])]
-        refine = [_less(db["paper"], db["baseline"]), _less(db["paper-mus"], db["baseline-mus"])]
-        light = _less(_score(group, "light-mus", column).get("db"), _score(group, "light", column).get("db"))
-        for what, gains, paper in (("MUS", mus, PAPER_MUS_DB), ("refine", refine, PAPER_REFINE_DB)):
-            for gain, with_ in zip(gains, WITH[what], strict=True):
-                name = f"{COLUMNS[column]}: {what} over none, {with_} [dB]"
-                found.append(_figure(name, f"paper {paper:+}", gain, _least(gain, paper)))
-        name = f"{COLUMNS[column]}: MUS over accumulation of the true light [dB]"
-        found.append(_figure(name, "no paper figure", light, None))
+        db = {row: _score(group, row, column).get("db") for row in group["rows"]}
+        for what, row, over, paper in STEPS:
+            gain = _less(db.get(row), db.get(over))
+            wanted, holds = ("-", None) if paper is None else (f"paper {paper:+}", _least(gain, paper))
+            found.append(_figure(f"{COLUMNS[column]}: {what} [dB]", wanted, gain, holds))
     return found
 
 
-WITH = {"MUS": ("with refine", "without refine"), "refine": ("accumulated", "with MUS")}
+STEPS = (
+    ("MUS over intervals kept, with refine", "paper-mus", "paper-held", PAPER_MUS_DB),
+    ("MUS over intervals kept, without refine", "baseline-mus", "baseline-held", PAPER_MUS_DB),
+    ("refine over none, with MUS", "paper-mus", "baseline-mus", PAPER_REFINE_DB),
+    ("refine over none, intervals kept", "paper-held", "baseline-held", PAPER_REFINE_DB),
+    ("accumulation over MUS, with refine", "paper", "paper-mus", None),
+    ("MUS over intervals kept, of the true light", "light-mus", "light-held", None),
+    ("accumulation over MUS, of the true light", "light", "light-mus", None),
+)
+"""What, row, row it is compared with, the paper's gain [dB] (table 3)."""
 
 
 def _naturalness(group: Group, _: Sequence[Record]) -> list[Figure]:
@@ -178,14 +184,16 @@ def _naturalness(group: Group, _: Sequence[Record]) -> list[Figure]:
 def _natural_ablation(group: Group, _: Sequence[Record]) -> list[Figure]:
     return [
         *(
-            _niqe_figure(group, f"MUS over none, {row}", f"{row}-mus", row, column, paper)
+            _niqe_figure(group, f"MUS over intervals kept, {row}", f"{row}-mus", f"{row}-held", column, paper)
             for column in ("tfi", *LEARNED)
             for row, paper in PAPER_MUS_NIQE.items()
         ),
         *(
-            _niqe_figure(group, f"refine over none, {row}", row, row.replace("paper", "baseline"), column, paper)
+            _niqe_figure(
+                group, f"refine over none, {decoder}", f"paper-{decoder}", f"baseline-{decoder}", column, paper
+            )
             for column in ("tfi", *LEARNED)
-            for row, paper in PAPER_REFINE_NIQE.items()
+            for decoder, paper in PAPER_REFINE_NIQE.items()
         ),
     ]
 

@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 
 from denoiser import accumulate, mus
-from denoiser.evaluate import still
+from denoiser.evaluate import held, still
 from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed, Planes, Spikes, film
 from denoiser.online import OnlineDnSS
 from denoiser.plain_torch import read_plain
 from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file
 
-DECODERS: dict[str, Any] = {"mus": mus, "accumulate": accumulate}
+DECODERS: dict[str, Any] = {"held": held, "mus": mus, "accumulate": accumulate}
 CHUNK = 32
 """Frames pushed at a time."""
 BEFORE = "before"
@@ -55,14 +55,17 @@ ROWS: dict[str, Row] = {
     "ssml": Row("SSML, then spikes", "ssml", "accumulate"),
     "spk2img-clean": Row("Spk2ImgNet (clean), then spikes", "spk2img-clean", "accumulate"),
     "spk2img-noisy": Row("Spk2ImgNet (noisy), then spikes", "spk2img-noisy", "accumulate"),
-    "baseline": Row("paper without refine", "paper-no-refine", "accumulate", True),
-    "baseline-mus": Row("paper without refine, MUS", "paper-no-refine", "mus"),
+    "baseline-held": Row("no refine, intervals kept", "paper-no-refine", "held"),
+    "baseline-mus": Row("no refine, MUS", "paper-no-refine", "mus"),
+    "baseline": Row("no refine, accumulated", "paper-no-refine", "accumulate", True),
+    "paper-held": Row("paper, intervals kept", "paper", "held"),
     "paper-mus": Row("paper, MUS", "paper", "mus"),
     "paper": Row("paper, accumulated", "paper", "accumulate", True),
     "best": Row("best", "best", "accumulate", True),
     "before": Row("best, earlier weights", "before", "accumulate", True),
     "best-map": Row("best with calibration", "best-map", "accumulate", True),
     "clean": Row("clean twin", "clean"),
+    "light-held": Row("true light, intervals kept", "light", "held"),
     "light-mus": Row("true light, MUS", "light", "mus"),
     "light": Row("true light, accumulated", "light", "accumulate"),
 }
@@ -152,7 +155,7 @@ def streams(
 
 
 def decoded(planes: Planes, decoder: str) -> Spikes:
-    """(T, H, W) rates to spikes by a decoder, "mus" or "accumulate"."""
+    """(T, H, W) rates to spikes by a decoder of `DECODERS`."""
     chosen = DECODERS[decoder]
     return chosen.step(planes, chosen.start(planes.shape[1:]))[0]  # type: ignore[no-any-return]
 

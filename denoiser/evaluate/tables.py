@@ -36,10 +36,14 @@ from spikecam_env.checked import checked_count, checked_memory, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.whole import made_folder, write_text_whole
 
-ABLATION = ("noisy", "baseline", "baseline-mus", "paper", "paper-mus", "clean", "light", "light-mus")
+ABLATION = (
+    "noisy",
+    *("baseline-held", "baseline-mus", "baseline", "paper-held", "paper-mus", "paper"),
+    *("clean", "light-held", "light-mus", "light"),
+)
 METHODS = ("noisy", "tfp", "ssml", "spk2img-clean", "spk2img-noisy", "paper-mus", "paper", "best", "clean", "light")
 REAL_METHODS = METHODS[:-2]
-REAL_ABLATION = ABLATION[:-3]
+REAL_ABLATION = ABLATION[:7]
 BYTES = 12
 """A frame and pixel: noisy, clean and decoded spikes, rates and light in float32, and one byte to spare."""
 LEAST_FRAMES = 2 * phm.WARM_UP
