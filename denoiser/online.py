@@ -2,8 +2,8 @@
 
     window (`denoiser.window`) -> network -> rate [spikes/frame] -> decoder (`denoiser.mus`, `denoiser.accumulate`)
 
-Frame t comes out once frame t + latency has gone in: 20 frames in `paper` mode, 27 in `best`, whose frames come
-eight at a time.  The output depends on the stream alone, bit for bit: not on how it is cut into chunks, nor on
+Frame t comes out once frame t + latency has gone in: 20 frames in `paper` mode, 31 in `best`, whose frames come
+sixteen at a time.  The output depends on the stream alone, bit for bit: not on how it is cut into chunks, nor on
 whether it was saved and restored on the way.  (On one machine and thread count: another may sum in another order.)
 """
 
@@ -22,7 +22,7 @@ from torch import nn
 from denoiser import accumulate, infer, mus
 from denoiser.recipe import Recipe
 from denoiser.weights import digest, load_weights, pretrained_path
-from denoiser.window import RollingWindow, Window, check_like
+from denoiser.window import PixelMap, RollingWindow, Window, check_like
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.sensor.sensor import checked_count
 from spikecam_env.streams.packing import as_spikes
@@ -41,6 +41,9 @@ class OnlineDnSS:
     output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
     stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things move).
     precision: of the network; "auto" is bfloat16 where the processor has it, else float32.
+    decoder: how rates become spikes, "accumulate" (`denoiser.accumulate`) or "mus" (`denoiser.mus`, the paper's);
+        default: the recipe's.
+    unit: `best` mode only: the calibrated unit, (gain, dark) maps as arrays (H, W), or a `PixelMap`; SNEE measures them.
     The network is copied: training it further changes nothing here.  One object denoises one stream: for another stream
     take `another()`.
     Errors: InputError for unknown options and unusable spikes; NotReadyError for a push after `flush`.
@@ -54,13 +57,21 @@ class OnlineDnSS:
         output: str = "spikes",
         stride: int = 1,
         precision: str = "auto",
+        decoder: str | None = None,
+        unit: PixelMap | tuple[ArrayLike, ArrayLike] | None = None,
     ) -> None:
         self.output = _checked_output(output)
         if not isinstance(precision, str) or precision not in PRECISIONS:
             raise unknown_name("precision", precision, PRECISIONS)
         if checked_count(stride, "stride") > 1 and recipe.layout.planes > 1:
             raise InputError(f"stride is {stride}; it must be 1 for a network of many planes a pass")
+        if decoder is not None and (not isinstance(decoder, str) or decoder not in _DECODERS):
+            raise unknown_name("decoder", decoder, _DECODERS)
+        if unit is not None and not recipe.layout.gain_memory:
+            raise InputError("this network takes no calibration map; leave unit out, or use mode 'best'")
         self._recipe, self._stride = recipe, int(stride)
+        self._decoder = recipe.decoder if decoder is None else decoder
+        self._unit = None if unit is None else PixelMap.of(unit)
         self._type = infer.number_type(precision)
         self._network = infer.prepared(network, self._type)
         self._digest = digest(recipe, network.state_dict())
@@ -102,6 +113,7 @@ class OnlineDnSS:
         self._window: RollingWindow | None = None
         self._decoding: Any = None
         self._held: NDArray[np.float32] | None = None
+        self._carried: infer.Carried = ()
         self._ended = False
 
     def push(self, spikes: ArrayLike) -> Denoised:
@@ -129,6 +141,7 @@ class OnlineDnSS:
                 "window": self._window.state(),
                 "decoding": copy.deepcopy(self._decoding),
                 "held": copy.deepcopy(self._held),
+                "carried": copy.deepcopy(self._carried),
                 "ended": self._ended,
             }
         return state
@@ -150,17 +163,19 @@ class OnlineDnSS:
             if state["shape"] is not None:
                 other._begin(state["shape"])
                 other._go_on(state)
-        except (KeyError, TypeError, AttributeError, IndexError) as error:
+        except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
             raise InputError(
                 f"the state is no whole state of a denoiser ({type(error).__name__}: {error}); "
                 "give what `OnlineDnSS.state()` returned"
             ) from error
         self._window, self._decoding, self._held = other._window, other._decoding, other._held
-        self._ended = other._ended
+        self._carried, self._ended = other._carried, other._ended
 
     def _begin(self, shape: tuple[int, int]) -> None:
-        self._window = RollingWindow(self._recipe.layout, shape)
-        self._decoding = _DECODERS[self._recipe.decoder].start(shape)
+        if self._unit is not None and self._unit.gain.shape != shape:
+            raise InputError(f"the calibration map has shape {self._unit.gain.shape}, the stream's frames {shape}")
+        self._window = RollingWindow(self._recipe.layout, shape, self._unit)
+        self._decoding = _DECODERS[self._decoder].start(shape)
 
     def _go_on(self, state: dict[str, Any]) -> None:
         assert self._window is not None
@@ -169,13 +184,23 @@ class OnlineDnSS:
             check_like(found, ours, "decoding")
         if state["held"] is not None:
             check_like(state["held"], np.empty((1, *self._window.shape), np.float32), "held", lengths=False)
+        if state["carried"]:
+            for found, size in zip(state["carried"], self._recipe.carries(self._window.shape), strict=True):
+                check_like(found, np.empty(size, np.float32), "carried")
         self._decoding, self._held = copy.deepcopy(state["decoding"]), copy.deepcopy(state["held"])
+        self._carried = copy.deepcopy(tuple(state["carried"]))
         self._ended = bool(state["ended"])
 
     def _identity(self) -> dict[str, Any]:
         """What frames depend on besides the stream."""
         precision = "bfloat16" if self._type == torch.bfloat16 else "float32"
-        return {"recipe and weights": self._digest, "stride": self._stride, "precision": precision}
+        return {
+            "recipe and weights": self._digest,
+            "stride": self._stride,
+            "precision": precision,
+            "decoder": self._decoder,
+            "calibration map": None if self._unit is None else self._unit.digest,
+        }
 
     def _denoise(self, windows: Iterator[Window]) -> Denoised:
         assert self._window is not None
@@ -183,7 +208,7 @@ class OnlineDnSS:
         for window in windows:
             rate = self._rate(window)
             self._window.learn(window, rate)
-            fired, self._decoding = _DECODERS[self._recipe.decoder].step(rate, self._decoding)
+            fired, self._decoding = _DECODERS[self._decoder].step(rate, self._decoding)
             rates.append(rate)
             spikes.append(fired)
         empty = (0, *self._window.shape)
@@ -195,7 +220,7 @@ class OnlineDnSS:
     def _rate(self, window: Window) -> NDArray[np.float32]:
         """(count, H, W) rates of one pass."""
         if window.start % self._stride == 0 or self._held is None:
-            self._held = infer.rates(self._network, window, self._type)
+            self._held, self._carried = infer.rates(self._network, window, self._type, self._carried)
         return self._held
 
     def _checked(self, spikes: ArrayLike) -> NDArray[np.uint8]:

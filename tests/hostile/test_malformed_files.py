@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import tempfile
 from pathlib import Path
 
 import h5py
@@ -14,6 +15,8 @@ from mutations import damaged, json_files, npz, npz_files, toml_files
 from tally import reads_or_refuses
 
 from denoiser.evaluate.work import FORMAT, Results
+from denoiser.reconstruct.recipe import WIDTH_STEP, reconstructor_recipe
+from denoiser.reconstruct.weights import load_reconstructor, save_reconstructor
 from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.calibration import read_campaign, write_flats
 from spikecam_env.calibration.campaign_files import save_rates
@@ -409,3 +412,17 @@ def test_a_malformed_result_is_refused(data: bytes, tmp_path: Path) -> None:
 def test_malformed_weights_are_refused(data: bytes, tmp_path: Path) -> None:
     (tmp_path / "x.pt").write_bytes(data)
     reads_or_refuses("weights .pt", lambda: load_weights(tmp_path / "x.pt"))
+
+
+def _reconstructor() -> bytes:
+    """An untrained one; `test_weights_come_back_to_half_precision` reads such a file."""
+    recipe = reconstructor_recipe("ssml", WIDTH_STEP)
+    with tempfile.TemporaryDirectory() as folder:
+        save_reconstructor(Path(folder) / "x.pt", "ssml", recipe, recipe.network(), {})
+        return (Path(folder) / "x.pt").read_bytes()
+
+
+@pytest.mark.parametrize("data", cases(damaged(_reconstructor())))
+def test_malformed_weights_of_a_reconstructor_are_refused(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "x.pt").write_bytes(data)
+    reads_or_refuses("reconstructor .pt", lambda: load_reconstructor(tmp_path / "x.pt"))
