@@ -4,7 +4,7 @@
     tables.py     the paper's tables and the still scenes: `spikecam evaluate table1 | table2 | table3 | table4 | still`
     measures.py   what is measured of rates against light, as pure functions
 
-docs/evaluation.md says what each figure is.
+docs/tables.md says what each figure is.
 """
 
 from denoiser.evaluate.quick import (
