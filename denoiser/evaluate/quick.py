@@ -260,7 +260,3 @@ def _write(folder: Path, result: dict[str, Any]) -> None:
 def main() -> None:
     """`python -m denoiser.evaluate`: the quick evaluation, printed."""
     print(report(evaluate_quick()))
-
-
-if __name__ == "__main__":
-    main()
