@@ -9,9 +9,9 @@ What it compares, and how:
     PSNR        both pictures moved to [-1, 1], peak 2: that of [0, 1] and peak 1
     SSIM        the same pictures in [-1, 1], windows of 7 x 7, data range 2
 
-SSIM in [-1, 1] is another number than in [0, 1], which the last column has: the term of the local means,
-(2 a b + C) / (a^2 + b^2 + C), punishes differences about mid-grey, where the means a and b pass through 0, and forgives
-them in the dark.  In one thing we differ: Spike-Zoo leaves PSNR's peak to scikit-image, which takes 1 in place of 2, 6 dB
+SSIM in [-1, 1] is another number than in [0, 1], which the last column has: the term of the local means a and b,
+(2 a b + C) / (a^2 + b^2 + C), punishes differences about mid-grey, where a and b pass through 0, and forgives them in
+the dark.  In one thing we differ: Spike-Zoo leaves PSNR's peak to scikit-image, which takes 1 in place of 2, 6 dB
 less, for a picture that nowhere is darker than mid-grey.
 
 Source: K. Chen et al., https://github.com/chenkang455/Spike-Zoo (v0.2.3): `metrics/__init__.py`,
@@ -46,7 +46,6 @@ def evaluate_spikezoo(
     *,
     weights: Weights | None = None,
     rate: float = RATE,
-    split: str = "test",
 ) -> dict[str, Any]:
     """Evaluate on the clips of a folder.
 
@@ -58,7 +57,7 @@ def evaluate_spikezoo(
     rate = checked_number(rate, "rate", 0.0, above=True, unit="spikes/frame")
     online = denoisers(modes, weights)
     scores: list[dict[str, Any]] = []
-    for clip in tqdm(find_clips(folder, split), desc="evaluate", unit="clip", leave=False):
+    for clip in tqdm(find_clips(folder), desc="evaluate", unit="clip", leave=False):
         spikes, truth = read_clip(clip)
         middle = len(spikes) // 2
         if not REACH <= middle < len(spikes) - REACH:
@@ -68,7 +67,7 @@ def evaluate_spikezoo(
     return {
         "rows": _means(scores),
         "clips": scores,
-        "settings": {"folder": str(folder), "rate": rate, "modes": list(modes), "split": split},
+        "settings": {"folder": str(folder), "rate": rate, "modes": list(modes)},
     }
 
 

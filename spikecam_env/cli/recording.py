@@ -51,7 +51,7 @@ def record_scene(
 
     Beside a .dat file, its geometry and frame rate go to `<name>.dat.json`, so that it opens without options.
 
-    what: for the progress bar.  attributes: of a .h5 file.  truth_every: frames between ground truths in it, 0 for none.
+    what: for the progress bar.  attributes: of a .h5 file.  truth_every: frames between ground truths in it; 0: none.
     """
     from tqdm import trange
 
@@ -73,7 +73,7 @@ def record_scene(
 def _appending(
     out: Path, scene: Scene, sensor: SpikeSensor, attributes: dict[str, object]
 ) -> Iterator[tuple[Callable[[Any], object], Callable[[int], object]]]:
-    """A function that takes (T, H, W) spikes, block after block, and one that adds the truth of a frame, to .h5 only."""
+    """A function that takes (T, H, W) spikes, block after block, and one that adds the truth of a frame (.h5 only)."""
     import numpy as np
 
     from spikecam_env.datasets.write import append_truth

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.checked import checked_count
-from spikecam_env.datasets.manifest import NAME, Manifest
+from spikecam_env.datasets.manifest import Manifest
 from spikecam_env.datasets.spikezoo import CLIP_FRAMES, RATE, Bits, write_clip
 from spikecam_env.errors import InputError
 from spikecam_env.names import distinct

@@ -3,8 +3,8 @@
     <folder>/test/spike/NAME.dat    bits, eight pixels a byte, the first in the lowest, bottom row first
     <folder>/test/gt/NAME.png       grey values 0 .. 1 = light / RATE at frame T // 2, of 8 bits
 
-`train` beside `test` is laid out alike.  Spike-Zoo divides a rate [spikes/frame] by RATE, cuts it to [0, 1] and compares
-it with the picture; its clips hold 301 frames of 250 x 400, of which its networks see the middle 41.
+`train` beside `test` is laid out in the same way.  Spike-Zoo divides a rate [spikes/frame] by RATE, cuts it to [0, 1]
+and compares it with the picture; its clips hold 301 frames of 250 x 400, of which its networks see the middle 41.
 
 Source: K. Chen et al., https://github.com/chenkang455/Spike-Zoo (v0.2.3), `datasets/base_dataset.py`,
 `utils/spike_utils.py`, `pipeline/base_pipeline.py`.
@@ -46,15 +46,15 @@ class Clip:
     picture: Path
 
 
-def find_clips(folder: str | Path, split: str = "test") -> list[Clip]:
-    """The clips of a folder that holds spike/ and gt/, or of its split, in the order of their names.
+def find_clips(folder: str | Path) -> list[Clip]:
+    """The clips of a folder that holds spike/ and gt/, or test/ with them, in the order of their names.
 
     Errors: InputError where there is no such folder, no .dat in it, or a stream without its picture.
     """
     root = Path(folder)
-    root = root if (root / "spike").is_dir() else root / split
+    root = root if (root / "spike").is_dir() else root / "test"
     if not (root / "spike").is_dir():
-        raise InputError(f"{folder} holds neither spike/*.dat with gt/*.png, nor {split}/spike; give a folder that does")
+        raise InputError(f"{folder} has no folder spike, nor test/spike; give one that holds spike/*.dat and gt/*.png")
     streams = sorted((root / "spike").glob("*.dat"))
     if not streams:
         raise InputError(f"{root / 'spike'} holds no .dat file")
