@@ -8,8 +8,9 @@ reference   mean of the other half: N frames, n spikes a pixel
 noise^2     var(n) / N^2, the reference's own.  var(n) is half the mean square difference of the counts of its first and
             last two fifths, which do not touch.  Charge passes on from spike to spike, so the variance of a count does
             not grow with its window: 1/6 for a camera without noise.
-still       |S| <= 4 sd, S the difference of the two halves' counts in 5 x 5 pixels.  The sd is that of the median of
-            S^2 over the picture, which few moving pixels do not change.  By chance 1 in 16 000 is beyond.
+still       E <= m + 4 sd, E the mean square difference of the two halves' counts over 5 x 5 pixels, m its median over
+            the picture and sd 1.48 x its median distance from m, which few moving pixels do not change.  By chance
+            1 in 30 000 is beyond.  Squares, since a fine texture that moved is brighter here and darker there.
 brightest   what 1 in 1000 of the still pixels of the reference exceeds
 
 Each half is denoised in its turn; figures are means over both, +- half their difference.
@@ -37,9 +38,9 @@ from spikecam_env.errors import InputError
 BOX = 5
 """Side of the squares in which counts are compared [pixels]."""
 MOVES_SD = 4.0
-"""Standard deviations of a difference that are no chance."""
-MEDIAN_OF_SQUARE = 0.4549
-"""Median of a squared standard normal number."""
+"""Standard deviations above the median that are no chance."""
+SD_BY_MEDIAN = 1.4826
+"""Standard deviation of normal numbers by the median of their distances from the middle."""
 BRIGHTEST = 0.999
 """Quantile of the reference."""
 PATTERN = 0.028
@@ -94,9 +95,9 @@ def evaluate_halves(spikes: NDArray[np.uint8], online: Mapping[str, OnlineDnSS])
 def still_pixels(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """(H, W) where two parts of a recording, of as many frames, saw as much light."""
     difference = first.sum(axis=0, dtype=np.int64) - second.sum(axis=0, dtype=np.int64)
-    around = uniform_filter(difference.astype(np.float64), BOX)
-    variance = float(np.median(np.square(around))) / MEDIAN_OF_SQUARE
-    return np.square(around) <= MOVES_SD**2 * variance
+    around = uniform_filter(np.square(difference.astype(np.float64)), BOX)
+    usual = np.median(around)
+    return around <= usual + MOVES_SD * SD_BY_MEDIAN * np.median(np.abs(around - usual))
 
 
 def reference(spikes: NDArray[np.uint8], still: NDArray[np.bool_]) -> Reference:
