@@ -204,7 +204,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
     ),
     "evaluate spikezoo": (
         ("evaluate", "spikezoo", "{here}", "--out", "{out}"),
-        {"--rate": FLOATS, "--best": ("{here}/a.dat",), "": ("{here}/none",)},
+        {"--rate": FLOATS, "--best": ("{here}/a.dat",)},
     ),
     "evaluate truth": (
         ("evaluate", "truth", "--out", "{out}"),
