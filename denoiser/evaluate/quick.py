@@ -27,6 +27,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from denoiser import accumulate
 from denoiser.metrics import gap_closed, psnr_db, ssim
@@ -83,7 +84,9 @@ def evaluate_quick(
     """
     denoisers = {m: _denoiser(m, (weights or {}).get(m)) for m in modes}
     scores: list[dict[str, Any]] = []
-    for scene in held_out(scenes_a_class, shape, frames, seed, model):
+    scenes = held_out(scenes_a_class, shape, frames, seed, model)
+    total = scenes_a_class * len(SPEEDS) * len(LIGHTS)
+    for scene in tqdm(scenes, desc="held-out scenes", unit="scene", total=total, leave=False):
         noisy, clean, oracle = (scene.streams[row] for row in ("noisy", "clean", "oracle"))
         denoised: dict[str, Stream] = {}
         for mode, online in denoisers.items():
