@@ -1,6 +1,6 @@
 """A real recording against itself: one half denoised, and the mean of the other half as the truth where nothing moves.
 
-    error^2 = mean (picture - reference)^2 - noise^2              over the still pixels [spikes/frame]^2
+    error^2 = mean (picture - reference)^2 - noise^2              over the static pixels [spikes/frame]^2
     dB      = 10 log10(brightest^2 / error^2)
 
 halves      the first and last frames, with `grain.GAP` between
@@ -8,10 +8,10 @@ reference   mean of the other half: N frames, n spikes a pixel
 noise^2     var(n) / N^2, the reference's own.  var(n) is half the mean square difference of the counts of its first and
             last two fifths, which do not touch.  Charge passes on from spike to spike, so the variance of a count does
             not grow with its window: 1/6 for a camera without noise.
-still       E <= m + 4 sd, E the mean square difference of the two halves' counts over 5 x 5 pixels, m its median over
+static      E <= m + 4 sd, E the mean square difference of the two halves' counts over 5 x 5 pixels, m its median over
             the picture and sd 1.48 x its median distance from m, which few moving pixels do not change.  By chance
             1 in 30 000 is beyond.  Squares, since a fine texture that moved is brighter here and darker there.
-brightest   what 1 in 1000 of the still pixels of the reference exceeds
+brightest   what 1 in 1000 of the static pixels of the reference exceeds
 
 Each half is denoised in its turn; figures are means over both, +- half their difference.
 
@@ -52,39 +52,39 @@ WINDOWS = (21, 41)
 
 @dataclass(frozen=True)
 class Reference:
-    """rate: (H, W) mean of a half [spikes/frame].  noise: its variance.  still: (H, W).  brightest [spikes/frame]."""
+    """rate: (H, W) mean of a half [spikes/frame].  noise: its variance.  static: (H, W).  brightest [spikes/frame]."""
 
     rate: NDArray[np.float64]
     noise: float
-    still: NDArray[np.bool_]
+    static: NDArray[np.bool_]
     brightest: float
 
 
 def evaluate_halves(spikes: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]) -> dict[str, Any]:
-    """(T, H, W) spikes of a scene that is still in most places.
+    """(T, H, W) spikes of a scene that is static in most places.
 
     Returns "rows": for noisy TFP 21, 41 and the whole half, and of each mode the last rate plane that saw its whole
     window and the mean over the half: error_db, spread_db, bias (relative), kept, kept_error; and what the test found:
-    still (share of pixels), count_variance, reference_db (of the reference's noise), pattern_db, brightest, frames.
-    Errors: InputError for halves of fewer than LEAST frames, and where nothing is still or lit.
+    static (share of pixels), count_variance, reference_db (of the reference's noise), pattern_db, brightest, frames.
+    Errors: InputError for halves of fewer than LEAST frames, and where nothing is static or lit.
     """
     both = two_looks(spikes)
     half = len(both[0])
     if half < LEAST:
         raise InputError(f"the recording has {len(spikes)} frames; two halves of {LEAST} and {GAP} between are needed")
-    still = still_pixels(*both)
+    static = static_pixels(*both)
     found: list[dict[str, dict[str, float]]] = []
-    references = [reference(other, still) for other in reversed(both)]
+    references = [reference(other, static) for other in reversed(both)]
     for part, seen in zip(both, references, strict=True):
         pictures = dict(_pictures(part, online))
         found.append({row: _judged(picture, part, seen) for row, picture in pictures.items()})
     noise = float(np.mean([r.noise for r in references]))
     brightest = float(np.mean([r.brightest for r in references]))
-    pattern = float(np.mean([np.square(PATTERN * r.rate[still]).mean() for r in references]))
+    pattern = float(np.mean([np.square(PATTERN * r.rate[static]).mean() for r in references]))
     return {
         "rows": [_mean(row, [one[row] for one in found]) for row in found[0]],
         "frames": half,
-        "still": float(still.mean()),
+        "static": float(static.mean()),
         "count_variance": noise * half**2,
         "brightest": brightest,
         "reference_db": decibels(noise, brightest),
@@ -92,7 +92,7 @@ def evaluate_halves(spikes: NDArray[np.uint8], online: Mapping[str, OnlineDnSS])
     }
 
 
-def still_pixels(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def static_pixels(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """(H, W) where two parts of a recording, of as many frames, saw as much light."""
     difference = first.sum(axis=0, dtype=np.int64) - second.sum(axis=0, dtype=np.int64)
     around = uniform_filter(np.square(difference.astype(np.float64)), BOX)
@@ -100,15 +100,15 @@ def still_pixels(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> NDArray
     return around <= usual + MOVES_SD * SD_BY_MEDIAN * np.median(np.abs(around - usual))
 
 
-def reference(spikes: NDArray[np.uint8], still: NDArray[np.bool_]) -> Reference:
-    """The mean of a half, and how well it is known.  Raises InputError where nothing is still, or it is dark."""
+def reference(spikes: NDArray[np.uint8], static: NDArray[np.bool_]) -> Reference:
+    """The mean of a half, and how well it is known.  Raises InputError where nothing is static, or it is dark."""
     part = len(spikes) * 2 // 5
     apart = spikes[:part].sum(axis=0, dtype=np.int64) - spikes[-part:].sum(axis=0, dtype=np.int64)
     rate = spikes.mean(axis=0, dtype=np.float64)
-    if not still.any() or not rate[still].any():
-        raise InputError("nothing in the recording is both still and lit; give one of a scene at rest")
-    variance = float(np.square(apart[still]).mean()) / 2
-    return Reference(rate, variance / len(spikes) ** 2, still, float(np.quantile(rate[still], BRIGHTEST)))
+    if not static.any() or not rate[static].any():
+        raise InputError("nothing in the recording is both static and lit; give one of a scene at rest")
+    variance = float(np.square(apart[static]).mean()) / 2
+    return Reference(rate, variance / len(spikes) ** 2, static, float(np.quantile(rate[static], BRIGHTEST)))
 
 
 def decibels(square: float, peak: float) -> float:
@@ -119,7 +119,7 @@ def decibels(square: float, peak: float) -> float:
 def report(result: dict[str, Any]) -> str:
     """The result as a table to read."""
     lines = [
-        f"halves of {result['frames']} frames; {100 * result['still']:.2f} % of the pixels are still; variance of a "
+        f"halves of {result['frames']} frames; {100 * result['static']:.2f} % of the pixels are static; variance of a "
         f"count {result['count_variance']:.3f}",
         f"brightest {result['brightest']:.3f} spikes/frame; noise of the reference {result['reference_db']:.2f} dB, "
         f"subtracted; a fixed pattern of {100 * PATTERN:g} % removed would cost {result['pattern_db']:.2f} dB",
@@ -144,9 +144,9 @@ def _pictures(part: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]) -> Iter
 
 
 def _judged(picture: NDArray, part: NDArray[np.uint8], seen: Reference) -> dict[str, float]:
-    wrong = float(np.square(picture - seen.rate)[seen.still].mean()) - seen.noise
-    share, error = kept([(picture, part.mean(axis=0), seen.rate)], seen.still)
-    bias = float(picture[seen.still].mean() / seen.rate[seen.still].mean()) - 1
+    wrong = float(np.square(picture - seen.rate)[seen.static].mean()) - seen.noise
+    share, error = kept([(picture, part.mean(axis=0), seen.rate)], seen.static)
+    bias = float(picture[seen.static].mean() / seen.rate[seen.static].mean()) - 1
     return {"error_db": decibels(wrong, seen.brightest), "bias": bias, "kept": share, "kept_error": error}
 
 

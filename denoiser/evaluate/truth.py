@@ -26,7 +26,7 @@ SHOWN = ("well lit, moving", "well lit, static", "all dim")
 
 
 def evaluate_truth(
-    still: str | os.PathLike[str] | None = None,
+    static: str | os.PathLike[str] | None = None,
     moving: str | os.PathLike[str] | None = None,
     modes: Sequence[str] = ("paper", "best"),
     *,
@@ -36,22 +36,22 @@ def evaluate_truth(
 ) -> dict[str, Any]:
     """Run the tests; those on recordings where there are recordings.
 
-    still: a recording of a scene at rest.  moving: one in which everything moves.  scenes: simulated ones, for each
+    static: a recording of a scene at rest.  moving: one in which everything moves.  scenes: simulated ones, for each
     camera of the pattern and each class of `quick`.
     Returns "halves", "pattern" (by recording or camera), "measured" (by camera, as `evaluate_quick`), "settings".
-    Errors: InputError for recordings that cannot be read, are too short, or do not stand still or have no light.
+    Errors: InputError for recordings that cannot be read, are too short, or dark, or nowhere at rest.
     """
-    recordings = {path: read_recording(Path(path)).spikes for path in (still, moving) if path is not None}
+    recordings = {path: read_recording(Path(path)).spikes for path in (static, moving) if path is not None}
     online = denoisers(modes, weights)
     result: dict[str, Any] = {
         "settings": {
-            "still": None if still is None else str(still),
+            "static": None if static is None else str(static),
             "moving": None if moving is None else str(moving),
             "modes": list(modes),
             "scenes": scenes,
             "seed": seed,
         },
-        "halves": None if still is None else halves.evaluate_halves(recordings[still], online),
+        "halves": None if static is None else halves.evaluate_halves(recordings[static], online),
         "pattern": {},
     }
     if moving is not None:
@@ -74,7 +74,7 @@ def report(result: dict[str, Any]) -> str:
     """The result as tables to read."""
     parts = []
     if result["halves"] is not None:
-        parts.append(f"{Path(result['settings']['still']).name}, against itself\n" + halves.report(result["halves"]))
+        parts.append(f"{Path(result['settings']['static']).name}, against itself\n" + halves.report(result["halves"]))
     for name, found in result["pattern"].items():
         parts.append("fixed pattern where the scene moves, " + fixed_pattern.report(found, name))
     for name, found in result["measured"].items():

@@ -19,10 +19,10 @@ class Truth:
     Without recordings the simulated tests alone are run.  Options of reading a recording go into a side file beside
     it (docs/recordings.md).
 
-    example:  spikecam evaluate truth --still wall.npz --moving helicopter.npz --out evaluation
+    example:  spikecam evaluate truth --static wall.npz --moving helicopter.npz --out evaluation
     """
 
-    still: Path | None = None
+    static: Path | None = None
     """A recording of a scene at rest: one half is denoised, the mean of the other is the truth."""
     moving: Path | None = None
     """A recording in which everything moves: what stays at a pixel is the camera's own pattern."""
@@ -43,7 +43,7 @@ class Truth:
 
         with nullcontext() if self.out is None else out_folder(self.out):
             result = evaluate_truth(
-                self.still,
+                self.static,
                 self.moving,
                 self.modes,
                 weights=self.weights.by_mode(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from denoiser.evaluate.halves import LEAST, evaluate_halves, reference, report, still_pixels
+from denoiser.evaluate.halves import LEAST, evaluate_halves, reference, report, static_pixels
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
 
@@ -38,7 +38,7 @@ class Painter:
 
 
 @pytest.fixture(scope="module")
-def still():
+def static():
     """Light and spikes of a camera without noise, every pixel of a light of its own."""
     light = np.random.default_rng(3).uniform(0.1, 0.5, SHAPE).astype(np.float32)
     spikes = SpikeSensor(SensorModel.preset("ideal"), SHAPE, seed=4, engine="fast").step(light, 432)
@@ -46,8 +46,8 @@ def still():
 
 
 @pytest.fixture(scope="module")
-def result(still):
-    light, spikes = still
+def result(static):
+    light, spikes = static
     return evaluate_halves(spikes, {"painter": Painter(1.02 * light)})
 
 
@@ -63,8 +63,8 @@ def test_the_variance_of_a_count_is_a_sixth(result):
     assert result["reference_db"] == pytest.approx(10 * np.log10(result["brightest"] ** 2 * 6 * 200**2), abs=0.2)
 
 
-def test_everything_is_still_but_for_chance(result):
-    assert result["still"] > 0.998
+def test_everything_is_static_but_for_chance(result):
+    assert result["static"] > 0.998
 
 
 @pytest.mark.parametrize("row, window", [("noisy TFP 21", 21), ("noisy TFP 41", 41), ("noisy half", 200)])
@@ -77,8 +77,8 @@ def test_noisy_pictures_err_by_their_quantisation(row, window, result):
     assert found["kept"] == pytest.approx(1.0, abs=max(5 * found["kept_error"], 1e-9))
 
 
-def test_a_picture_2_percent_too_bright_is_said_to_be(still, result):
-    light, _ = still
+def test_a_picture_2_percent_too_bright_is_said_to_be(static, result):
+    light, _ = static
     for name in ("painter last plane", "painter half"):
         row = rows(result)[name]
         expected = 10 * np.log10(result["brightest"] ** 2 / np.square(0.02 * light).mean())
@@ -87,9 +87,9 @@ def test_a_picture_2_percent_too_bright_is_said_to_be(still, result):
         assert row["kept"] == pytest.approx(1.02, abs=0.01)
 
 
-def test_what_a_removed_pattern_costs_follows_from_its_size(still, result):
+def test_what_a_removed_pattern_costs_follows_from_its_size(static, result):
     """2.8 % of the light, rms (docs/calibration.md: 2.6 to 2.9 %)."""
-    expected = 10 * np.log10(result["brightest"] ** 2 / np.square(0.028 * still[0]).mean())
+    expected = 10 * np.log10(result["brightest"] ** 2 / np.square(0.028 * static[0]).mean())
     assert result["pattern_db"] == pytest.approx(expected, abs=0.1)
 
 
@@ -103,25 +103,25 @@ def test_a_change_is_found_beyond_four_standard_deviations_of_5_x_5_pixels(sd, m
     first = np.zeros((2, 200, 200), np.uint8)
     second = first.copy()
     first[0] = differs
-    still = still_pixels(first, second)
-    print(f"{sd:g} sd: {wanted} of 25 differ; {(~still).mean():.1e} of the pixels move")
-    assert still[100, 100] == (not moves)
-    assert (~still).mean() < 1e-3
+    static = static_pixels(first, second)
+    print(f"{sd:g} sd: {wanted} of 25 differ; {(~static).mean():.1e} of the pixels move")
+    assert static[100, 100] == (not moves)
+    assert (~static).mean() < 1e-3
 
 
-def test_a_place_that_moves_is_left_out(still):
-    _, spikes = still
+def test_a_place_that_moves_is_left_out(static):
+    _, spikes = static
     moved = spikes.copy()
     moved[216:, 20:40, 20:40] = np.roll(spikes[216:], 7, axis=2)[:, 20:40, 20:40]
     result = evaluate_halves(moved, {})
-    left_out = (1 - result["still"]) * SHAPE[0] * SHAPE[1]
+    left_out = (1 - result["static"]) * SHAPE[0] * SHAPE[1]
     print(f"{left_out:.0f} pixels left out; 400 moved, 176 are beside them")
     assert 390 < left_out < 600
     assert rows(result)["noisy half"]["error_db"] > 45
 
 
-def test_the_brightest_is_the_thousandth_part(still):
-    seen = reference(still[1], np.ones(SHAPE, bool))
+def test_the_brightest_is_the_thousandth_part(static):
+    seen = reference(static[1], np.ones(SHAPE, bool))
     assert (seen.rate > seen.brightest).mean() <= 0.001 <= (seen.rate >= seen.brightest).mean()
 
 
@@ -130,8 +130,8 @@ def test_the_report_says_every_row(result):
     assert all(row["row"] in text for row in result["rows"]) and "subtracted" in text
 
 
-def test_a_recording_that_is_too_short_or_dark_is_refused(still):
+def test_a_recording_that_is_too_short_or_dark_is_refused(static):
     with pytest.raises(InputError, match=f"halves of {LEAST}"):
-        evaluate_halves(still[1][:220], {})
-    with pytest.raises(InputError, match="still and lit"):
+        evaluate_halves(static[1][:220], {})
+    with pytest.raises(InputError, match="static and lit"):
         evaluate_halves(np.zeros((300, 16, 16), np.uint8), {})

@@ -348,7 +348,7 @@ def test_a_malformed_manifest_is_refused(data: bytes, tmp_path: Path, meets) -> 
         ("dataset.json (dataset verify)", ("dataset", "verify", "{bad}")),
         ("weights .pt (evaluate)", ("evaluate", "quick", "--best", "{bad}.pt", "--out", "{out}")),
         ("spikes .h5 (export)", ("export", "{bad}.h5", "--out", "{out}")),
-        ("spikes .npz (evaluate truth)", ("evaluate", "truth", "--still", "{bad}.npz", "--out", "{out}")),
+        ("spikes .npz (evaluate truth)", ("evaluate", "truth", "--static", "{bad}.npz", "--out", "{out}")),
         ("clips (evaluate spikezoo)", ("evaluate", "spikezoo", "{bad}.dat", "--out", "{out}")),
     ],
 )

@@ -211,7 +211,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         {
             "--seed": SEEDS,
             "--scenes": COUNTS,
-            "--still": ("{here}/none.npz", "{here}/a.dat", "\x00.npz", ""),
+            "--static": ("{here}/none.npz", "{here}/a.dat", "\x00.npz", ""),
             "--moving": ("{here}/none.npz", "{here}/a.dat", "\x00.npz", ""),
             "--best": ("{here}/a.dat",),
         },
