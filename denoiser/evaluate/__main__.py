@@ -1,6 +1,5 @@
 """`python -m denoiser.evaluate`: the quick evaluation, printed."""
 
-from denoiser.evaluate.quick import evaluate_quick, report
+from denoiser.evaluate.quick import main
 
-if __name__ == "__main__":
-    print(report(evaluate_quick()))
+main()

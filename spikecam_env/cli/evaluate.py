@@ -1,4 +1,4 @@
-"""`spikecam evaluate`: how much a denoiser helps, on scenes it has not seen."""
+"""`spikecam evaluate`: how much a denoiser helps."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ from typing import Annotated
 import tyro
 
 from spikecam_env.checked import checked_count
+from spikecam_env.cli.evaluate_spikezoo import SpikeZoo
 from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
+from spikecam_env.cli.evaluate_truth import Truth
 from spikecam_env.cli.options import Checked, Seed
 
 
 @dataclass
 class Quick:
     """Compare noisy, denoised (both modes) and clean-twin streams on held-out scenes.
+
+    Held-out textures, speeds and light levels, TFP 21 and 41, against true light and the clean twin.
 
     example:  spikecam evaluate quick --out evaluation
     """
@@ -46,7 +50,7 @@ class Quick:
 
 @dataclass
 class Evaluate:
-    """How good the denoiser is, by tables (docs/tables.md).
+    """How much a denoiser helps (docs/tables.md, docs/evaluation.md).
 
     example:  spikecam evaluate quick --out evaluation
     """
@@ -58,6 +62,8 @@ class Evaluate:
         | Annotated[Table3, tyro.conf.subcommand("table3", prefix_name=False)]
         | Annotated[Table4, tyro.conf.subcommand("table4", prefix_name=False)]
         | Annotated[StillScenes, tyro.conf.subcommand("still", prefix_name=False)]
+        | Annotated[SpikeZoo, tyro.conf.subcommand("spikezoo", prefix_name=False)]
+        | Annotated[Truth, tyro.conf.subcommand("truth", prefix_name=False)]
     ) = field(default_factory=Quick)
 
     def run(self) -> None:

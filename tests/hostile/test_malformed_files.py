@@ -366,6 +366,9 @@ def test_a_malformed_manifest_is_refused(data: bytes, tmp_path: Path, meets) -> 
         ("spikes .npz (denoise)", ("denoise", "{bad}.npz", "--out", "{out}")),
         ("dataset.json (dataset verify)", ("dataset", "verify", "{bad}")),
         ("weights .pt (evaluate)", ("evaluate", "quick", "--best", "{bad}.pt", "--out", "{out}")),
+        ("spikes .h5 (export)", ("export", "{bad}.h5", "--out", "{out}")),
+        ("spikes .npz (evaluate truth)", ("evaluate", "truth", "--static", "{bad}.npz", "--out", "{out}")),
+        ("clips (evaluate spikezoo)", ("evaluate", "spikezoo", "{bad}.dat", "--out", "{out}")),
     ],
 )
 def test_what_is_no_file_is_refused(kind: str, target: str, args: tuple, tmp_path: Path, meets) -> None:

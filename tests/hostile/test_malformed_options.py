@@ -53,6 +53,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--without": ("", "shot", "\x00"),
             "--model": ("", "scs", "..", "/", "\x00.toml", "x" * 300 + ".toml", "/dev/null.toml"),
             "--scene": ("", "disks", "\x00"),
+            "--truth-every": (-1, 10**16, 10**30),
             "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
         },
     ),
@@ -68,6 +69,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--slow": (*FLOATS, "2"),
             "--mean-interval": (*FLOATS, "0.5"),
             "--transfer": ("", "log", "gamma0", "gammanan", "gamma1e308"),
+            "--truth-every": (-1, 10**16, 10**30),
             "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
         },
     ),
@@ -223,6 +225,29 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
     "evaluate still": (
         ("evaluate", "still", "--out", "{out}", "--rows", "noisy"),
         {"--scenes": COUNTS, "--size": SIZES, "--seeds": COUNTS, "--frames": (*COUNTS, 10**15), "--jobs": WORKERS},
+    ),
+    "evaluate spikezoo": (
+        ("evaluate", "spikezoo", "{here}", "--out", "{out}"),
+        {"--rate": FLOATS, "--best": ("{here}/a.dat",)},
+    ),
+    "evaluate truth": (
+        ("evaluate", "truth", "--out", "{out}"),
+        {
+            "--seed": SEEDS,
+            "--scenes": COUNTS,
+            "--static": ("{here}/none.npz", "{here}/a.dat", "\x00.npz", ""),
+            "--moving": ("{here}/none.npz", "{here}/a.dat", "\x00.npz", ""),
+            "--best": ("{here}/a.dat",),
+        },
+    ),
+    "export": (
+        ("export", "{here}/none.h5", "--out", "{out}"),
+        {
+            "--frames": (*COUNTS, 300),
+            "--clips": COUNTS,
+            "--rate": FLOATS,
+            "--out": ("{here}/none/x", "{here}/a.dat"),
+        },
     ),
     "blind-trial": (
         ("blind-trial", "--out", "{out}"),
