@@ -13,7 +13,6 @@ one go, so that a network runs once for MUS and accumulation.
 from __future__ import annotations
 
 import hashlib
-import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -62,6 +61,7 @@ ROWS: dict[str, Row] = {
     "paper-mus": Row("paper, MUS", "paper", "mus"),
     "paper": Row("paper, accumulated", "paper", "accumulate", True),
     "best": Row("best", "best", "accumulate", True),
+    "best-overlap": Row("best, passes overlapped", "best-overlap", "accumulate", True),
     "before": Row("best, earlier weights", "before", "accumulate", True),
     "best-map": Row("best with calibration", "best-map", "accumulate", True),
     "clean": Row("clean twin", "clean"),
@@ -73,6 +73,7 @@ NETWORKS = {
     "paper": "paper",
     "paper-no-refine": "paper-no-refine",
     "best": "best",
+    "best-overlap": "best",
     "best-map": "best",
     "before": BEFORE,
 }
@@ -137,8 +138,6 @@ def why_not(source: str, weights: Weights) -> str:
             if name in weights.files:
                 raise
             return str(error)
-    if source == "best-map" and not _takes_unit():
-        return "this OnlineDnSS takes no calibration"
     return ""
 
 
@@ -198,10 +197,6 @@ def _count(path: Path) -> int:
     return sum(tensor.numel() for tensor in read_plain(path)["state_dict"].values())
 
 
-def _takes_unit() -> bool:
-    return "unit" in inspect.signature(OnlineDnSS.__init__).parameters
-
-
 @lru_cache(maxsize=2)
 def _online(path: Path) -> OnlineDnSS:
     return OnlineDnSS.from_file(path, output="rate")
@@ -211,9 +206,13 @@ def _network(name: str) -> Callable[[Case, Exposed, Weights], Planes]:
     return lambda case, exposed, weights: denoised(_online(weights.path(name)).another(), exposed)
 
 
+def _overlapped(case: Case, exposed: Exposed, weights: Weights) -> Planes:
+    return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", overlap=True), exposed)
+
+
 def _calibrated(case: Case, exposed: Exposed, weights: Weights) -> Planes:
-    options: dict[str, Any] = {"unit": still.calibrated(case)}
-    return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", **options), exposed)
+    unit = still.calibrated(case)
+    return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", unit=unit), exposed)
 
 
 def _pipeline(name: str) -> Callable[[Case, Exposed, Weights], Planes]:
@@ -229,6 +228,7 @@ def _light(case: Case, exposed: Exposed, weights: Weights) -> Planes:
 
 _SOURCES: dict[str, Callable[[Case, Exposed, Weights], Planes]] = {
     **{name: _network(file) for name, file in NETWORKS.items()},
+    "best-overlap": _overlapped,
     "best-map": _calibrated,
     **{name: _pipeline(name) for name in PIPELINES},
     "light": _light,
