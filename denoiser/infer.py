@@ -26,18 +26,28 @@ def prepared(network: nn.Module, number_type: torch.dtype) -> nn.Module:
     return where_torch_can(copied)
 
 
-def rates(network: nn.Module, window: Window, number_type: torch.dtype) -> NDArray[np.float32]:
-    """(count, H, W) float32 rates in the frames the window covers, cut to [0, 1] [spikes/frame]."""
-    return where_torch_can(lambda: _rates(network, window, number_type))
+Carried = tuple[NDArray[np.float32], ...]
+"""What a pass leaves for the next, as arrays (n, h, w); empty before the first, and for networks that carry nothing."""
 
 
-def _rates(network: nn.Module, window: Window, number_type: torch.dtype) -> NDArray[np.float32]:
+def rates(
+    network: nn.Module, window: Window, number_type: torch.dtype, carried: Carried = ()
+) -> tuple[NDArray[np.float32], Carried]:
+    """(count, H, W) float32 rates in the frames the window covers, cut to [0, 1] [spikes/frame], and what is carried."""
+    return where_torch_can(lambda: _rates(network, window, number_type, carried))
+
+
+def _rates(
+    network: nn.Module, window: Window, number_type: torch.dtype, carried: Carried
+) -> tuple[NDArray[np.float32], Carried]:
     layout, device = torch.channels_last, next(network.parameters()).device
     spikes = torch.from_numpy(np.ascontiguousarray(window.spikes))[None].to(device, number_type)
     planes = torch.from_numpy(window.planes)[None].to(device)
+    before = tuple(torch.from_numpy(array)[None].to(device) for array in carried) or None
     with torch.inference_mode(), torch.autocast(device.type, number_type, enabled=number_type != torch.float32):
-        rate = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout))
-    return np.ascontiguousarray(rate[0, : window.count].float().clamp(0.0, 1.0).cpu().numpy())
+        rate, kept = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout), before)
+    whole = np.ascontiguousarray(rate[0, : window.count].float().clamp(0.0, 1.0).cpu().numpy())
+    return whole, tuple(np.ascontiguousarray(k[0].float().cpu().numpy()) for k in kept or ())
 
 
 def number_type(precision: str) -> torch.dtype:

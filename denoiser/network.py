@@ -84,7 +84,7 @@ def _blend_head(inputs: int) -> nn.Conv2d:
 
 
 class DnSS(nn.Module):
-    """(N, 41, H, W) spikes and (N, 1, H, W) noisy 1/ISI -> (N, 1, H, W) clean 1/ISI."""
+    """(N, 41, H, W) spikes and (N, 1, H, W) noisy 1/ISI -> (N, 1, H, W) clean 1/ISI, and nothing to carry on."""
 
     def __init__(
         self,
@@ -107,7 +107,7 @@ class DnSS(nn.Module):
         self.infer = nn.Sequential(conv_relu(features, 12), conv(12, 1))
         self.theta = nn.Sequential(conv_relu(2, 12), _blend_head(12))
 
-    def forward(self, spikes: Tensor, noisy: Tensor) -> Tensor:
+    def forward(self, spikes: Tensor, noisy: Tensor, carried: None = None) -> tuple[Tensor, None]:
         height, width = spikes.shape[-2:]
         spikes, noisy = pad_to_multiple(spikes, 4), pad_to_multiple(noisy, 4)
         features = self.denoise(self.stem(spikes))
@@ -117,4 +117,4 @@ class DnSS(nn.Module):
         inferred = self.infer(features)
         theta = torch.sigmoid(self.theta(torch.cat([inferred, noisy.to(inferred.dtype)], dim=1))).float()
         blended = theta * inferred.float() + (1 - theta) * noisy
-        return blended[..., :height, :width]
+        return blended[..., :height, :width], None

@@ -2,8 +2,8 @@
 
     window (`denoiser.window`) -> network -> rate [spikes/frame] -> decoder (`denoiser.mus`, `denoiser.accumulate`)
 
-Frame t comes out once frame t + latency has gone in: 20 frames in `paper` mode, 27 in `best`, whose frames come
-eight at a time.  The output depends on the stream alone, bit for bit: not on how it is cut into chunks, nor on
+Frame t comes out once frame t + latency has gone in: 20 frames in `paper` mode, 31 in `best`, whose frames come
+sixteen at a time.  The output depends on the stream alone, bit for bit: not on how it is cut into chunks, nor on
 whether it was saved and restored on the way.  (On one machine and thread count: another may sum in another order.)
 """
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Iterator
+from itertools import chain as chain_of
 from typing import Any
 
 import numpy as np
@@ -20,9 +21,10 @@ from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
 from denoiser import accumulate, infer, mus
+from denoiser.chain import Chain, Crossfade, Rates
 from denoiser.recipe import Recipe
 from denoiser.weights import digest, load_weights, pretrained_path
-from denoiser.window import RollingWindow, Window, check_like
+from denoiser.window import PixelMap, check_like
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.sensor.sensor import checked_count
 from spikecam_env.streams.packing import as_spikes
@@ -41,6 +43,11 @@ class OnlineDnSS:
     output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
     stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things move).
     precision: of the network; "auto" is bfloat16 where the processor has it, else float32.
+    decoder: how rates become spikes, "accumulate" (`denoiser.accumulate`) or "mus" (`denoiser.mus`, the paper's);
+        default: the recipe's.
+    unit: `best` mode only: the calibrated unit, maps (gain, dark) of shape (H, W), or a `PixelMap`; SNEE measures them.
+    overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`denoiser.chain`): less error,
+        no seams, twice the work.
     The network is copied: training it further changes nothing here.  One object denoises one stream: for another stream
     take `another()`.
     Errors: InputError for unknown options and unusable spikes; NotReadyError for a push after `flush`.
@@ -54,13 +61,26 @@ class OnlineDnSS:
         output: str = "spikes",
         stride: int = 1,
         precision: str = "auto",
+        decoder: str | None = None,
+        unit: PixelMap | tuple[ArrayLike, ArrayLike] | None = None,
+        overlap: bool = False,
     ) -> None:
         self.output = _checked_output(output)
         if not isinstance(precision, str) or precision not in PRECISIONS:
             raise unknown_name("precision", precision, PRECISIONS)
         if checked_count(stride, "stride") > 1 and recipe.layout.planes > 1:
             raise InputError(f"stride is {stride}; it must be 1 for a network of many planes a pass")
-        self._recipe, self._stride = recipe, int(stride)
+        if decoder is not None and (not isinstance(decoder, str) or decoder not in _DECODERS):
+            raise unknown_name("decoder", decoder, _DECODERS)
+        if unit is not None and not recipe.layout.gain_memory:
+            raise InputError("this network takes no calibration map; leave unit out, or use mode 'best'")
+        if not isinstance(overlap, bool):
+            raise InputError(f"overlap is {overlap!r}; it must be True or False")
+        if overlap and recipe.layout.planes % 2:
+            raise InputError("overlap is True; passes of this network cannot overlap by half, leave it False")
+        self._recipe, self._stride, self._overlap = recipe, int(stride), overlap
+        self._decoder = recipe.decoder if decoder is None else decoder
+        self._unit = None if unit is None else PixelMap.of(unit)
         self._type = infer.number_type(precision)
         self._network = infer.prepared(network, self._type)
         self._digest = digest(recipe, network.state_dict())
@@ -95,13 +115,13 @@ class OnlineDnSS:
     @property
     def shape(self) -> tuple[int, int] | None:
         """(rows, columns) of the stream, once known."""
-        return None if self._window is None else self._window.shape
+        return self._chains[0].shape if self._chains else None
 
     def reset(self) -> None:
         """Forget the stream; the next may have another size."""
-        self._window: RollingWindow | None = None
+        self._chains: list[Chain] = []
+        self._mixing: Crossfade | None = None
         self._decoding: Any = None
-        self._held: NDArray[np.float32] | None = None
         self._ended = False
 
     def push(self, spikes: ArrayLike) -> Denoised:
@@ -109,26 +129,25 @@ class OnlineDnSS:
         if self._ended:
             raise NotReadyError("the stream has ended (flush was called); call reset() to begin another")
         chunk = self._checked(spikes)
-        if self._window is None:
+        if not self._chains:
             self._begin((chunk.shape[1], chunk.shape[2]))
-        assert self._window is not None
-        return self._denoise(self._window.push(chunk))
+        return self._denoise([chain.push(chunk) for chain in self._chains])
 
     def flush(self) -> Denoised:
         """The stream is over -> its last frames, so that as many came out as went in."""
-        if self._window is None:
+        if not self._chains:
             raise NotReadyError("nothing was pushed yet; push spike frames first")
         self._ended = True
-        return self._denoise(self._window.end())
+        return self._denoise([chain.end() for chain in self._chains])
 
     def state(self) -> dict[str, Any]:
         """A copy of everything later frames depend on, but the weights: plain arrays and numbers, picklable."""
         state: dict[str, Any] = {"of": self._identity(), "shape": self.shape}
-        if self._window is not None:
+        if self._chains:
             state |= {
-                "window": self._window.state(),
+                "chains": [chain.state() for chain in self._chains],
+                "mixing": None if self._mixing is None else self._mixing.state(),
                 "decoding": copy.deepcopy(self._decoding),
-                "held": copy.deepcopy(self._held),
                 "ended": self._ended,
             }
         return state
@@ -150,61 +169,72 @@ class OnlineDnSS:
             if state["shape"] is not None:
                 other._begin(state["shape"])
                 other._go_on(state)
-        except (KeyError, TypeError, AttributeError, IndexError) as error:
+        except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
             raise InputError(
                 f"the state is no whole state of a denoiser ({type(error).__name__}: {error}); "
                 "give what `OnlineDnSS.state()` returned"
             ) from error
-        self._window, self._decoding, self._held = other._window, other._decoding, other._held
-        self._ended = other._ended
+        self._chains, self._mixing = other._chains, other._mixing
+        self._decoding, self._ended = other._decoding, other._ended
 
     def _begin(self, shape: tuple[int, int]) -> None:
-        self._window = RollingWindow(self._recipe.layout, shape)
-        self._decoding = _DECODERS[self._recipe.decoder].start(shape)
+        if self._unit is not None and self._unit.gain.shape != shape:
+            raise InputError(f"the calibration map has shape {self._unit.gain.shape}, the stream's frames {shape}")
+        options: dict[str, Any] = {"unit": self._unit, "stride": self._stride}
+        firsts = (0, self._recipe.layout.planes // 2) if self._overlap else (0,)
+        self._chains = [Chain(self._recipe, self._network, self._type, shape, first=n, **options) for n in firsts]
+        self._mixing = Crossfade(self._recipe.layout.planes, shape) if self._overlap else None
+        self._decoding = _DECODERS[self._decoder].start(shape)
 
     def _go_on(self, state: dict[str, Any]) -> None:
-        assert self._window is not None
-        self._window.restore(state["window"])
+        for chain, its in zip(self._chains, state["chains"], strict=True):
+            chain.restore(its)
+        if self._mixing is not None:
+            self._mixing.restore(state["mixing"])
         for found, ours in zip(state["decoding"], self._decoding, strict=True):
             check_like(found, ours, "decoding")
-        if state["held"] is not None:
-            check_like(state["held"], np.empty((1, *self._window.shape), np.float32), "held", lengths=False)
-        self._decoding, self._held = copy.deepcopy(state["decoding"]), copy.deepcopy(state["held"])
+        self._decoding = copy.deepcopy(state["decoding"])
         self._ended = bool(state["ended"])
 
     def _identity(self) -> dict[str, Any]:
         """What frames depend on besides the stream."""
         precision = "bfloat16" if self._type == torch.bfloat16 else "float32"
-        return {"recipe and weights": self._digest, "stride": self._stride, "precision": precision}
+        return {
+            "recipe and weights": self._digest,
+            "stride": self._stride,
+            "precision": precision,
+            "decoder": self._decoder,
+            "overlap": self._overlap,
+            "calibration map": None if self._unit is None else self._unit.digest,
+        }
 
-    def _denoise(self, windows: Iterator[Window]) -> Denoised:
-        assert self._window is not None
-        rates, spikes = [], []
-        for window in windows:
-            rate = self._rate(window)
-            self._window.learn(window, rate)
-            fired, self._decoding = _DECODERS[self._recipe.decoder].step(rate, self._decoding)
+    def _denoise(self, passes: list[Iterator[tuple[int, Rates]]]) -> Denoised:
+        """The frames that these passes, by chain, complete."""
+        shape = self._chains[0].shape
+        rates, spikes = [np.empty((0, *shape), np.float32)], [np.empty((0, *shape), np.uint8)]
+        for rate in self._mixed(passes):
+            fired, self._decoding = _DECODERS[self._decoder].step(rate, self._decoding)
             rates.append(rate)
             spikes.append(fired)
-        empty = (0, *self._window.shape)
-        all_spikes = np.concatenate([np.empty(empty, np.uint8), *spikes])
-        all_rates = np.concatenate([np.empty(empty, np.float32), *rates])
-        outputs: dict[str, Denoised] = {"spikes": all_spikes, "rate": all_rates, "both": (all_spikes, all_rates)}
-        return outputs[self.output]
+        if self.output == "spikes":
+            return np.concatenate(spikes)
+        return np.concatenate(rates) if self.output == "rate" else (np.concatenate(spikes), np.concatenate(rates))
 
-    def _rate(self, window: Window) -> NDArray[np.float32]:
-        """(count, H, W) rates of one pass."""
-        if window.start % self._stride == 0 or self._held is None:
-            self._held = infer.rates(self._network, window, self._type)
-        return self._held
+    def _mixed(self, passes: list[Iterator[tuple[int, Rates]]]) -> Iterator[Rates]:
+        if self._mixing is None:
+            yield from (rate for _, rate in passes[0])
+            return
+        for start, rate in chain_of(*passes):
+            self._mixing.add(start, rate)
+        yield self._mixing.take(min(chain.covered for chain in self._chains))
 
     def _checked(self, spikes: ArrayLike) -> NDArray[np.uint8]:
         chunk = as_spikes(spikes)
         if min(chunk.shape[1:]) < 1:
             raise InputError(f"spikes have shape {chunk.shape}; frames must have at least one row and one column")
-        if self._window is not None and chunk.shape[1:] != self._window.shape:
+        if self._chains and chunk.shape[1:] != self.shape:
             raise InputError(
-                f"spikes have frames of {chunk.shape[1:]}, the stream has {self._window.shape}; "
+                f"spikes have frames of {chunk.shape[1:]}, the stream has {self.shape}; "
                 "call reset() to begin a stream of another size"
             )
         if chunk.size and chunk.max() > 1:

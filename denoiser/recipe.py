@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 from torch import nn
 
-from denoiser.block_network import BlockDnSS
 from denoiser.network import DnSS
+from denoiser.stream_network import CARRY, StreamDnSS
 from denoiser.window import WindowLayout
 from spikecam_env.errors import unknown_name
 from spikecam_env.untrusted import Declared, declared
@@ -28,7 +28,15 @@ class Recipe:
         """The untrained network: (N, span, H, W) spikes, (N, layers, H, W) planes -> (N, planes, H, W) rates."""
         if self.layout.planes == 1:
             return DnSS(window=self.layout.span, refine=self.refine)
-        return BlockDnSS(span=self.layout.span, layers=self.layout.layers, planes=self.layout.planes)
+        layout = self.layout
+        return StreamDnSS(layout.span, layout.layers, layout.planes, layout.means)
+
+    def carries(self, shape: tuple[int, int]) -> tuple[tuple[int, int, int], ...]:
+        """Shapes of what a pass leaves for the next, for frames of `shape`."""
+        if self.layout.planes == 1:
+            return ()
+        height, width = (n + -n % 4 for n in shape)
+        return (1, *shape), (CARRY, height // 2, width // 2)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for a checkpoint."""
@@ -70,9 +78,11 @@ class _DeclaredRecipe(Declared):
 
 
 RECIPES = {
-    "paper": Recipe(WindowLayout(past=20, planes=1, future=20), "clean_inverse_interval", "mus"),
+    "paper": Recipe(WindowLayout(past=20, planes=1, future=20), "clean_inverse_interval", "accumulate"),
     "best": Recipe(
-        WindowLayout(past=20, planes=8, future=20, half_widths=(4, 12, 24), memories=(64.0, 512.0), gain_memory=1024.0),
+        WindowLayout(
+            past=16, planes=16, future=16, half_widths=(4, 12, 22), memories=(64.0, 512.0), gain_memory=1024.0
+        ),
         "light",
         "accumulate",
     ),

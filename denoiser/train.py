@@ -1,18 +1,13 @@
-"""Training: minimise the error of the rate on simulated pairs, resumable at any minute.
+"""Training: minimise the error of the rate along simulated streams, resumable at any minute.
 
-    paper   L = mean (ISI_dn - ISI_clean)^2                 paper (22), on normalised intervals
-    best    L = mean (rate - light)^2 / (light + 0.05)      light weighs as its count noise does, so dim scenes count
+    paper   L = mean (ISI_dn - ISI_clean)^2                 paper (22), on normalised intervals (`interval_training`)
+    best    L = mean (rate - light)^2 / (rate + 0.02) ..    light weighs as its count noise does (`rollout`)
 
 Adam; the rate of learning warms up over 100 steps and falls as a cosine to nothing at the end.  Everything follows from
-the seed and the number of steps; a run limited by `minutes` ends where the clock says.
+the seed and the number of steps; a run limited by `minutes` ends where the clock says.  A resumed run draws other
+streams.  On a GPU streams, windows and network are all there.
 
-`best` sees the pixel's gain as it found it itself earlier in the stream (`denoiser.window`).  So every `refresh_every`
-steps the network of the moment is written down, and the clips simulated from then on are denoised by it from their
-first frame to give that gain; until the first refresh the gain is 1, and the first network, which learned without, is
-not shown the gain it finds.  (A resumed run draws its clips again, with the last network written down.)
-
-In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `rollout-<step>.pt` (the network that found the
-gain), `curve.json` and `curve.png` (validation).
+In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `curve.json` and `curve.png` (validation).
 """
 
 from __future__ import annotations
@@ -22,44 +17,41 @@ import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Protocol
 
-import numpy as np
 import torch
 from pydantic import Field
 from torch import Tensor, nn
 from tqdm import tqdm
 
-from denoiser import infer
-from denoiser.pairs import CLIP_SHAPE, ClipFeed, draw_clip
+from denoiser.captured import captured
+from denoiser.interval_training import IntervalWindows
 from denoiser.plain_torch import read_plain, tensors_like
-from denoiser.pool import Batch, SamplePool
 from denoiser.recipe import Recipe, recipe_of
+from denoiser.rollout import Rollouts
+from denoiser.simulated import Bank, SimulatedStreams
 from denoiser.weights import save_weights, write_whole
-from denoiser.window import Window
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.untrusted import Declared, Name, Whole, declared
 from spikecam_env.whole import whole_file, write_text_whole
 
-POOL_CLIPS = 160
-FIRST_CLIPS = 24
-VALIDATION_CLIPS = 10
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
+VALIDATION_STREAMS = 8
+VALIDATION_PASSES = 24
 WARM_UP_STEPS = 100
-
+PASSES = {"best": 3, "paper": 1}
+"""Passes of each stream that a step takes."""
 
 _COUNTS = {
     "steps": (1, 10**9),
     "batch": (1, 65_536),
     "seed": (0, 2**62),
     "threads": (1, 1024),
-    "patch": (4, CLIP_SHAPE[0]),
-    "steps_per_clip": (1, 10**9),
-    "refresh_every": (1, 10**9),
-    "workers": (1, 1024),
+    "patch": (16, 128),
+    "validate_every": (1, 10**9),
 }
 """Options that are whole numbers, with the least and the most."""
 
@@ -71,10 +63,10 @@ _AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
 class TrainConfig:
     """mode: "best" | "paper".  out: folder.  The run ends after `steps`, or `minutes` where that is given.
 
-    batch: patches a step.  patch: their side [pixels].  lr: highest rate of learning.  steps_per_clip: steps between
-    new clips.  refresh_every: steps between validations, and between new networks for the gain.  threads: for the
-    network.  device: where it is, and the pool; a GPU wants larger batches.  workers: processes that simulate; how many
-    there are decides how far ahead of a new network clips are begun.  resume: go on from out/last.pt.
+    batch: streams a step.  patch: their side [pixels], a multiple of 16.  lr: highest rate of learning.
+    validate_every: steps between validations.  threads: of the processor.  device: where streams and network are; a
+    GPU wants larger batches.  refine: `paper` with its refine module or, for the ablation, without.
+    resume: go on from out/last.pt.
     """
 
     mode: str = "best"
@@ -87,11 +79,10 @@ class TrainConfig:
     minutes: float | None = None
     patch: int = 64
     lr: float = 1e-3
-    steps_per_clip: int = 8
+    refine: bool = True
     save_every_s: float = 60.0
-    refresh_every: int = 1000
+    validate_every: int = 1000
     device: str = "cpu"
-    workers: int = 1
 
     def __post_init__(self) -> None:
         recipe_of(self.mode)
@@ -105,8 +96,11 @@ class TrainConfig:
                 continue
             if not isinstance(amount, int | float) or isinstance(amount, bool) or not 0 < amount <= highest:
                 raise InputError(f"{name} is {amount!r}; it must be a number above 0, at most {highest:g}")
-        if not isinstance(self.resume, bool):
-            raise InputError(f"resume is {self.resume!r}; it must be True or False")
+        for name in ("resume", "refine"):
+            if not isinstance(getattr(self, name), bool):
+                raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
+        if self.patch % 16:
+            raise InputError(f"patch is {self.patch}; it must be a multiple of 16")
         if not isinstance(self.out, str | os.PathLike):
             raise InputError(f"out is {self.out!r}; it must be the path of a folder")
         object.__setattr__(self, "out", Path(self.out))
@@ -118,20 +112,29 @@ def train(config: TrainConfig, *, progress: bool = True) -> Path:
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)
-    recipe = recipe_of(config.mode)
+    recipe = replace(recipe_of(config.mode), refine=config.refine)
     run = _Run.begin(config, recipe)
     if config.resume and (config.out / "last.pt").exists():
         run.load(config.out / "last.pt")
-    newest = FIRST_CLIPS + run.step // config.steps_per_clip
-    pool = SamplePool(POOL_CLIPS, config.device)
-    first, rollout = max(0, newest - POOL_CLIPS), _rollout(config, recipe, run.step)
-    feed = ClipFeed(recipe, config.seed, first, rollout, workers=config.workers)
-    try:
-        for _ in range(min(newest, POOL_CLIPS)):
-            pool.add(next(feed))
-        return _loop(config, recipe, run, pool, feed, progress)
-    finally:
-        feed.close()
+    return _loop(config, recipe, run, progress)
+
+
+class Source(Protocol):
+    """What a network learns from and is judged by."""
+
+    streams: SimulatedStreams
+
+    def loss(self, network: nn.Module, passes: int) -> Tensor:
+        """The loss of one step, with gradients."""
+
+    def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
+        """Mean squared errors against the light, by what guessed it."""
+
+
+def source(recipe: Recipe, *, seed: int, **options: Any) -> Source:
+    """Streams for a recipe: `Rollouts` for the light, `IntervalWindows` for the clean interval."""
+    kind = IntervalWindows if recipe.target == "clean_inverse_interval" else Rollouts
+    return kind(recipe.layout, seed=seed, **options)
 
 
 @dataclass
@@ -140,7 +143,6 @@ class _Run:
 
     network: nn.Module
     optimiser: torch.optim.Optimizer
-    rng: np.random.Generator
     step: int
     seconds: float
     curve: list[dict[str, float]]
@@ -149,16 +151,19 @@ class _Run:
     @classmethod
     def begin(cls, config: TrainConfig, recipe: Recipe) -> _Run:
         network = recipe.network().to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
-        optimiser = torch.optim.Adam(network.parameters(), config.lr)
-        return cls(network, optimiser, np.random.default_rng([config.seed, 1]), 0, 0.0, [], [])
+        on_gpu = torch.device(config.device).type == "cuda"
+        lr = (
+            torch.tensor(config.lr, device=config.device) if on_gpu else config.lr
+        )  # in a graph only a tensor can change
+        optimiser = torch.optim.Adam(network.parameters(), lr, capturable=on_gpu)
+        return cls(network, optimiser, 0, 0.0, [], [])
 
     def save(self, path: Path) -> None:
         write_whole(
             path,
             {
                 "network": self.network.state_dict(),
-                "optimiser": self.optimiser.state_dict(),
-                "rng": json.dumps(self.rng.bit_generator.state),
+                "optimiser": _plain_groups(self.optimiser.state_dict()),
                 "step": self.step,
                 "seconds": self.seconds,
                 "curve": self.curve,
@@ -169,22 +174,26 @@ class _Run:
     def load(self, path: Path) -> None:
         data = read_plain(path)
         try:
-            parts = {name: data.pop(name) for name in ("network", "optimiser", "rng")}
-            generator = json.loads(parts["rng"])
-        except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
+            parts = {name: data.pop(name) for name in ("network", "optimiser")}
+        except (KeyError, TypeError, AttributeError) as error:
             raise InputError(f"{path} is not a run; give another --out, or resume=False") from error
         try:
             progress = declared(_Progress, data, str(path))
-            draws = declared(_Generator, generator, f"{path}: rng")
             tensors_like(self.network.state_dict(), parts["network"], str(path))
             _refuse_other_moments(parts["optimiser"], self.optimiser, str(path))
         except InputError as error:
             raise InputError(f"{error}; it is not a run of this mode: give another --out, or resume=False") from error
         self.network.load_state_dict(parts["network"])
-        self.optimiser.load_state_dict(parts["optimiser"])
-        self.rng.bit_generator.state = draws.model_dump()
+        groups = [dict(group) for group in self.optimiser.state_dict()["param_groups"]]
+        self.optimiser.load_state_dict({**parts["optimiser"], "param_groups": groups})
         self.step, self.seconds, self.curve = progress.step, progress.seconds, [dict(p) for p in progress.curve]
         self.resumed_at = [*progress.resumed_at, self.step]
+
+
+def _plain_groups(state: dict[str, Any]) -> dict[str, Any]:
+    """An optimiser's state with its rates of learning as numbers, as on a processor."""
+    groups = [{**group, "lr": float(group["lr"]), "capturable": False} for group in state["param_groups"]]
+    return {**state, "param_groups": groups}
 
 
 class _Progress(Declared):
@@ -196,23 +205,9 @@ class _Progress(Declared):
     resumed_at: list[Whole]
 
 
-class _Words(Declared):
-    state: Annotated[int, Field(ge=0, lt=2**128)]
-    inc: Annotated[int, Field(ge=0, lt=2**128)]
-
-
-class _Generator(Declared):
-    """numpy's PCG64."""
-
-    bit_generator: Literal["PCG64"]
-    state: _Words
-    has_uint32: Literal[0, 1]
-    uinteger: Annotated[int, Field(ge=0, lt=2**32)]
-
-
 def _refuse_other_moments(found: Any, optimiser: torch.optim.Optimizer, where: str) -> None:
     """Raises InputError unless `found` is the state of an Adam of the same parameters."""
-    ours = optimiser.state_dict()["param_groups"]
+    ours = _plain_groups(optimiser.state_dict())["param_groups"]
     groups = found.get("param_groups") if isinstance(found, dict) else None
     settings = [{name: v for name, v in group.items() if name != "lr"} for group in ours]
     if not isinstance(groups, list) or not all(isinstance(group, dict) for group in groups):
@@ -230,34 +225,32 @@ def _refuse_other_moments(found: Any, optimiser: torch.optim.Optimizer, where: s
         tensors_like({"step": torch.zeros(()), "exp_avg": like, "exp_avg_sq": like}, moment, f"{where}: optimiser")
 
 
-def _loop(
-    config: TrainConfig,
-    recipe: Recipe,
-    run: _Run,
-    pool: SamplePool,
-    feed: ClipFeed,
-    progress: bool,
-) -> Path:
-    loss_of = _clean_interval_loss if recipe.target == "clean_inverse_interval" else _light_loss
+def _loop(config: TrainConfig, recipe: Recipe, run: _Run, progress: bool) -> Path:
+    device = torch.device(config.device)
+    compiled = device.type == "cuda"
+    seed = config.seed + run.step  # a resumed run meets other streams
+    torch.backends.cudnn.benchmark = True
+    bank = Bank.drawn(config.seed, device, progress=progress)
+    streams = source(
+        recipe, seed=seed, taken=config.batch, patch=config.patch, device=device, bank=bank, compiled=compiled
+    )
+    judge = Judge(recipe, config.seed + VALIDATION_SEED, device)
     before, began, saved = run.seconds, time.monotonic(), time.monotonic()
     bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
     losses: list[Tensor] = []
+    step = stepper(run, streams, PASSES[config.mode])
     while (done := _done(config, run)) < 1.0:
-        if run.step and run.step % config.steps_per_clip == 0:
-            pool.add(next(feed))
         _set_rate(run.optimiser, config.lr, run.step, done)
-        losses.append(_step(run, pool.batch(run.rng, config.batch, config.patch), loss_of))
+        losses.append(step())
         run.step += 1
         run.seconds = before + time.monotonic() - began
         bar.update()
-        if run.step % config.refresh_every == 0:
-            knows_gain = run.step > config.refresh_every
-            scores = validate(recipe, run.network, config.seed + VALIDATION_SEED, knows_gain)
+        if run.step % config.validate_every == 0:
+            scores = judge.scores(run.network)
             loss = float(torch.stack(losses).mean())
             run.curve.append({"step": run.step, "seconds": run.seconds, "loss": loss, **scores})
             losses.clear()
-            bar.set_postfix(loss=loss, light_db=scores["network_vs_light_db"])
-            feed.weights = _refresh(config, recipe, run)
+            bar.set_postfix(loss=loss, network_db=scores["network_db"])
             _save(config, recipe, run)
             saved = time.monotonic()
         elif time.monotonic() - saved > config.save_every_s:
@@ -275,69 +268,48 @@ def _done(config: TrainConfig, run: _Run) -> float:
 def _set_rate(optimiser: torch.optim.Optimizer, lr: float, step: int, done: float) -> None:
     rate = lr * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
     for group in optimiser.param_groups:
-        group["lr"] = rate
+        if isinstance(group["lr"], Tensor):
+            group["lr"].fill_(rate)
+        else:
+            group["lr"] = rate
 
 
-def _step(run: _Run, batch: Batch, loss_of: Callable[[Tensor, Tensor], Tensor]) -> Tensor:
-    """One step of the network; its loss, which a GPU need not have worked out yet."""
-    with torch.autocast(batch.spikes.device.type, torch.bfloat16):
-        predicted = run.network(batch.spikes.to(torch.bfloat16), batch.planes.float())
-    loss = loss_of(predicted.float(), batch.target.float())
-    run.optimiser.zero_grad(set_to_none=True)
-    loss.backward()
-    nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
-    run.optimiser.step()
-    return loss.detach()
+def stepper(run: _Run, streams: Source, passes: int) -> Callable[[], Tensor]:
+    """A function that takes one step and returns its loss, which a GPU need not have worked out yet."""
+
+    def step() -> Tensor:
+        run.optimiser.zero_grad(set_to_none=True)
+        loss = streams.loss(run.network, passes)
+        loss.backward()
+        nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
+        run.optimiser.step()
+        return loss.detach()
+
+    return captured(step, streams.streams.device, streams.streams.rng)
 
 
-def _clean_interval_loss(predicted: Tensor, target: Tensor) -> Tensor:
-    return (predicted - target).square().mean()
+class Judge:
+    """Held-out streams, the same at every validation."""
 
+    def __init__(self, recipe: Recipe, seed: int, device: torch.device) -> None:
+        self._recipe, self._seed, self._device = recipe, seed, device
+        self._bank = Bank.drawn(seed, device, textures=32, units=16)
 
-def _light_loss(predicted: Tensor, target: Tensor) -> Tensor:
-    return ((predicted - target).square() / (target + 0.05)).mean()
-
-
-def validate(recipe: Recipe, network: nn.Module, seed: int, knows_gain: bool = True) -> dict[str, float]:
-    """Error over held-out windows, as PSNR [dB] against light 1.0: network, noisy 1/ISI and the window's mean rate.
-
-    Against the true light in each covered frame, and against what the network is taught.  The network runs over each
-    clip from its start, as online.
-    """
-    network.eval()
-    guide = network if knows_gain and recipe.layout.gain_memory else None
-    sums: dict[str, float] = {}
-    for number in range(VALIDATION_CLIPS):
-        for sample in draw_clip(recipe, seed, number, guide)[:3]:
-            window = Window(0, len(sample.light), sample.spikes, sample.planes.astype(np.float32))
-            guesses = {
-                "network": infer.rates(network, window, torch.bfloat16),
-                "interval": window.planes[: window.count],
-                "mean": window.spikes.mean(axis=0, keepdims=True, dtype=np.float32),
-            }
-            for name, guess in guesses.items():
-                for reference in ("light", "target"):
-                    error = np.square(guess - getattr(sample, reference).astype(np.float32)).mean()
-                    sums[f"{name}_vs_{reference}_db"] = sums.get(f"{name}_vs_{reference}_db", 0.0) + float(error)
-    network.train()
-    return {name: round(-10 * float(np.log10(total / (3 * VALIDATION_CLIPS))), 3) for name, total in sums.items()}
-
-
-def _rollout(config: TrainConfig, recipe: Recipe, step: int) -> Path | None:
-    """The network written down last, if there is one."""
-    path = config.out / f"rollout-{step // config.refresh_every * config.refresh_every}.pt"
-    return path if recipe.layout.gain_memory and path.exists() else None
-
-
-def _refresh(config: TrainConfig, recipe: Recipe, run: _Run) -> Path | None:
-    """Write the network down for the clips to come; older ones go."""
-    if not recipe.layout.gain_memory:
-        return None
-    path = config.out / f"rollout-{run.step}.pt"
-    save_weights(path, config.mode, recipe, run.network, {"knows_gain": run.step > config.refresh_every})
-    for old in sorted(config.out.glob("rollout-*.pt"), key=os.path.getmtime)[:-2]:
-        old.unlink()
-    return path
+    def scores(self, network: nn.Module) -> dict[str, float]:
+        """PSNR against light 1.0 [dB] of the network and what it is compared with, each along whole streams."""
+        network.eval()
+        streams = source(
+            self._recipe,
+            seed=self._seed,
+            taken=VALIDATION_STREAMS,
+            pool=1,
+            patch=64,
+            device=self._device,
+            bank=self._bank,
+        )
+        errors = streams.errors(network, VALIDATION_PASSES)
+        network.train()
+        return {f"{name}_db": round(-10 * math.log10(max(error, 1e-12)), 3) for name, error in errors.items()}
 
 
 def _save(config: TrainConfig, recipe: Recipe, run: _Run) -> Path:
@@ -380,8 +352,8 @@ def _plot(curve: list[dict[str, float]], path: Path) -> None:
 
     figure = Figure(figsize=(6, 4))
     axes = figure.subplots()
-    for name in ("network", "interval", "mean"):
-        axes.plot([p["step"] for p in curve], [p[f"{name}_vs_light_db"] for p in curve], label=name)
+    for name in sorted({key for point in curve for key in point if key.endswith("_db")}):
+        axes.plot([p["step"] for p in curve], [p[name] for p in curve], label=name.removesuffix("_db"))
     axes.set(xlabel="step", ylabel="PSNR against the true light [dB]")
     axes.legend()
     with whole_file(path) as beside:

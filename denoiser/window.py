@@ -9,7 +9,7 @@ A pass of the network covers `planes` frames b .. b + planes (b a multiple of `p
              until the first spike has come);
              running means e <- e + (s - e) / m over all frames up to the window's end, one for each memory m,
              corrected for the short past at the start (divided by 1 - (1 - 1/m)^frames);
-             the pixel's gain (where the layout asks for it), see below.
+             the pixel's gain, and whether it is known (where the layout asks for them), see below.
 
 A rate from n whole intervals errs by about 1/(t_n - t_0), a count by 1/window: for dim pixels that is less by the
 rate itself.  The running means carry what no window holds: pixels darker than one spike a window, and the
@@ -21,7 +21,9 @@ Gain.  Where things move, the ratio of a pixel's spikes to its denoised rate, bo
 
 is the pixel's fixed pattern: light passes, the pattern stays (correlation with the true gain 0.92 after 256 frames in
 slow and fast scenes, 0.83 in still ones, which leave texture in it).  The rate planes are divided by g and the
-plane 4 (g - 1) is added.  The sums forget with the layout's `gain_memory`; `learn` feeds them the network's own rates.
+planes 4 (g - 1) and 0 are added.  The sums forget with the layout's `gain_memory`; `learn` feeds them the network's own
+rates.  Where a calibration map gives the pixel's gain and dark rate, the planes are (plane - dark) / gain, and 1 is added
+instead of 0: texture and pattern are then told apart in still scenes too.
 
 Edges: before the first and after the last frame the spikes are mirrored (frame -1 - i is frame i); the planes use
 real frames only.  The state is the frames of one window, the last spike before it, the running means and the sums.
@@ -29,8 +31,10 @@ real frames only.  The state is the frames of one window, the last spike before 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Container, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -38,6 +42,48 @@ from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
+
+WINDOW_PRIOR = 2.0
+"""Spikes that a pixel's gain of 1 weighs against what the sums say."""
+
+
+@dataclass(frozen=True)
+class PixelMap:
+    """A calibrated unit: its light l fires gain * l + dark times a frame.
+
+    gain, dark: (H, W) float32; gain 0.01 to 100; dark [spikes/frame], 0 to 1.
+    Raises InputError for other shapes, and for values that are not finite or out of range.
+    """
+
+    gain: NDArray[np.float32]
+    dark: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        gain, dark = (np.ascontiguousarray(value, np.float32) for value in (self.gain, self.dark))
+        if gain.ndim != 2 or gain.shape != dark.shape or not gain.size:
+            raise InputError(f"a calibration map has gain and dark of one shape (H, W); got {gain.shape}, {dark.shape}")
+        if not (np.all((gain >= 0.01) & (gain <= 100)) and np.all((dark >= 0) & (dark <= 1))):
+            raise InputError("a calibration map must have gains from 0.01 to 100 and dark rates from 0 to 1")
+        object.__setattr__(self, "gain", gain)
+        object.__setattr__(self, "dark", dark)
+
+    @classmethod
+    def of(cls, unit: Any) -> PixelMap:
+        """A map as it is, or of a pair (gain, dark).  Raises InputError for anything else."""
+        if isinstance(unit, cls):
+            return unit
+        try:
+            gain, dark = unit
+            return cls(np.asarray(gain, np.float32), np.asarray(dark, np.float32))
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"unit is {type(unit).__name__}; give a PixelMap or a pair of maps (gain, dark)"
+            ) from error
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of both maps."""
+        return hashlib.sha256(self.gain.tobytes() + self.dark.tobytes()).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -49,7 +95,7 @@ class WindowLayout:
     future: int = 20
     half_widths: tuple[int, ...] = ()
     memories: tuple[float, ...] = ()
-    gain_memory: float = 0.0  # frames; 0: no gain plane
+    gain_memory: float = 0.0  # frames; 0: no gain planes
 
     @property
     def span(self) -> int:
@@ -59,7 +105,13 @@ class WindowLayout:
     @property
     def layers(self) -> int:
         """Rate planes given beside the spikes."""
-        return self.planes + len(self.half_widths) + len(self.memories) + (self.gain_memory > 0)
+        return self.planes + len(self.half_widths) + len(self.memories) + 2 * (self.gain_memory > 0)
+
+    @property
+    def means(self) -> tuple[int, int]:
+        """Which of the layers are running means: the first, and the last + 1."""
+        first = self.planes + len(self.half_widths)
+        return first, first + len(self.memories)
 
     @property
     def latency(self) -> int:
@@ -80,10 +132,13 @@ class Window:
 class RollingWindow:
     """Cuts a stream that comes in chunks of any length into passes; the cut does not depend on the chunks."""
 
-    def __init__(self, layout: WindowLayout, shape: tuple[int, int]) -> None:
+    def __init__(
+        self, layout: WindowLayout, shape: tuple[int, int], unit: PixelMap | None = None, first: int = 0
+    ) -> None:
         self.layout = layout
         self.shape = shape
-        self.start = 0  # first frame of the next pass
+        self.unit = unit
+        self.start = first  # first frame of the next pass
         self.seen = 0  # frames pushed
         self._frames = np.empty((0, *shape), np.uint8)  # the last frames, up to `seen`
         self._last = np.full(shape, -1, np.int32)  # last spike before the window
@@ -158,13 +213,23 @@ class RollingWindow:
             weight = 1.0 - (1.0 - 1.0 / memory) ** self._averaged
             planes[layout.planes + len(layout.half_widths) + i] = self._means[i] * np.float32(1.0 / weight)
         if layout.gain_memory > 0:
-            gain = np.clip((self._sums[0] + 2) / (self._sums[1] + 2), 0.5, 2.0)
-            planes[:-1] /= gain
-            planes[-1] = 4 * (gain - 1)
+            self._calibrate(planes)
         spikes = known
         if first < 0 or stop > self.seen:
             spikes = known[_mirror(np.arange(first, stop), self.seen) - known_first]
         return Window(self.start, min(layout.planes, self.seen - self.start), spikes, planes)
+
+    def _calibrate(self, planes: NDArray[np.float32]) -> None:
+        """Take the pixel's gain out of the planes and say what it is; in place."""
+        if self.unit is None:
+            gain = np.clip((self._sums[0] + WINDOW_PRIOR) / (self._sums[1] + WINDOW_PRIOR), 0.5, 2.0)
+        else:
+            gain = self.unit.gain
+            planes[:-2] -= self.unit.dark
+            np.maximum(planes[:-2], 0.0, out=planes[:-2])
+        planes[:-2] /= gain
+        planes[-2] = 4 * (gain - 1)
+        planes[-1] = 0.0 if self.unit is None else 1.0
 
     def _advance(self) -> None:
         """Move on by one pass; frames that leave the window leave their last spike."""
@@ -195,14 +260,6 @@ def check_like(found: Any, ours: Any, name: str, *, lengths: bool = True) -> Non
     if not alike:
         kind = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else type(found).__name__
         raise InputError(f"{name} of the state is {kind}; the state is of another stream, or damaged")
-
-
-def without_gain(window: Window) -> Window:
-    """The window as it would be at gain 1."""
-    planes = window.planes.copy()
-    planes[:-1] *= 1 + planes[-1] / 4
-    planes[-1] = 0.0
-    return replace(window, planes=planes)
 
 
 def _mirror(frames: NDArray[np.int64], count: int) -> NDArray[np.int64]:

@@ -1,27 +1,30 @@
-"""`spikecam evaluate`: how much a denoiser helps, on scenes it has not seen."""
+"""`spikecam evaluate`: how much a denoiser helps."""
 
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
 from spikecam_env.checked import checked_count
+from spikecam_env.cli.evaluate_spikezoo import SpikeZoo
+from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
+from spikecam_env.cli.evaluate_truth import Truth
 from spikecam_env.cli.options import Checked, Seed
 
 
 @dataclass
-class Evaluate:
+class Quick:
     """Compare noisy, denoised (both modes) and clean-twin streams on held-out scenes.
+
+    Held-out textures, speeds and light levels, TFP 21 and 41, against true light and the clean twin.
 
     example:  spikecam evaluate quick --out evaluation
     """
 
-    what: tyro.conf.Positional[Literal["quick"]] = "quick"
-    """quick: held-out textures, speeds and light levels, TFP 21 and 41, against true light and the clean twin."""
     out: Path | None = None
     """Folder for evaluate.json and evaluate.txt."""
     paper: Path | None = None
@@ -43,3 +46,25 @@ class Evaluate:
         print(report(result), end="")
         if self.out is not None:
             print(f"wrote evaluate.json and evaluate.txt in {self.out}")
+
+
+@dataclass
+class Evaluate:
+    """How much a denoiser helps (docs/tables.md, docs/evaluation.md).
+
+    example:  spikecam evaluate quick --out evaluation
+    """
+
+    what: (
+        Annotated[Quick, tyro.conf.subcommand("quick", prefix_name=False)]
+        | Annotated[Table1, tyro.conf.subcommand("table1", prefix_name=False)]
+        | Annotated[Table2, tyro.conf.subcommand("table2", prefix_name=False)]
+        | Annotated[Table3, tyro.conf.subcommand("table3", prefix_name=False)]
+        | Annotated[Table4, tyro.conf.subcommand("table4", prefix_name=False)]
+        | Annotated[StillScenes, tyro.conf.subcommand("still", prefix_name=False)]
+        | Annotated[SpikeZoo, tyro.conf.subcommand("spikezoo", prefix_name=False)]
+        | Annotated[Truth, tyro.conf.subcommand("truth", prefix_name=False)]
+    ) = field(default_factory=Quick)
+
+    def run(self) -> None:
+        self.what.run()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import tyro
 
 from spikecam_env.cli.camera import Camera
-from spikecam_env.cli.options import Count, Positive, Seed, Size
+from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
 from spikecam_env.errors import InputError
 
 if TYPE_CHECKING:
@@ -55,6 +55,8 @@ class FilmToSpikes:
     camera: Camera = field(default_factory=Camera)
     seed: Seed = 0
     """Seed of the camera unit and its noise."""
+    truth_every: Whole = 0
+    """Frames between ground truths (the film's light) in an .h5 file; 0: none."""
 
     def run(self) -> None:
         from scenes import VideoScene
@@ -62,7 +64,7 @@ class FilmToSpikes:
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
 
-        check_out(self.out, self.frames or 1, self.size)
+        check_out(self.out, self.frames or 1, self.size, self.truth_every)
         model = self.camera.load()
         sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
         asked = self._frames_asked(model.frame_rate_hz)
@@ -82,7 +84,8 @@ class FilmToSpikes:
         check_out(self.out, frames, self.size)
         attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
         attributes |= {"film": self.film.name, "transfer": scene.transfer, "gain": scene.gain}
-        spikes = record_scene(self.out, scene, sensor, frames, f"record {self.film.name}", attributes)
+        what = f"record {self.film.name}"
+        spikes = record_scene(self.out, scene, sensor, frames, what, attributes, self.truth_every)
         done = self._done(scene, frames, sensor.engine, spikes)
         print(table([{"film to spikes": name, "": value} for name, value in done.items()]))
 

@@ -17,6 +17,7 @@ from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.entry import say
 from spikecam_env.cli.evaluate import Evaluate
+from spikecam_env.cli.export import Export
 from spikecam_env.cli.film_to_spikes import FilmToSpikes
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.options import check_options
@@ -43,6 +44,7 @@ COMMANDS: dict[str, Any] = {
     "film": FilmToSpikes,
     "scenes": Scenes,
     "dataset": Dataset,
+    "export": Export,
     "denoise": Denoise,
     "train": Train,
     "evaluate": Evaluate,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from spikecam_env.cli.camera import Camera
-from spikecam_env.cli.options import Count, Rpm, Seed, Size
+from spikecam_env.cli.options import Count, Rpm, Seed, Size, Whole
 
 
 @dataclass
@@ -30,6 +30,8 @@ class Record:
     """Rows and columns."""
     seed: Seed = 0
     """Seed of the camera unit, its noise and the scene."""
+    truth_every: Whole = 0
+    """Frames between ground truths (radiance, flow, object number ...) in an .h5 file; 0: none."""
 
     def run(self) -> None:
         from spikecam_env.cli.named_scene import scene_named
@@ -37,11 +39,12 @@ class Record:
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
 
-        check_out(self.out, self.frames, self.size)
+        check_out(self.out, self.frames, self.size, self.truth_every)
         model = self.camera.load()
         sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
         scene = scene_named(self.scene, self.size, self.seed, model.frame_rate_hz, self.rpm)
         attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
-        spikes = record_scene(self.out, scene, sensor, self.frames, f"record {self.scene}", attributes)
+        what = f"record {self.scene}"
+        spikes = record_scene(self.out, scene, sensor, self.frames, what, attributes, self.truth_every)
         rate = spikes / (self.frames * math.prod(self.size))
         print(table([{"file": str(self.out), "frames": self.frames, "engine": sensor.engine, "spikes/frame": rate}]))

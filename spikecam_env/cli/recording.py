@@ -21,14 +21,16 @@ BLOCK = 64
 HDF5 = (".h5", ".hdf5")
 
 
-def check_out(out: Path, frames: int, shape: tuple[int, int]) -> None:
-    """Errors: InputError for a file type that no recording has, a place that cannot be written to, and more frames than
-    the disk has room for, or for a .npz the memory."""
+def check_out(out: Path, frames: int, shape: tuple[int, int], truth_every: int = 0) -> None:
+    """Errors: InputError for a file type that no recording has, or that has no room for truth where there is to be
+    some, a place that cannot be written to, and more frames than the disk has room for, or for a .npz the memory."""
     from spikecam_env.streams.packing import packed_bytes
 
     suffix = out.suffix.lower()
     if suffix not in (*HDF5, ".dat", ".npz"):
         raise InputError(f"--out {out}: unknown file type {suffix!r}; use .h5, .dat or .npz")
+    if truth_every and suffix not in HDF5:
+        raise InputError(f"--out {out}: truth (--truth-every {truth_every}) is kept in .h5 files only")
     check_file(out)
     if suffix == ".npz":
         checked_memory(2 * frames * math.prod(shape), f"{frames} frames in a .npz")
@@ -37,31 +39,44 @@ def check_out(out: Path, frames: int, shape: tuple[int, int]) -> None:
 
 
 def record_scene(
-    out: Path, scene: Scene, sensor: SpikeSensor, frames: int, what: str, attributes: dict[str, object]
+    out: Path,
+    scene: Scene,
+    sensor: SpikeSensor,
+    frames: int,
+    what: str,
+    attributes: dict[str, object],
+    truth_every: int = 0,
 ) -> int:
     """Write `frames` frames of spikes to a .h5, .dat or .npz file, which appears whole; returns how many spikes.
 
     Beside a .dat file, its geometry and frame rate go to `<name>.dat.json`, so that it opens without options.
 
-    what: for the progress bar.  attributes: of a .h5 file.
+    what: for the progress bar.  attributes: of a .h5 file.  truth_every: frames between ground truths in it; 0: none.
     """
     from tqdm import trange
 
+    from spikecam_env.datasets.write import truth_frames
+
     spikes = 0
-    with _appending(out, sensor, attributes) as append:
+    with _appending(out, scene, sensor, attributes) as (append, append_truth):
         for start in trange(0, frames, BLOCK, desc=what, unit="block", leave=False):
             count = min(BLOCK, frames - start)
             block = sensor.step(scene.radiance(start, start + count), count)
             append(block)
+            for frame in truth_frames(truth_every, start, start + count):
+                append_truth(frame)
             spikes += int(block.sum())
     return spikes
 
 
 @contextmanager
-def _appending(out: Path, sensor: SpikeSensor, attributes: dict[str, object]) -> Iterator[Callable[[Any], object]]:
-    """A function that takes (T, H, W) spikes, block after block."""
+def _appending(
+    out: Path, scene: Scene, sensor: SpikeSensor, attributes: dict[str, object]
+) -> Iterator[tuple[Callable[[Any], object], Callable[[int], object]]]:
+    """A function that takes (T, H, W) spikes, block after block, and one that adds the truth of a frame (.h5 only)."""
     import numpy as np
 
+    from spikecam_env.datasets.write import append_truth
     from spikecam_env.streams import SpikeWriter, pack_frames, save_npz
     from spikecam_env.streams.side_file import write_side_file
     from spikecam_env.whole import whole_file
@@ -69,13 +84,17 @@ def _appending(out: Path, sensor: SpikeSensor, attributes: dict[str, object]) ->
     suffix = out.suffix.lower()
     if suffix in HDF5:
         with SpikeWriter(out, sensor.shape, sensor.model.frame_rate_hz, **attributes) as writer:
-            yield writer.append
+            yield writer.append, lambda frame: append_truth(writer, scene, frame)
     elif suffix == ".dat":
         with whole_file(out) as beside, beside.open("wb") as file:
-            yield lambda block: file.write(pack_frames(block).tobytes())
+            yield lambda block: file.write(pack_frames(block).tobytes()), _no_truth
         rows, columns = sensor.shape
         write_side_file(out, {"height": rows, "width": columns, "frame_rate_hz": sensor.model.frame_rate_hz})
     else:
         blocks: list[Any] = []
-        yield blocks.append
+        yield blocks.append, _no_truth
         save_npz(out, np.concatenate(blocks))
+
+
+def _no_truth(frame: int) -> None:
+    raise AssertionError("check_out lets truth into .h5 files only")

@@ -1,4 +1,4 @@
-"""`spikecam train`: train a denoiser on pairs simulated on the fly."""
+"""`spikecam train`: train a denoiser along simulated streams."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Train:
     """Train DnSS on noisy and clean streams simulated on the fly; goes on from its last checkpoint.
 
     example:  spikecam train --mode best --out runs/best
-    on a GPU: spikecam train --mode best --device cuda --batch 64 --workers 12 --refresh-every 4000 --out runs/best
+    on a GPU: spikecam train --mode best --device cuda --batch 96 --minutes 10 --out runs/best
     """
 
     out: Path
@@ -27,21 +27,19 @@ class Train:
     minutes: Positive | None = None
     """End by the clock instead."""
     batch: Annotated[int, Checked(checked_count, most=65_536)] = 16
-    """Patches a step, 64 x 64 pixels."""
+    """Streams a step, 64 x 64 pixels each."""
     lr: Annotated[float, Checked(checked_number, least=0.0, most=1.0, above=True)] = 1e-3
     """Highest rate of learning."""
     seed: Seed = 0
     """Seed of network, scenes, cameras and noise."""
     threads: Workers = 2
-    """Threads of the network, on a processor."""
+    """Threads, on a processor."""
     device: str = "cpu"
-    """Where the network learns: cpu, cuda, cuda:1."""
-    workers: Workers = 1
-    """Processes that simulate beside it; a GPU needs a dozen to be kept busy."""
-    steps_per_clip: Count = 8
-    """Steps between new clips."""
-    refresh_every: Count = 1000
-    """Steps between validations, and between new networks for the gain."""
+    """Where streams and network are: cpu, cuda, cuda:1."""
+    refine: bool = True
+    """`paper` with its refine module, or for the ablation without."""
+    validate_every: Count = 1000
+    """Steps between validations."""
     resume: bool = True
     """Go on from the folder's checkpoint where there is one."""
 

@@ -58,21 +58,24 @@ def write_scene(plan: Plan, entry: Entry, folder: Path) -> Iterator[int | Writte
                 twin.step(light, count, out=clean[:count])
             with clock.on("file"):
                 writer.append(noisy[:count], clean[:count])
-            for frame in truth_frames(plan, start, start + count):
+            for frame in truth_frames(plan.truth_every, start, start + count):
                 with clock.on("truth"):
-                    instant = frame + 0.5
-                    writer.append_truth(instant, **_truth(scene, instant))
+                    append_truth(writer, scene, frame)
             yield count
     with clock.on("digest"):
         digest = sha256_of(path)
     yield Written(entry, path.stat().st_size, digest, clock.seconds, time.process_time() - begun)
 
 
-def truth_frames(plan: Plan, start: int, stop: int) -> range:
-    """Frames of start .. stop whose ground truth is kept."""
-    if plan.truth_every == 0:
-        return range(0)
-    return range(-(-start // plan.truth_every) * plan.truth_every, stop, plan.truth_every)
+def truth_frames(every: int, start: int, stop: int) -> range:
+    """Frames of start .. stop whose ground truth is kept: every so many, 0 for none."""
+    return range(-(-start // every) * every, stop, every) if every else range(0)
+
+
+def append_truth(writer: SpikeWriter, scene: Scene, frame: int) -> None:
+    """Add the ground truth in the middle of a frame to a recording."""
+    instant = frame + 0.5
+    writer.append_truth(instant, **_truth(scene, instant))
 
 
 def sha256_of(path: Path, progress: Callable[[int], object] | None = None) -> str:

@@ -94,7 +94,11 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
         (("denoise", "good.dat", "--window", "4"), "--window 4"),
         (("denoise", "good.dat", "--out", "good.dat"), "good.dat"),
         (("train", "--out", "runs", "--steps", "0"), "steps 0"),
-        (("evaluate", "--best", "text.npz"), "text.npz"),
+        (("evaluate", "quick", "--best", "text.npz"), "text.npz"),
+        (("evaluate", "truth", "--static", "text.npz"), "text.npz"),
+        (("evaluate", "spikezoo", "."), "no folder spike"),
+        (("export", "broken.h5", "--out", "zoo"), "broken.h5"),
+        (("record", "--out", "x.dat", "--truth-every", "10"), "kept in .h5 files only"),
     ],
 )
 def test_what_is_wrong_ends_in_one_line_and_code_2(args, message: str, tmp_path: Path, monkeypatch, capsys) -> None:

@@ -81,10 +81,14 @@ def _clip(recipe):
 
 
 def _evaluation(**options) -> dict[str, object]:
-    from denoiser import evaluate
+    from denoiser.evaluate import quick
 
-    evaluate._write(Path(options["out"]), {"figures": list(range(3000))})
+    quick._write(Path(options["out"]), {"figures": list(range(3000))})
     return {}
+
+
+def _result(*_: object, **__: object) -> dict[str, object]:
+    return {"figures": list(range(3000))}
 
 
 def _film(*_: object) -> list[np.ndarray]:
@@ -113,6 +117,15 @@ TRAINING: Work = {
 EVALUATION: Work = {
     "denoiser.evaluate:evaluate_quick": _evaluation,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,
+    "denoiser.evaluate.quick:report": lambda _: "figures\n" * 200,
+}
+SPIKEZOO: Work = {
+    "denoiser.evaluate.spikezoo:evaluate_spikezoo": _result,
+    "denoiser.evaluate.spikezoo:report": lambda _: "figures\n" * 200,
+}
+TRUTH: Work = {
+    "denoiser.evaluate.truth:evaluate_truth": _result,
+    "denoiser.evaluate.truth:report": lambda _: "figures\n" * 200,
 }
 CALIBRATION: Work = {"spikecam_env.calibration:calibrate": cache(calibrate)}
 DIAGNOSIS: Work = {"spikecam_env.gap.diagnose:diagnose": lambda *_, **__: made_up._plain("none", "No gap.")}
@@ -138,6 +151,14 @@ WRITINGS: dict[str, Writing] = {
     "dataset": Writing(f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}),
     "train": Writing("train --out {out} --steps 2 --batch 2", "run", TRAINING),
     "evaluate": Writing("evaluate quick --out {out}", "evaluation", EVALUATION),
+    "evaluate table": Writing(
+        f"evaluate table1 --out {{out}} --rows noisy --scenes disk --seeds 1 --frames 200 {' '.join(SMALL)}",
+        "table",
+        {},
+    ),
+    "evaluate spikezoo": Writing("evaluate spikezoo {recordings} --out {out}", "evaluation", SPIKEZOO),
+    "evaluate truth": Writing("evaluate truth --out {out}", "evaluation", TRUTH),
+    "export": Writing("export {recording} --frames 33 --out {out}", "exported", {}),
     "calibrate": Writing("calibrate {campaign} --out {out}", "calibrated", CALIBRATION),
     "campaign simulate": Writing(
         "campaign simulate {out} --shape 16 16 --frames 400 --recording flat:radiance=0.3", "campaign", {}
@@ -166,7 +187,7 @@ def inputs_in(folder: Path) -> dict[str, Path]:
     made = {"recording": recordings / "disk.h5", "recordings": recordings, "campaign": folder / "campaign"}
     made["film"] = folder / "film.npy"
     np.save(made["film"], np.random.default_rng(0).integers(0, 255, (9, 24, 40), dtype=np.uint8))
-    assert run(["record", "--out", str(made["recording"]), "--frames", "64", *SMALL]) == 0
+    assert run(["record", "--out", str(made["recording"]), "--frames", "64", "--truth-every", "16", *SMALL]) == 0
     levels = [word for level in ("0.1", "0.2", "0.4") for word in ("--recording", f"flat:radiance={level}")]
     simulate = ["campaign", "simulate", str(made["campaign"]), "--shape", "16", "16", "--frames", "800"]
     assert run([*simulate, "--recording", "dark", *levels]) == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import tempfile
 from pathlib import Path
 
 import h5py
@@ -13,6 +14,9 @@ import pytest
 from mutations import damaged, json_files, npz, npz_files, toml_files
 from tally import reads_or_refuses
 
+from denoiser.evaluate.work import FORMAT, Results
+from denoiser.reconstruct.recipe import WIDTH_STEP, reconstructor_recipe
+from denoiser.reconstruct.weights import load_reconstructor, save_reconstructor
 from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.calibration import write_flats
 from spikecam_env.campaign import read_campaign
@@ -69,6 +73,21 @@ SPIKES = (RNG.random((FRAMES, *SHAPE)) < 0.3).astype(np.uint8)
 STREAM = {"spikes": SPIKES, "time_axis": np.array(0)}
 MAPS = {"D_light": np.full(SHAPE, 3.0), "Nd": np.full(SHAPE, 2.0)}
 PACKED = {"seq": np.packbits(SPIKES[:40], axis=0, bitorder="big"), "length": np.array(40)}
+
+
+EVALUATION = {"shape": [8, 8], "frames": 200, "data": None}
+RESULT = {
+    "scene": "disk",
+    "seed": 0,
+    "interval": 10.0,
+    "speed": 0.0,
+    "row": "best",
+    "weights": {"best": "0" * 64, "spk2img-clean": None},
+    "pictures": {"tfi": {"db": 20.0, "ssim": 0.5, "niqe": None}},
+    "mean_plane": {"db": 30.0, "ssim": 0.9, "niqe": None},
+    "bias": 0.01,
+    "db_by_place": [30.0, None],
+}
 
 
 def cases(files):
@@ -347,7 +366,10 @@ def test_a_malformed_manifest_is_refused(data: bytes, tmp_path: Path, meets) -> 
         ("spikes .dat (denoise)", ("denoise", "{bad}.dat", "--out", "{out}")),
         ("spikes .npz (denoise)", ("denoise", "{bad}.npz", "--out", "{out}")),
         ("dataset.json (dataset verify)", ("dataset", "verify", "{bad}")),
-        ("weights .pt (evaluate)", ("evaluate", "--best", "{bad}.pt", "--out", "{out}")),
+        ("weights .pt (evaluate)", ("evaluate", "quick", "--best", "{bad}.pt", "--out", "{out}")),
+        ("spikes .h5 (export)", ("export", "{bad}.h5", "--out", "{out}")),
+        ("spikes .npz (evaluate truth)", ("evaluate", "truth", "--static", "{bad}.npz", "--out", "{out}")),
+        ("clips (evaluate spikezoo)", ("evaluate", "spikezoo", "{bad}.dat", "--out", "{out}")),
     ],
 )
 def test_what_is_no_file_is_refused(kind: str, target: str, args: tuple, tmp_path: Path, meets) -> None:
@@ -376,7 +398,35 @@ def test_the_good_ones_are_good(campaign: Path, recordings: Path, tmp_path: Path
     assert len(Manifest.read(tmp_path).files) == 2
 
 
+@pytest.mark.parametrize("data", cases(json_files({"format": FORMAT, **EVALUATION})))
+def test_a_malformed_head_of_results_is_refused(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "table1.jsonl"
+    path.write_bytes(data.replace(b"\n", b" ") + b"\n" + json.dumps(RESULT).encode())
+    reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+
+
+@pytest.mark.parametrize("data", cases(json_files(RESULT, within=2)))
+def test_a_malformed_result_is_refused(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "table1.jsonl"
+    path.write_bytes(json.dumps({"format": FORMAT, **EVALUATION}).encode() + b"\n" + data.replace(b"\n", b" "))
+    reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+
+
 @pytest.mark.parametrize("data", cases(damaged(pretrained_path("paper").read_bytes())))
 def test_malformed_weights_are_refused(data: bytes, tmp_path: Path) -> None:
     (tmp_path / "x.pt").write_bytes(data)
     reads_or_refuses("weights .pt", lambda: load_weights(tmp_path / "x.pt"))
+
+
+def _reconstructor() -> bytes:
+    """An untrained one; `test_weights_come_back_to_half_precision` reads such a file."""
+    recipe = reconstructor_recipe("ssml", WIDTH_STEP)
+    with tempfile.TemporaryDirectory() as folder:
+        save_reconstructor(Path(folder) / "x.pt", "ssml", recipe, recipe.network(), {})
+        return (Path(folder) / "x.pt").read_bytes()
+
+
+@pytest.mark.parametrize("data", cases(damaged(_reconstructor())))
+def test_malformed_weights_of_a_reconstructor_are_refused(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "x.pt").write_bytes(data)
+    reads_or_refuses("reconstructor .pt", lambda: load_reconstructor(tmp_path / "x.pt"))

@@ -27,6 +27,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from denoiser import accumulate
 from denoiser.metrics import gap_closed, psnr_db, ssim
@@ -71,17 +72,21 @@ def evaluate_quick(
     shape: tuple[int, int] = (96, 96),
     frames: int = 280,
     seed: int = 0,
+    model: SensorModel | None = None,
     out: str | os.PathLike[str] | None = None,
 ) -> dict[str, Any]:
     """Evaluate on the held-out grid: static, slow, fast x bright, middle, dim.
 
-    weights: checkpoint by mode, instead of the shipped ones.  out: a folder for `evaluate.json` and `evaluate.txt`.
+    weights: checkpoint by mode, instead of the shipped ones.  model: of the cameras, default the preset `scsim`.
+    out: a folder for `evaluate.json` and `evaluate.txt`.
     Returns group (`GROUPS`) -> row -> picture -> {light_db, light_ssim, clean_db, clean_ssim, gap_closed}, and
     "settings" (with the mean interval [frames] of each light level).
     """
     denoisers = {m: _denoiser(m, (weights or {}).get(m)) for m in modes}
     scores: list[dict[str, Any]] = []
-    for scene in held_out(scenes_a_class, shape, frames, seed):
+    scenes = held_out(scenes_a_class, shape, frames, seed, model)
+    total = scenes_a_class * len(SPEEDS) * len(LIGHTS)
+    for scene in tqdm(scenes, desc="held-out scenes", unit="scene", total=total, leave=False):
         noisy, clean, oracle = (scene.streams[row] for row in ("noisy", "clean", "oracle"))
         denoised: dict[str, Stream] = {}
         for mode, online in denoisers.items():
@@ -103,8 +108,14 @@ def evaluate_quick(
     return result
 
 
-def held_out(scenes_a_class: int, shape: tuple[int, int], frames: int, seed: int) -> Iterator[HeldOut]:
-    """The held-out scenes, exposed; textures, motions, camera units and noise follow from the seed."""
+def held_out(
+    scenes_a_class: int, shape: tuple[int, int], frames: int, seed: int, model: SensorModel | None = None
+) -> Iterator[HeldOut]:
+    """The held-out scenes, exposed; textures, motions, camera units and noise follow from the seed.
+
+    model: of the cameras, default the preset `scsim`.
+    """
+    camera = SensorModel.preset("scsim") if model is None else model
     textures = held_out_textures(seed)
     for i, (speed, light) in enumerate((s, b) for s in SPEEDS for b in LIGHTS):
         for j in range(scenes_a_class):
@@ -117,7 +128,7 @@ def held_out(scenes_a_class: int, shape: tuple[int, int], frames: int, seed: int
                 contrast=6.0,
                 textures=textures,
             )
-            yield _expose(scene, speed, light, frames, scene_seed)
+            yield _expose(scene, speed, light, frames, scene_seed, camera)
 
 
 def held_out_textures(seed: int, size: int = 256) -> list[Texture]:
@@ -180,9 +191,9 @@ def _whole(online: OnlineDnSS, spikes: Stream) -> tuple[Stream, Stream]:
     return np.concatenate([first, rest]), np.concatenate([first_rates, rest_rates])
 
 
-def _expose(scene: Collage, speed: str, light: str, frames: int, seed: int) -> HeldOut:
+def _expose(scene: Collage, speed: str, light: str, frames: int, seed: int, model: SensorModel) -> HeldOut:
     keys = scene.radiance(0, frames)
-    sensor = SpikeSensor(SensorModel.preset("scsim"), shape=scene.shape, seed=seed, engine="reference")
+    sensor = SpikeSensor(model, shape=scene.shape, seed=seed, engine="reference")
     streams = {
         "noisy": sensor.step(keys, frames=frames),
         "clean": sensor.clean_twin().step(keys, frames=frames),
@@ -260,7 +271,3 @@ def _write(folder: Path, result: dict[str, Any]) -> None:
 def main() -> None:
     """`python -m denoiser.evaluate`: the quick evaluation, printed."""
     print(report(evaluate_quick()))
-
-
-if __name__ == "__main__":
-    main()

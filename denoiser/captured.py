@@ -1,0 +1,37 @@
+"""A step of training that a GPU replays: it is thousands of small kernels, whose launches take longer than they do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+WARM_UPS = 3
+"""Calls before the capture: kernels are chosen and memory is taken in them.  They do what the step does."""
+
+
+def captured(step: Callable[[], Tensor], device: torch.device, generator: torch.Generator) -> Callable[[], Tensor]:
+    """The step; on a GPU recorded once, after WARM_UPS calls of it, and replayed from then on.
+
+    step: the same work at every call, on tensors that stay where they are; its result is copied out.
+    generator: all that the step draws from.
+    """
+    if device.type != "cuda":
+        return step
+    beside = torch.cuda.Stream()
+    beside.wait_stream(torch.cuda.current_stream())
+    with torch.cuda.stream(beside):
+        for _ in range(WARM_UPS):
+            step()
+    torch.cuda.current_stream().wait_stream(beside)
+    graph = torch.cuda.CUDAGraph()
+    graph.register_generator_state(generator)
+    with torch.cuda.graph(graph):
+        found = step()
+
+    def replay() -> Tensor:
+        graph.replay()
+        return found.clone()
+
+    return replay

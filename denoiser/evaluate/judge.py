@@ -1,0 +1,144 @@
+"""One row of one case, judged: pictures against the light or by NIQE, and its rates against the light."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from denoiser.evaluate import measures
+from denoiser.evaluate.exposed import Exposed, Planes, Spikes, picture
+from denoiser.metrics import psnr_db, ssim
+from denoiser.niqe import SMALLEST, niqe
+from spikecam_env.untrusted import Declared, Name, Seed
+
+COLUMNS = {
+    "tfp21": "TFP 21",
+    "tfp41": "TFP 41",
+    "tfi": "TFI",
+    "spk2img-clean": "Spk2Img, clean",
+    "spk2img-noisy": "Spk2Img, noisy",
+}
+"""Pictures that rows are judged under, and their titles."""
+PLANE = "plane"
+"""The column of the rate plane itself."""
+LAST = 41
+"""Frames of the last picture of a stream of spikes."""
+MEAN_EVERY = 5
+"""Of the judged rate planes, one in so many goes into their mean score; prime to 8 and 16 planes a pass."""
+
+
+class Score(Declared):
+    """Of a picture: PSNR [dB] and SSIM against the light, or NIQE where no light is known."""
+
+    db: float | None = None
+    ssim: float | None = None
+    niqe: float | None = None
+
+
+class Record(Declared):
+    """What was found for one row of one case; None where a measure has no value.
+
+    weights: SHA-256 of what it was made with, by name of the row's source and of the columns.
+    pictures: by column, at the middle frame; `plane` is the rate plane.
+    mean_plane: the mean score of all judged rate planes.  bias, lag [frames]: of the row's rates, or of its spikes.
+    db_by_place [dB], flicker, texture: of its rate planes, see `measures`.
+    mean_db, last_db [dB]: where nothing moves, of the mean over all frames, and of the last picture.
+    """
+
+    scene: Name
+    seed: Seed
+    interval: float
+    speed: float
+    row: Name
+    weights: dict[str, str | None]
+    pictures: dict[str, Score]
+    mean_plane: Score | None = None
+    bias: float | None = None
+    lag: float | None = None
+    db_by_place: list[float | None] = Field(default_factory=list)
+    flicker: float | None = None
+    texture: float | None = None
+    mean_db: float | None = None
+    last_db: float | None = None
+
+    @property
+    def key(self) -> tuple[str, int, float, float, str]:
+        """Which row of which case."""
+        return self.scene, self.seed, self.interval, self.speed, self.row
+
+
+def display(radiance: Planes, white: float) -> np.ndarray:
+    """Light as a screen shows it: (H, W) in [0, 1], gamma 2.2."""
+    return np.clip(np.asarray(radiance, np.float64) / white, 0, 1) ** (1 / 2.2)
+
+
+def pictures_of(
+    spikes: Spikes, planes: Planes | None, exposed: Exposed, columns: Mapping[str, Path]
+) -> dict[str, Planes]:
+    """By column: the row's pictures at the middle frame, and its rate plane there.  columns: file of weights of each,
+    which those that need none ignore."""
+    middle = exposed.middle - exposed.first
+    shown = {column: picture(column, spikes, middle, weights) for column, weights in columns.items()}
+    return shown if planes is None else shown | {PLANE: planes[middle]}
+
+
+def judged(
+    shown: dict[str, Planes], spikes: Spikes, planes: Planes | None, exposed: Exposed, passes: int, *, still: bool
+) -> dict[str, Any]:
+    """Entries of a `Record` but for its key and weights."""
+    if exposed.light is None:
+        return {"pictures": {column: _natural(p, exposed.white) for column, p in shown.items()}}
+    truth = exposed.light[exposed.middle - exposed.first]
+    found: dict[str, Any] = {"pictures": {c: _against(p, truth, exposed.white) for c, p in shown.items()}}
+    rates = spikes if planes is None else planes
+    found |= {
+        "bias": plain(measures.bias(rates, exposed.light)),
+        "lag": plain(measures.lag_frames(rates, exposed.light)),
+    }
+    if planes is not None:
+        found |= _of_planes(planes, exposed, passes)
+    return found | (_at_rest(spikes, planes, truth, exposed.white) if still else {})
+
+
+def plain(value: float) -> float | None:
+    """For JSON, which knows neither infinity nor NaN."""
+    return round(float(value), 5) if np.isfinite(value) else None
+
+
+def _against(shown: Planes, truth: Planes, white: float) -> Score:
+    return Score(db=plain(psnr_db(shown, truth, white)), ssim=plain(ssim(shown, truth, white)))
+
+
+def _natural(shown: Planes, white: float) -> Score:
+    return Score(niqe=plain(niqe(display(shown, white)))) if min(shown.shape) >= SMALLEST else Score()
+
+
+def _of_planes(planes: Planes, exposed: Exposed, passes: int) -> dict[str, Any]:
+    light, first, white = exposed.light, exposed.first, exposed.white
+    assert light is not None
+    scores = [_against(p, truth, white) for p, truth in zip(planes[::MEAN_EVERY], light[::MEAN_EVERY], strict=True)]
+    middle = exposed.middle - first
+    return {
+        "mean_plane": Score(db=_mean([s.db for s in scores]), ssim=_mean([s.ssim for s in scores])),
+        "db_by_place": [plain(db) for db in measures.db_by_place(planes, light, passes, first, white)],
+        "flicker": plain(measures.across_over_within(planes, light, passes, first)),
+        "texture": plain(measures.texture_slope(planes[middle], light[middle])),
+    }
+
+
+def _at_rest(spikes: Spikes, planes: Planes | None, truth: Planes, white: float) -> dict[str, Any]:
+    rates = spikes if planes is None else planes
+    last = spikes[-LAST:].mean(axis=0, dtype=np.float32) if planes is None else planes[-1]
+    return {
+        "mean_db": plain(psnr_db(rates.mean(axis=0, dtype=np.float32), truth, white)),
+        "last_db": plain(psnr_db(last, truth, white)),
+    }
+
+
+def _mean(values: list[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return plain(float(np.mean(known))) if known else None

@@ -1,0 +1,77 @@
+"""The picture page of a table: one strip a scene, from what the rows show, noisy to light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib import font_manager
+from PIL import Image, ImageDraw, ImageFont
+
+from denoiser.evaluate.exposed import Case
+from denoiser.evaluate.judge import COLUMNS, PLANE, Record
+from denoiser.evaluate.rows import ROWS
+from denoiser.evaluate.work import LIGHT, picture_path
+from spikecam_env.whole import whole_file
+
+BACKGROUND, INK, FAINT = (16, 18, 22), (235, 238, 242), (150, 158, 170)
+MARGIN, CAPTION = 8, 38
+WIDE = 260
+"""Columns of a picture on the page."""
+COLUMN = "tfp21"
+"""Under which spikes are shown: it needs no network, and blurs less than TFP 41."""
+STRIP = ("noisy", "paper-mus", "paper", "best", "clean")
+
+
+def write_page(path: Path, folder: Path, cases: Sequence[Case], rows: Sequence[str], records: Sequence[Record]) -> None:
+    """Strips of the scenes whose pictures are in `folder`; no page where there are none."""
+    first = {case.scene: case for case in reversed(cases)}
+    strips = [_strip(folder, first[scene], rows, records) for scene in reversed(first)]
+    made = [strip for strip in strips if strip is not None]
+    if not made:
+        return
+    width, height = max(s.width for s in made), sum(s.height for s in made)
+    whole = Image.new("RGB", (width, height), BACKGROUND)
+    top = 0
+    for strip in made:
+        whole.paste(strip, (0, top))
+        top += strip.height
+    with whole_file(path) as beside:
+        whole.save(beside)
+
+
+def _strip(folder: Path, case: Case, rows: Sequence[str], records: Sequence[Record]) -> Image.Image | None:
+    panels = [(row, COLUMN) for row in STRIP if row in rows]
+    panels += [(row, PLANE) for row in rows if ROWS[row].shows_planes]
+    panels.append((LIGHT, LIGHT))
+    shown = [(row, column, picture_path(folder, case, row, column)) for row, column in panels]
+    pictures = [(row, column, Image.open(path)) for row, column, path in shown if path.is_file()]
+    if not pictures:
+        return None
+    w, h = WIDE, round(WIDE / pictures[0][2].width * pictures[0][2].height)
+    strip = Image.new("RGB", (len(pictures) * (w + MARGIN) + MARGIN, h + MARGIN + CAPTION), BACKGROUND)
+    draw = ImageDraw.Draw(strip)
+    for i, (row, column, picture) in enumerate(pictures):
+        x = MARGIN + i * (w + MARGIN)
+        strip.paste(picture.resize((w, h), Image.Resampling.LANCZOS).convert("RGB"), (x, MARGIN))
+        title, line = _caption(case, row, column, records)
+        draw.text((x, MARGIN + h + 3), title, INK, _font(12))
+        draw.text((x, MARGIN + h + 18), line, FAINT, _font(11))
+    return strip
+
+
+def _caption(case: Case, row: str, column: str, records: Sequence[Record]) -> tuple[str, str]:
+    if row == LIGHT:
+        return f"{case.scene}: true light", ""
+    title = f"{ROWS[row].title}, {'rate plane' if column == PLANE else COLUMNS[column]}"
+    key = (case.scene, case.seed, case.interval, case.speed, row)
+    score = next((r.pictures.get(column) for r in records if r.key == key), None)
+    if score is None:
+        return title, ""
+    if score.niqe is not None:
+        return title, f"NIQE {score.niqe:.2f}"
+    return title, "" if score.db is None or score.ssim is None else f"{score.db:.2f} dB, SSIM {score.ssim:.3f}"
+
+
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    return ImageFont.truetype(font_manager.findfont("DejaVu Sans"), size)

@@ -1,0 +1,235 @@
+"""The rows of the tables: what each makes of a noisy stream.
+
+A source gives rates or spikes of the judged frames; a decoder makes spikes of rates.  Rows of one source are made in
+one go, so that a network runs once for MUS and accumulation.
+
+    noisy, clean       spikes as they are
+    TFP, SSML, ...     the paper's pipelines: every frame reconstructed, then spikes by the noise-free camera, which is
+                       `denoiser.accumulate`
+    paper, best, ...   rate planes of an `OnlineDnSS`, from the stream's first frame on
+    light              the true light through a decoder: what a perfect network would score
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from denoiser import accumulate, mus
+from denoiser.evaluate import held, still
+from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed, Planes, Spikes, film
+from denoiser.online import OnlineDnSS
+from denoiser.plain_torch import read_plain
+from spikecam_env.errors import InputError
+from spikecam_env.untrusted import existing_file
+
+DECODERS: dict[str, Any] = {"held": held, "mus": mus, "accumulate": accumulate}
+CHUNK = 32
+"""Frames pushed at a time."""
+BEFORE = "before"
+"""Weights to compare with: none are shipped under this name."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """title  in the table.  decoder  of the source's rates, "" where it gives spikes.  shows_planes: its rate planes
+    are judged too."""
+
+    title: str
+    source: str
+    decoder: str = ""
+    shows_planes: bool = False
+
+
+ROWS: dict[str, Row] = {
+    "noisy": Row("noisy", "noisy"),
+    "tfp": Row("TFP 41, then spikes", "tfp41", "accumulate"),
+    "ssml": Row("SSML, then spikes", "ssml", "accumulate"),
+    "spk2img-clean": Row("Spk2ImgNet (clean), then spikes", "spk2img-clean", "accumulate"),
+    "spk2img-noisy": Row("Spk2ImgNet (noisy), then spikes", "spk2img-noisy", "accumulate"),
+    "baseline-held": Row("no refine, intervals kept", "paper-no-refine", "held"),
+    "baseline-mus": Row("no refine, MUS", "paper-no-refine", "mus"),
+    "baseline": Row("no refine, accumulated", "paper-no-refine", "accumulate", True),
+    "paper-held": Row("paper, intervals kept", "paper", "held"),
+    "paper-mus": Row("paper, MUS", "paper", "mus"),
+    "paper": Row("paper, accumulated", "paper", "accumulate", True),
+    "best": Row("best", "best", "accumulate", True),
+    "best-overlap": Row("best, passes overlapped", "best-overlap", "accumulate", True),
+    "before": Row("best, earlier weights", "before", "accumulate", True),
+    "best-map": Row("best with calibration", "best-map", "accumulate", True),
+    "clean": Row("clean twin", "clean"),
+    "light-held": Row("true light, intervals kept", "light", "held"),
+    "light-mus": Row("true light, MUS", "light", "mus"),
+    "light": Row("true light, accumulated", "light", "accumulate"),
+}
+NETWORKS = {
+    "paper": "paper",
+    "paper-no-refine": "paper-no-refine",
+    "best": "best",
+    "best-overlap": "best",
+    "best-map": "best",
+    "before": BEFORE,
+}
+"""Weights of the sources that are denoisers."""
+PIPELINES = ("tfp41", "ssml", "spk2img-clean", "spk2img-noisy")
+NAMES = (*dict.fromkeys(NETWORKS.values()), *(name for name in PIPELINES if name not in CLASSICAL))
+"""Of all weights that a table can use."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Files of weights by name, instead of those that are shipped."""
+
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    @classmethod
+    def found(cls, folder: Path | None, files: Mapping[str, Path]) -> Weights:
+        """The files, and of names that have none NAME.pt in a folder, where it is there."""
+        there = {} if folder is None else {n: folder / f"{n}.pt" for n in NAMES if (folder / f"{n}.pt").is_file()}
+        return cls(there | dict(files))
+
+    def path(self, name: str) -> Path:
+        """Where weights of a name are, or would be."""
+        return self.files.get(name) or Path(str(resources.files("denoiser") / "weights" / f"{name}.pt"))
+
+    def check(self) -> None:
+        """Raises InputError for a file that was asked for and is not there."""
+        for path in self.files.values():
+            existing_file(path)
+
+    def missing(self, name: str) -> str:
+        """Why there are none, or ""."""
+        return "" if self.path(name).is_file() else f"no weights are shipped yet: {self.path(name).name}"
+
+    def digest(self, name: str) -> str | None:
+        """SHA-256 of the file; None where there is none."""
+        path = self.path(name)
+        return _sha256(path, path.stat().st_mtime_ns) if path.is_file() else None
+
+
+@lru_cache(maxsize=64)
+def _sha256(path: Path, _: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def weights_of(source: str) -> str | None:
+    """Name of the weights that a source or a picture needs; None where it needs none."""
+    if source in NETWORKS:
+        return NETWORKS[source]
+    return source if source in PIPELINES and source not in CLASSICAL else None
+
+
+def why_not(source: str, weights: Weights) -> str:
+    """Why a source cannot be had, or "".  Raises InputError for a file that was asked for and cannot be read."""
+    name = weights_of(source)
+    if name is not None and (why := weights.missing(name)):
+        return why
+    if source in NETWORKS:
+        try:
+            planes_a_pass(source, weights)
+        except InputError as error:
+            if name in weights.files:
+                raise
+            return str(error)
+    return ""
+
+
+def streams(
+    source: str, rows: list[str], case: Case, exposed: Exposed, weights: Weights
+) -> dict[str, tuple[Spikes, Planes | None]]:
+    """By row of the source: (judged frames, H, W) spikes, and the planes they were made of where there are any."""
+    if source in ("noisy", "clean"):
+        whole = exposed.noisy if source == "noisy" else exposed.clean
+        assert whole is not None
+        return {row: (exposed.judged(whole), None) for row in rows}
+    planes = _SOURCES[source](case, exposed, weights)
+    return {row: (decoded(planes, ROWS[row].decoder), planes) for row in rows}
+
+
+def decoded(planes: Planes, decoder: str) -> Spikes:
+    """(T, H, W) rates to spikes by a decoder of `DECODERS`."""
+    chosen = DECODERS[decoder]
+    return chosen.step(planes, chosen.start(planes.shape[1:]))[0]  # type: ignore[no-any-return]
+
+
+def denoised(online: OnlineDnSS, exposed: Exposed) -> Planes:
+    """Rate planes of the judged frames; no more frames are pushed than they need."""
+    planes = np.empty((exposed.stop - exposed.first, *exposed.noisy.shape[1:]), np.float32)
+    ready = pushed = 0
+    while ready < exposed.stop:
+        chunk = exposed.noisy[pushed : pushed + CHUNK]
+        new = online.push(chunk) if len(chunk) else online.flush()
+        pushed += len(chunk)
+        begin, end = max(ready, exposed.first), min(ready + len(new), exposed.stop)
+        if end > begin:
+            planes[begin - exposed.first : end - exposed.first] = new[begin - ready : end - ready]
+        ready += len(new)
+    return planes
+
+
+def planes_a_pass(source: str, weights: Weights) -> int:
+    """Rate planes that the source's network gives at once; 1 where there is none."""
+    return _passes(weights.path(NETWORKS[source])) if source in NETWORKS else 1
+
+
+@lru_cache(maxsize=8)
+def _passes(path: Path) -> int:
+    from denoiser.weights import load_weights
+
+    return load_weights(path)[0].layout.planes
+
+
+def parameters(source: str, weights: Weights) -> int | None:
+    """How many weights a source's network has; None for a source without one."""
+    name = weights_of(source)
+    return None if name is None else _count(weights.path(name))
+
+
+@lru_cache(maxsize=16)
+def _count(path: Path) -> int:
+    return sum(tensor.numel() for tensor in read_plain(path)["state_dict"].values())
+
+
+@lru_cache(maxsize=2)
+def _online(path: Path) -> OnlineDnSS:
+    return OnlineDnSS.from_file(path, output="rate")
+
+
+def _network(name: str) -> Callable[[Case, Exposed, Weights], Planes]:
+    return lambda case, exposed, weights: denoised(_online(weights.path(name)).another(), exposed)
+
+
+def _overlapped(case: Case, exposed: Exposed, weights: Weights) -> Planes:
+    return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", overlap=True), exposed)
+
+
+def _calibrated(case: Case, exposed: Exposed, weights: Weights) -> Planes:
+    unit = still.calibrated(case)
+    return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", unit=unit), exposed)
+
+
+def _pipeline(name: str) -> Callable[[Case, Exposed, Weights], Planes]:
+    return lambda case, exposed, weights: film(
+        name, exposed.noisy, range(exposed.first, exposed.stop), weights.path(name)
+    )
+
+
+def _light(case: Case, exposed: Exposed, weights: Weights) -> Planes:
+    assert exposed.light is not None
+    return np.ascontiguousarray(exposed.light)
+
+
+_SOURCES: dict[str, Callable[[Case, Exposed, Weights], Planes]] = {
+    **{name: _network(file) for name, file in NETWORKS.items()},
+    "best-overlap": _overlapped,
+    "best-map": _calibrated,
+    **{name: _pipeline(name) for name in PIPELINES},
+    "light": _light,
+}

@@ -1,0 +1,91 @@
+"""Scenes in which nothing moves: the held-out collages of `quick`, at rest, well lit.
+
+Here fixed pattern and texture look the same to a denoiser that does not know its camera; one that takes a calibration
+is given SNEE's, from flats of the same camera.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from functools import lru_cache
+
+import numpy as np
+
+from denoiser.evaluate.exposed import Case, Exposed
+from denoiser.evaluate.phm import AHEAD
+from denoiser.evaluate.quick import LIGHTS, held_out_textures
+from denoiser.pairs import light_in_frame
+from scenes.collage import Collage
+from spikecam_env.calibration import calibrate, write_flats
+from spikecam_env.sensor import SensorModel, SpikeSensor
+
+FRAMES = 400
+"""Frames whose mean is judged: 10 ms at 40 kHz."""
+SHAPE = (96, 96)
+WELL_LIT = ("bright", "middle")
+"""Of `quick.LIGHTS`."""
+CONTRAST = 6.0
+"""Brightest over darkest light, as in `quick`."""
+FLAT_LEVELS = (0.0, 0.1, 0.25, 0.6)
+"""Radiance of the flats that SNEE is given; 0 is the dark."""
+FLAT_FRAMES = 10_000
+"""Of each flat: a quarter of a second, in which a rate of 0.1 is known to 0.1 %."""
+
+
+def still_scenes(a_class: int) -> tuple[str, ...]:
+    """Names of the scenes: so many at each light."""
+    return tuple(f"{light} {i}" for light in WELL_LIT for i in range(a_class))
+
+
+@lru_cache(maxsize=1)
+def expose(case: Case) -> Exposed:
+    """The case's streams; all frames are judged."""
+    name, number = case.scene.rsplit(" ", 1)
+    scene = Collage(
+        case.shape,
+        1000 * (WELL_LIT.index(name) + 1) + int(number),
+        speed=0.0,
+        light=LIGHTS[name],
+        contrast=CONTRAST,
+        textures=list(_textures()),
+    )
+    frames = case.frames + AHEAD
+    keys = scene.radiance(0, frames)
+    camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, unit_seed(case), engine="auto")
+    twin = camera.clean_twin()
+    light = light_in_frame(keys, 0)
+    return Exposed(
+        camera.step(keys, frames),
+        twin.step(keys, frames),
+        np.broadcast_to(light, (case.frames, *case.shape)),
+        first=0,
+        stop=case.frames,
+        middle=case.frames // 2,
+        white=float(light.max()),
+    )
+
+
+def unit_seed(case: Case) -> int:
+    """Of the camera before a scene: every scene and seed has its own."""
+    return int(np.random.default_rng([case.seed, *case.scene.encode()]).integers(2**31))
+
+
+def calibrated(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    """SNEE's maps of the case's camera, (gain, dark) of (H, W); a pixel that it could not fit gets the median ones."""
+    with tempfile.TemporaryDirectory() as folder:
+        flats = write_flats(
+            folder,
+            SensorModel.preset("scsim"),
+            levels=FLAT_LEVELS,
+            frames=FLAT_FRAMES,
+            shape=case.shape,
+            seed=unit_seed(case),
+        )
+        found = calibrate(flats).main
+    gain, dark = (np.where(np.isfinite(m), m, np.nanmedian(m)).astype(np.float32) for m in (found.gain, found.dark))
+    return gain, np.maximum(dark, 0)
+
+
+@lru_cache(maxsize=1)
+def _textures() -> tuple[np.ndarray, ...]:
+    return tuple(held_out_textures(0))

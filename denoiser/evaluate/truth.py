@@ -1,0 +1,91 @@
+"""Truth tests: what a denoiser is worth where nobody knows the light, or the camera is a real one.
+
+    halves          a real recording at rest, one half denoised, the mean of the other as the truth (`halves`)
+    pattern         a recording that moves, and simulated ones: fixed pattern that is left (`fixed_pattern`)
+    measured        the held-out scenes of `quick`, true light, before cameras as measured (preset `measured`): once
+                    with its shading, which no denoiser can tell from the scene, and once without
+
+NIQE judges a picture by itself and rewards grain; these compare with light that was seen.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from denoiser.evaluate import fixed_pattern, halves
+from denoiser.evaluate.quick import PICTURES, Summary, evaluate_quick
+from denoiser.evaluate.restored import Weights, denoisers
+from spikecam_env.sensor import SensorModel
+from spikecam_env.streams import read_recording
+
+SHOWN = ("well lit, moving", "well lit, static", "all dim")
+"""Of `quick.GROUPS`."""
+
+
+def evaluate_truth(
+    static: str | os.PathLike[str] | None = None,
+    moving: str | os.PathLike[str] | None = None,
+    modes: Sequence[str] = ("paper", "best"),
+    *,
+    weights: Weights | None = None,
+    scenes: int = 1,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Run the tests; those on recordings where there are recordings.
+
+    static: a recording of a scene at rest.  moving: one in which everything moves.  scenes: simulated ones, for each
+    camera of the pattern and each class of `quick`.
+    Returns "halves", "pattern" (by recording or camera), "measured" (by camera, as `evaluate_quick`), "settings".
+    Errors: InputError for recordings that cannot be read, are too short, or dark, or nowhere at rest.
+    """
+    recordings = {path: read_recording(Path(path)).spikes for path in (static, moving) if path is not None}
+    online = denoisers(modes, weights)
+    result: dict[str, Any] = {
+        "settings": {
+            "static": None if static is None else str(static),
+            "moving": None if moving is None else str(moving),
+            "modes": list(modes),
+            "scenes": scenes,
+            "seed": seed,
+        },
+        "halves": None if static is None else halves.evaluate_halves(recordings[static], online),
+        "pattern": {},
+    }
+    if moving is not None:
+        result["pattern"][Path(moving).name] = fixed_pattern.evaluate_pattern(recordings[moving], online)
+    result["pattern"] |= fixed_pattern.evaluate_simulated_pattern(online, scenes=scenes, seed=seed)
+    result["measured"] = {
+        name: evaluate_quick(modes, weights=weights, scenes_a_class=scenes, seed=seed, model=model)
+        for name, model in cameras().items()
+    }
+    return result
+
+
+def cameras() -> dict[str, SensorModel]:
+    """Models of the cameras before the held-out scenes, by what the report calls them."""
+    measured = SensorModel.preset("measured")
+    return {"measured": measured, "measured, without shading": measured.without("vignetting")}
+
+
+def report(result: dict[str, Any]) -> str:
+    """The result as tables to read."""
+    parts = []
+    if result["halves"] is not None:
+        parts.append(f"{Path(result['settings']['static']).name}, against itself\n" + halves.report(result["halves"]))
+    for name, found in result["pattern"].items():
+        parts.append("fixed pattern where the scene moves, " + fixed_pattern.report(found, name))
+    for name, found in result["measured"].items():
+        tables = [_table(group, found[group]) for group in SHOWN]
+        parts.append(f"cameras {name}, against the true light [dB]\n" + "\n".join(tables) + "\n")
+    return "\n".join(parts)
+
+
+def _table(title: str, table: Summary) -> str:
+    lines = [f"{title:18}" + "".join(f"{picture:>10}" for picture in PICTURES) + "   (TFI of rates: the plane)"]
+    for row, pictures in table.items():
+        levels = (pictures[picture]["light_db"] for picture in PICTURES)
+        lines.append(f"{row:18}" + "".join("         -" if level is None else f"{level:10.2f}" for level in levels))
+    return "\n".join(lines)

@@ -1,0 +1,177 @@
+"""Rows of cases, in this process or in several, each result saved as soon as it is there.
+
+A unit of work is one source (`rows.ROWS`) of one case: its rows share a run of its network.  What a results file has is
+not done again, unless the weights have changed since.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from denoiser.evaluate import phm, real, still
+from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed
+from denoiser.evaluate.judge import Record, display, judged, pictures_of
+from denoiser.evaluate.rows import ROWS, Weights, planes_a_pass, streams, weights_of
+from spikecam_env.errors import InputError, shown
+from spikecam_env.stopping import without_interrupts
+from spikecam_env.untrusted import declared, parse_json, read_text
+from spikecam_env.whole import whole_file, write_text_whole
+
+FORMAT = "spikecam-evaluation/1"
+_EXPOSE: dict[str, Callable[[Case], Exposed]] = {"phm": phm.expose, "real": real.expose, "still": still.expose}
+LIGHT = "light"
+"""Name of the picture of the true light."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """Some rows of one source of one case.  pictures: a folder for PNG files of what the rows show, or None."""
+
+    case: Case
+    source: str
+    rows: tuple[str, ...]
+    columns: tuple[str, ...]
+    weights: Weights
+    pictures: Path | None = None
+
+
+@dataclass(frozen=True)
+class Results:
+    """Records of a results file (JSON lines, settings first), or of none.  Raises InputError for a damaged file, and
+    for one of other settings."""
+
+    path: Path | None
+    settings: dict[str, Any]
+    records: dict[tuple[Any, ...], Record]
+
+    @classmethod
+    def opened(cls, path: Path | None, settings: dict[str, Any]) -> Results:
+        """What is in the file; nothing where it is not there yet."""
+        if path is None or not path.exists():
+            return cls(path, settings, {})
+        head, *lines = read_text(path).rstrip("\n").split("\n")
+        found = parse_json(head, str(path))
+        if not isinstance(found, dict) or found.get("format") != FORMAT:
+            raise InputError(f"{path} is no {FORMAT} file; choose another folder")
+        if different := [name for name in settings if found.get(name) != settings[name]]:
+            was = ", ".join(f"{name} {shown(found.get(name))} (asked: {settings[name]})" for name in different)
+            raise InputError(f"{path} holds results of other settings: {was}; ask for the same, or another folder")
+        records = [
+            declared(Record, parse_json(line, str(path)), f"{path}, line {i}") for i, line in enumerate(lines, 2)
+        ]
+        return cls(path, settings, {record.key: record for record in records})
+
+    def add(self, records: Iterable[Record]) -> None:
+        """Take records in, and write the file."""
+        self.records.update({record.key: record for record in records})
+        if self.path is not None:
+            head = json.dumps({"format": FORMAT, **self.settings})
+            write_text_whole(self.path, "\n".join([head, *(r.model_dump_json() for r in self.records.values())]) + "\n")
+
+
+def tasks(
+    case: Case, rows: Sequence[str], columns: Sequence[str], weights: Weights, pictures: Path | None
+) -> list[Task]:
+    """The work on a case, a task for each source of its rows."""
+    return [
+        Task(case, source, tuple(r for r in rows if ROWS[r].source == source), tuple(columns), weights, pictures)
+        for source in dict.fromkeys(ROWS[row].source for row in rows)
+    ]
+
+
+def undone(asked: Sequence[Task], results: Results) -> list[Task]:
+    """The tasks that have rows without a result, or one of other weights."""
+    return [task for task in asked if not all(_is_done(task, row, results) for row in task.rows)]
+
+
+def work(todo: Sequence[Task], jobs: int = 1) -> Iterator[list[Record]]:
+    """Records of the tasks, as they are done.  jobs: processes; 1 works in this one.
+
+    Raises InputError where a process dies.
+    """
+    if jobs == 1 or len(todo) < 2:
+        yield from map(do, todo)
+        return
+    pool = ProcessPoolExecutor(min(jobs, len(todo)), mp_context=get_context("spawn"), initializer=_one_thread)
+    try:
+        with without_interrupts():  # it starts the processes
+            waiting = [pool.submit(do, task) for task in todo]
+        for done in as_completed(waiting):
+            yield done.result()
+    except BrokenProcessPool as error:
+        raise InputError(
+            "a worker process died, perhaps for want of memory; run the same command with fewer jobs: "
+            "it goes on with what is not done"
+        ) from error
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def do(task: Task) -> list[Record]:
+    """One task, done here."""
+    exposed = _EXPOSE[task.case.kind](task.case)
+    made = streams(task.source, list(task.rows), task.case, exposed, task.weights)
+    columns = {column: task.weights.path(column) for column in task.columns}
+    records = []
+    for row, (spikes, planes) in made.items():
+        planes = planes if ROWS[row].shows_planes else None
+        shown = pictures_of(spikes, planes, exposed, columns)
+        passes = planes_a_pass(task.source, task.weights)
+        found = judged(shown, spikes, planes, exposed, passes, still=task.case.kind == "still")
+        records.append(Record(**_key(task.case), row=row, weights=_identity(task), **found))
+        _save_pictures(task, row, shown, exposed)
+    return records
+
+
+def picture_path(folder: Path, case: Case, row: str, column: str) -> Path:
+    """Of what a row shows in a column."""
+    return folder / f"{case.scene.replace(' ', '-')}-{row}-{column}.png"
+
+
+def _save_pictures(task: Task, row: str, shown: dict[str, np.ndarray], exposed: Exposed) -> None:
+    if task.pictures is None:
+        return
+    for column, found in shown.items():
+        _save(picture_path(task.pictures, task.case, row, column), display(found, exposed.white))
+    if exposed.light is not None:
+        truth = exposed.light[exposed.middle - exposed.first]
+        _save(picture_path(task.pictures, task.case, LIGHT, LIGHT), display(truth, exposed.white))
+
+
+def _save(path: Path, shown: np.ndarray) -> None:
+    from PIL import Image
+
+    with whole_file(path) as beside:
+        Image.fromarray((255 * shown + 0.5).astype(np.uint8)).save(beside)
+
+
+def _key(case: Case) -> dict[str, Any]:
+    return {"scene": case.scene, "seed": case.seed, "interval": case.interval, "speed": case.speed}
+
+
+def _identity(task: Task) -> dict[str, str | None]:
+    names = [weights_of(task.source), *(c for c in task.columns if c not in CLASSICAL)]
+    return {name: task.weights.digest(name) for name in names if name is not None}
+
+
+def _is_done(task: Task, row: str, results: Results) -> bool:
+    found = results.records.get((*_key(task.case).values(), row))
+    return found is not None and found.weights == _identity(task) and set(task.columns) <= set(found.pictures)
+
+
+def _one_thread() -> None:
+    import torch
+
+    from spikecam_env.datasets.worker import use_one_thread
+
+    use_one_thread()
+    torch.set_num_threads(1)

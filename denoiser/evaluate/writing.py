@@ -1,0 +1,25 @@
+"""Results of an evaluation as two files: for programs and to read."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from spikecam_env.whole import write_text_whole
+
+
+def write_result(folder: Path, name: str, result: dict[str, Any], text: str) -> None:
+    """`<name>.json` and `<name>.txt` in a folder that is there; each appears whole.  What is not finite is null."""
+    write_text_whole(folder / f"{name}.json", json.dumps(_plain(result), indent=1, allow_nan=False) + "\n")
+    write_text_whole(folder / f"{name}.txt", text)
+
+
+def _plain(value: Any) -> Any:
+    """For JSON, which knows neither infinity nor NaN."""
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,35 @@
+"""The last frames of many simulated streams, as they go on."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from denoiser.reconstruct.lessons import Windows
+from denoiser.simulated import SimulatedStreams
+
+
+class RollingWindows:
+    """Windows of `span` frames of every stream; a window counts once its stream is that old.
+
+    spikes: "clean" or "noisy".  All is kept in place, as `denoiser.captured` wants it.
+    """
+
+    def __init__(self, streams: SimulatedStreams, spikes: str, span: int) -> None:
+        self.streams, self._kind = streams, spikes
+        shape, device = (streams.count, span, streams.patch, streams.patch), streams.device
+        self._spikes = torch.zeros(shape, dtype=torch.uint8, device=device)
+        self._light = torch.zeros(shape, device=device)
+        self._age = torch.zeros(streams.count, dtype=torch.int64, device=device)
+
+    def advance(self, frames: int) -> Windows:
+        """Go on by `frames`; the windows that end there, which the next call overwrites."""
+        part = self.streams.advance(frames)
+        _push(self._spikes, getattr(part, self._kind))
+        _push(self._light, part.light)
+        self._age.copy_(torch.where(part.begins, 0, self._age) + frames)
+        return Windows(self._spikes, self._light, self._age >= self._spikes.shape[1])
+
+
+def _push(held: Tensor, new: Tensor) -> None:
+    held.copy_(torch.cat([held, new], dim=1)[:, -held.shape[1] :])

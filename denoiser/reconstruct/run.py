@@ -1,0 +1,102 @@
+"""A run of training that can go on where it was stopped: networks, optimiser, and how far it is.
+
+`last.pt` holds them as plain values; reading it checks every name, shape, type and number before anything is used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import torch
+from pydantic import Field
+from torch import Tensor, nn
+
+from denoiser.plain_torch import read_plain, tensors_like
+from denoiser.weights import write_whole
+from spikecam_env.errors import InputError
+from spikecam_env.untrusted import Declared, Name, Whole, declared
+
+
+@dataclass
+class Run:
+    """networks: by name, all of them learned together.  seconds: spent so far.  curve: the validations."""
+
+    networks: nn.ModuleDict
+    optimiser: torch.optim.Optimizer
+    step: int
+    seconds: float
+    curve: list[dict[str, float]]
+    resumed_at: list[int]
+
+    @classmethod
+    def begin(cls, networks: nn.ModuleDict) -> Run:
+        weights = list(networks.parameters())
+        on_gpu = weights[0].is_cuda
+        rate = torch.tensor(1e-3, device=weights[0].device) if on_gpu else 1e-3  # a replayed step reads tensors alone
+        return cls(networks, torch.optim.Adam(weights, rate, capturable=on_gpu), 0, 0.0, [], [])
+
+    def set_rate(self, rate: float) -> None:
+        """The rate of learning from now on."""
+        for group in self.optimiser.param_groups:
+            if isinstance(group["lr"], Tensor):
+                group["lr"].fill_(rate)
+            else:
+                group["lr"] = rate
+
+    def save(self, path: Path) -> None:
+        """Write all of it; the file appears whole."""
+        progress = {name: getattr(self, name) for name in ("step", "seconds", "curve", "resumed_at")}
+        parts = {
+            "networks": self.networks.state_dict(),
+            "optimiser": {"moments": self._moments(), "settings": self._settings()},
+        }
+        write_whole(path, parts | progress)
+
+    def load(self, path: Path) -> None:
+        """Go on from a file of `save`.  Raises InputError where it is damaged, or of other networks."""
+        data = read_plain(path)
+        try:
+            if not isinstance(data, dict) or not {"networks", "optimiser"} <= set(data):
+                raise InputError(f"{path} holds no networks")
+            weights, moments = data.pop("networks"), data.pop("optimiser")
+            progress = declared(_Progress, data, str(path))
+            tensors_like(self.networks.state_dict(), weights, str(path))
+            self._refuse_others(moments, str(path))
+        except InputError as error:
+            raise InputError(f"{error}; it is not a run of this mode: give another --out, or resume=False") from error
+        self.networks.load_state_dict(weights)
+        groups = self.optimiser.state_dict()["param_groups"]
+        self.optimiser.load_state_dict({"state": moments["moments"], "param_groups": groups})
+        self.step, self.seconds, self.curve = progress.step, progress.seconds, [dict(p) for p in progress.curve]
+        self.resumed_at = [*progress.resumed_at, self.step]
+
+    def _moments(self) -> dict[int, dict[str, Tensor]]:
+        """Of each parameter by number."""
+        return self.optimiser.state_dict()["state"]
+
+    def _settings(self) -> list[dict[str, Any]]:
+        """Of the optimiser, but for what depends on the device or changes from step to step."""
+        groups = self.optimiser.state_dict()["param_groups"]
+        return [{name: v for name, v in group.items() if name not in ("lr", "capturable")} for group in groups]
+
+    def _refuse_others(self, found: Any, where: str) -> None:
+        """Raises InputError unless these are moments of an Adam of the same parameters and settings."""
+        if not isinstance(found, dict) or found.get("settings") != self._settings():
+            raise InputError(f"{where}: the optimiser has other settings or parameters")
+        weights = [p.detach().cpu() for p in self.networks.parameters()]
+        moments = found.get("moments")
+        if not isinstance(moments, dict) or set(moments) not in (set(), set(range(len(weights)))):
+            raise InputError(f"{where}: the optimiser has no moments of these parameters")
+        for number, moment in moments.items():
+            like = weights[number]
+            expected = {"step": torch.zeros(()), "exp_avg": like, "exp_avg_sq": like}
+            tensors_like(expected, moment, f"{where}: optimiser")
+
+
+class _Progress(Declared):
+    step: Whole
+    seconds: Annotated[float, Field(ge=0)]
+    curve: list[dict[Name, float]]
+    resumed_at: list[Whole]

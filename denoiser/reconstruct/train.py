@@ -1,0 +1,271 @@
+"""Training a reconstructor on simulated streams as they go on, resumable at any minute.
+
+Each step moves every stream on by `frames_a_step` frames and learns from the window that ends there
+(`rolling.py`), by the loss of `lessons.py`.  Adam; the rate of learning warms up over 100 steps and falls as a cosine
+to nothing at the end.  A run limited by `minutes` ends where the clock says; a resumed one goes on with new streams.
+
+In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `curve.json` and `curve.png`: validation on streams
+of another seed, against the true light, beside TFP 21, TFP 41 and TFI of the same windows.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from denoiser.captured import captured
+from denoiser.reconstruct import ssml
+from denoiser.reconstruct.lessons import Lesson, Windows, lesson_of
+from denoiser.reconstruct.recipe import ReconstructorRecipe, reconstructor_recipe
+from denoiser.reconstruct.rolling import RollingWindows
+from denoiser.reconstruct.run import Run
+from denoiser.reconstruct.spk2imgnet import WINDOW
+from denoiser.reconstruct.weights import save_reconstructor
+from denoiser.simulated import Bank, SimulatedStreams
+from spikecam_env.checked import checked_count, checked_number, checked_seed
+from spikecam_env.errors import InputError
+from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.whole import whole_file, write_text_whole
+
+WARM_UP_STEPS = 100
+VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
+VALIDATION_STREAMS = 64
+VALIDATION_MOMENTS = 4
+VALIDATION_TEXTURES, VALIDATION_UNITS = 32, 16
+FRAMES_BETWEEN_MOMENTS = 64
+LARGEST_SEED = 2**62
+"""So that the seed of the validation has room above it."""
+_COUNTS = {
+    "steps": 10**9,
+    "batch": 65_536,
+    "threads": 1024,
+    "patch": 4096,
+    "frames_a_step": WINDOW,
+    "validate_every": 10**9,
+}
+"""Options that are whole numbers from 1, with the most."""
+_AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
+"""Options that are numbers above 0, with the most."""
+
+
+@dataclass(frozen=True)
+class ReconstructorConfig:
+    """mode: "spk2img-clean" | "spk2img-noisy" | "ssml".  out: folder.
+
+    The run ends after `steps`, or `minutes` where that is given.  width: channels; None: the recipe's.
+    batch: streams, each a window a step.  patch: their side [pixels].  frames_a_step: by which they go on.
+    lr: highest rate of learning.  validate_every: steps.  threads, device: of network and streams.
+    resume: go on from out/last.pt.
+    """
+
+    mode: str = "spk2img-noisy"
+    out: Path = Path("training")
+    steps: int = 20_000
+    batch: int = 64
+    seed: int = 0
+    threads: int = 1
+    resume: bool = True
+    minutes: float | None = None
+    patch: int = 64
+    lr: float = 1e-3
+    save_every_s: float = 60.0
+    validate_every: int = 500
+    device: str = "cpu"
+    width: int | None = None
+    frames_a_step: int = 12
+
+    def __post_init__(self) -> None:
+        self.recipe()
+        checked_seed(self.seed, "seed", LARGEST_SEED)
+        for name, most in _COUNTS.items():
+            checked_count(getattr(self, name), name, most)
+        for name, highest in _AMOUNTS.items():
+            if name != "minutes" or self.minutes is not None:
+                checked_number(getattr(self, name), name, 0.0, highest, above=True)
+        if not isinstance(self.resume, bool):
+            raise InputError(f"resume is {self.resume!r}; it must be True or False")
+        if not isinstance(self.out, str | os.PathLike):
+            raise InputError(f"out is {self.out!r}; it must be the path of a folder")
+        object.__setattr__(self, "out", Path(self.out))
+        checked_device(self.device, "train with --device cpu")
+
+    def recipe(self) -> ReconstructorRecipe:
+        """What is trained; raises InputError for an unknown mode or width."""
+        return reconstructor_recipe(self.mode, self.width)
+
+
+def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -> Path:
+    """Train, or go on training; returns the path of the weights.
+
+    `minutes` counts from here, the drawing of textures and compilation included.
+    Raises InputError where `out` holds the run of another mode or width, or a damaged one.
+    """
+    began = time.monotonic()
+    torch.set_num_threads(config.threads)
+    torch.manual_seed(config.seed)
+    torch.backends.cudnn.benchmark = True
+    config.out.mkdir(parents=True, exist_ok=True)
+    lesson = lesson_of(config.recipe())
+    lesson.networks.to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+    run = Run.begin(lesson.networks)
+    if config.resume and (config.out / "last.pt").exists():
+        run.load(config.out / "last.pt")
+    return _loop(config, lesson, run, began, progress)
+
+
+def _loop(config: ReconstructorConfig, lesson: Lesson, run: Run, began: float, progress: bool) -> Path:
+    rolling = _windows(config, run.step, lesson.span)
+    held_out = _held_out(config)
+    before, saved = run.seconds, time.monotonic()
+    bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
+    losses: list[Tensor] = []
+    run.set_rate(_rate(config.lr, 0, 0.0))  # of the calls that come before a capture
+    step = captured(lambda: _step(config, lesson, run, rolling), torch.device(config.device), rolling.streams.rng)
+    while (done := _done(config, run)) < 1.0:
+        run.set_rate(_rate(config.lr, run.step, done))
+        losses.append(step())
+        run.step += 1
+        run.seconds = before + time.monotonic() - began
+        bar.update()
+        if run.step % config.validate_every == 0:
+            scores = validate(lesson.networks["student"], held_out)
+            loss = float(torch.stack(losses).mean())
+            run.curve.append({"step": run.step, "seconds": run.seconds, "loss": loss, **scores})
+            losses.clear()
+            bar.set_postfix(loss=loss, db=scores["network_db"])
+        if run.step % config.validate_every == 0 or time.monotonic() - saved > config.save_every_s:
+            _save(config, run)
+            saved = time.monotonic()
+    bar.close()
+    return _save(config, run)
+
+
+def _step(config: ReconstructorConfig, lesson: Lesson, run: Run, rolling: RollingWindows) -> Tensor:
+    """One step; its loss, which a GPU need not have worked out yet."""
+    run.optimiser.zero_grad(set_to_none=True)
+    windows = rolling.advance(config.frames_a_step)
+    with torch.autocast(windows.spikes.device.type, torch.bfloat16):
+        losses = lesson.losses(windows, torch.bfloat16)
+    loss = (losses * windows.old).sum() / windows.old.sum().clamp(min=1)
+    loss.backward()
+    nn.utils.clip_grad_norm_(run.networks.parameters(), 1.0)
+    run.optimiser.step()
+    return loss.detach()
+
+
+def _done(config: ReconstructorConfig, run: Run) -> float:
+    """Share of the run that is over, by the clock where it is limited by minutes."""
+    return run.step / config.steps if config.minutes is None else run.seconds / (60 * config.minutes)
+
+
+def _rate(highest: float, step: int, done: float) -> float:
+    """The rate of learning of a step."""
+    return highest * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
+
+
+def _windows(config: ReconstructorConfig, step: int, span: int) -> RollingWindows:
+    """Of the streams to learn from; a run that is resumed at `step` meets others."""
+    device = torch.device(config.device)
+    bank = Bank.drawn(config.seed, device)
+    seed, compiled = config.seed + step, device.type == "cuda"
+    streams = SimulatedStreams(config.batch, config.patch, device, seed, bank=bank, compiled=compiled)
+    return RollingWindows(streams, config.recipe().learns_from, span)
+
+
+def _held_out(config: ReconstructorConfig) -> list[Windows]:
+    """Windows of other streams at a few moments."""
+    seed, device = config.seed + VALIDATION_SEED, torch.device(config.device)
+    bank = Bank.drawn(seed, device, textures=VALIDATION_TEXTURES, units=VALIDATION_UNITS)
+    streams = SimulatedStreams(VALIDATION_STREAMS, config.patch, device, seed, bank=bank)
+    rolling = RollingWindows(streams, config.recipe().learns_from, WINDOW)
+    return [rolling.advance(FRAMES_BETWEEN_MOMENTS).copy() for _ in range(VALIDATION_MOMENTS)]
+
+
+def validate(network: nn.Module, held_out: list[Windows]) -> dict[str, float]:
+    """Error of the light over held-out windows, as PSNR [dB] against light 1.0: network, TFP 21, TFP 41, TFI."""
+    network.eval()
+    sums: dict[str, float] = {}
+    for windows in held_out:
+        spikes, middle = windows.spikes, WINDOW // 2
+        with torch.inference_mode(), torch.autocast(spikes.device.type, torch.bfloat16):
+            found = network(spikes.to(torch.bfloat16).contiguous(memory_format=torch.channels_last))
+        guesses: Mapping[str, Tensor] = {
+            "network": found.clamp(0, 1),
+            "tfp21": spikes[:, middle - 10 : middle + 11].float().mean(1, keepdim=True),
+            "tfp41": spikes.float().mean(1, keepdim=True),
+            "tfi": ssml.interval_rate(spikes, middle),
+        }
+        for name, guess in guesses.items():
+            errors = (guess - windows.light[:, middle, None]).square().mean((1, 2, 3))
+            sums[f"{name}_db"] = sums.get(f"{name}_db", 0.0) + float(errors[windows.old].sum())
+    network.train()
+    count = sum(int(windows.old.sum()) for windows in held_out)
+    return {name: round(-10 * math.log10(max(total, 1e-12) / max(count, 1)), 3) for name, total in sums.items()}
+
+
+def _save(config: ReconstructorConfig, run: Run) -> Path:
+    weights = config.out / f"{config.mode}.pt"
+    student = run.networks["student"]
+    save_reconstructor(weights, config.mode, config.recipe(), student, _training_record(config, run))
+    run.save(config.out / "last.pt")
+    write_text_whole(config.out / "curve.json", json.dumps(run.curve, indent=1))
+    if run.curve:
+        _plot(run.curve, config.out / "curve.png")
+    return weights
+
+
+def _training_record(config: ReconstructorConfig, run: Run) -> dict[str, Any]:
+    try:
+        package = version("spikecam-env")
+    except PackageNotFoundError:
+        package = "not installed"
+    return {
+        "command": _command(config),
+        "options": {k: v for k, v in asdict(config).items() if k not in ("out", "resume", "save_every_s")},
+        "steps": run.step,
+        "minutes": round(run.seconds / 60, 1),
+        "resumed_at": run.resumed_at,
+        "package": package,
+    }
+
+
+def _command(config: ReconstructorConfig) -> str:
+    """What to type to train so."""
+    given = [f for f in fields(config) if f.name not in ("out", "mode") and getattr(config, f.name) != f.default]
+    options = "".join(f" --{f.name.replace('_', '-')} {getattr(config, f.name)}" for f in given)
+    return f"spikecam train --mode {config.mode} --out OUT{options}"
+
+
+def _plot(curve: list[dict[str, float]], path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6, 4))
+    axes = figure.subplots()
+    for name in ("network", "tfp21", "tfp41", "tfi"):
+        axes.plot([p["step"] for p in curve], [p[f"{name}_db"] for p in curve], label=name)
+    axes.set(xlabel="step", ylabel="PSNR against the true light [dB]")
+    axes.legend()
+    with whole_file(path) as beside:
+        figure.savefig(beside, dpi=120)
+
+
+def main() -> None:
+    """`python -m denoiser.reconstruct.train`: the options of ReconstructorConfig."""
+    import tyro
+
+    print(train_reconstructor(tyro.cli(ReconstructorConfig)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""Checkpoints of reconstructors: as `denoiser.weights`, with weights in float16 (they compute in float32).
+
+A file is `torch.save` of plain values: format, name, recipe, state_dict, training (command, seed, steps, minutes,
+package version) and sha256, the digest of recipe and weights.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from denoiser.plain_torch import read_plain, tensors_like
+from denoiser.reconstruct.recipe import LEARNED, ReconstructorRecipe
+from denoiser.threads import where_torch_can
+from denoiser.weights import digest, write_whole
+from spikecam_env.errors import InputError, shown, unknown_name
+
+FORMAT = "spikecam-reconstructor/1"
+
+
+def save_reconstructor(
+    path: str | os.PathLike[str], name: str, recipe: ReconstructorRecipe, network: nn.Module, training: dict[str, Any]
+) -> None:
+    """Write a checkpoint; the file appears whole."""
+    state = _halves(network)
+    data = {"format": FORMAT, "name": name, "recipe": recipe.to_dict(), "state_dict": state, "training": training}
+    write_whole(path, data | {"sha256": digest(recipe, state)})  # type: ignore[arg-type]  # it asks for to_dict alone
+
+
+def load_reconstructor(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module, dict[str, Any]]:
+    """Read a checkpoint: (recipe, network in evaluation mode with float32 weights, training record).
+
+    Raises InputError for a missing or damaged file, a file of another kind, weights of another network, and weights
+    that are not finite or not those of the digest.
+    """
+    return where_torch_can(lambda: _load(path))
+
+
+def shipped_path(name: str) -> Path:
+    """Where the shipped weights of a learned reconstructor are."""
+    if not isinstance(name, str) or name not in LEARNED:
+        raise unknown_name("learned reconstructor", name, LEARNED)
+    return Path(str(resources.files("denoiser") / "weights" / f"{name}.pt"))
+
+
+def _load(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module, dict[str, Any]]:
+    data = read_plain(path)
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        found = data.get("format") if isinstance(data, dict) else type(data).__name__
+        raise InputError(f"{path} is not a {FORMAT} checkpoint (found {shown(found)}); give a file of `spikecam train`")
+    recipe = ReconstructorRecipe.from_dict(data.get("recipe"), f"{path}: recipe")
+    network, training = recipe.network(), data.get("training")
+    weights = tensors_like(_halves(network), data.get("state_dict"), str(path))
+    if not isinstance(training, dict):
+        raise InputError(f"{path}: training is {type(training).__name__}; it must be a table; copy the file again")
+    if data.get("sha256") != digest(recipe, weights):  # type: ignore[arg-type]  # it asks for to_dict alone
+        raise InputError(f"{path} is damaged: its weights are not those of its digest; copy it again or train anew")
+    network.load_state_dict(weights)  # in float32, the type of the network
+    return recipe, network.eval(), dict(training)
+
+
+def _halves(network: nn.Module) -> dict[str, Tensor]:
+    return {name: w.detach().cpu().to(torch.float16).contiguous() for name, w in network.state_dict().items()}

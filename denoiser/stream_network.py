@@ -1,0 +1,89 @@
+"""The recurrent network of `best` mode: one pass gives the rate in 16 consecutive frames, and what the next pass gets.
+
+    joined, carried' = body(fold [spikes, planes, last], carried)          half resolution, a U-Net of one level
+    rate = unfold(out(joined)) + head([unfold(out(joined)), planes])       [spikes/frame]
+
+Where the unit is calibrated, the running means hold more than any window, as long as nothing moves: the head then says
+for each mean how much of the rate it is, and the rest is the rate above.  The folding of 2 x 2 pixels into channels and
+the 1 x 1 convolution after it are one 2 x 2 convolution of stride 2.
+
+Carried from pass to pass: `last`, the rate in the last frame of the pass before, (N, 1, H, W), and a hidden picture
+(N, CARRY, H/2, W/2) in [-1, 1]; nothing (None) before the first.  (N, channels, H, W) in and out; sizes that 4 does not
+divide are extended as in `network`.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from denoiser.network import conv, conv_relu, pad_to_multiple
+
+CARRY = 16
+"""Channels of the hidden picture."""
+
+Carried = tuple[Tensor, Tensor] | None
+"""(last, hidden), float32."""
+
+
+class Residual(nn.Module):
+    """x + conv(relu(conv(x)))."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.change = nn.Sequential(conv_relu(width, width), conv(width, width))
+
+    def forward(self, x: Tensor) -> Tensor:
+        return functional.relu(x + self.change(x))
+
+
+class StreamDnSS(nn.Module):
+    """(N, span, H, W) spikes, (N, layers, H, W) planes, carried -> (N, planes, H, W) rates [spikes/frame], carried.
+
+    means: which of the layers are running means (first, last + 1).  The last layer is 1 where the unit is calibrated.
+    """
+
+    def __init__(
+        self,
+        span: int,
+        layers: int,
+        planes: int,
+        means: tuple[int, int],
+        widths: tuple[int, int] = (64, 128),
+    ) -> None:
+        super().__init__()
+        fine, coarse = widths
+        self.means = means
+        self.stem = nn.Sequential(nn.Conv2d(span + layers + 1, fine, 2, 2), nn.ReLU(inplace=True))
+        self.mix = conv_relu(fine + CARRY, fine)
+        self.fine = conv_relu(fine, fine)
+        self.coarse = nn.Sequential(conv_relu(fine, coarse, stride=2), *(Residual(coarse) for _ in range(3)))
+        self.up = nn.ConvTranspose2d(coarse, fine, 2, 2)
+        self.join = nn.Sequential(conv_relu(2 * fine, fine), conv_relu(fine, fine))
+        self.keep = conv(fine, CARRY)
+        self.out = conv(fine, 4 * planes)
+        self.unfold = nn.PixelShuffle(2)
+        self.head = nn.Sequential(conv_relu(planes + layers + 1, 24), conv(24, planes + means[1] - means[0]))
+
+    def forward(self, spikes: Tensor, planes: Tensor, carried: Carried = None) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+        height, width = spikes.shape[-2:]
+        spikes, planes = pad_to_multiple(spikes, 4), pad_to_multiple(planes.float(), 4)
+        if carried is None:
+            full, half = spikes.shape[-2:], [n // 2 for n in spikes.shape[-2:]]
+            last, hidden = planes.new_zeros((len(planes), 1, *full)), planes.new_zeros((len(planes), CARRY, *half))
+        else:
+            last, hidden = pad_to_multiple(carried[0], 4), carried[1]
+        seen = torch.cat([planes, last], dim=1).to(spikes.dtype)
+        fine = self.fine(self.mix(torch.cat([self.stem(torch.cat([spikes, seen], 1)), hidden.to(spikes.dtype)], 1)))
+        joined = self.join(torch.cat([self.up(self.coarse(fine)), fine], dim=1))
+        first = self.unfold(self.out(joined))
+        change = self.head(torch.cat([first, seen.to(first.dtype)], dim=1)).float()
+        count = first.shape[1]
+        rate = first.float() + change[:, :count]
+        shares = functional.pad(change[:, count:] - 2.0, (0, 0, 0, 0, 1, 0)).softmax(dim=1)[:, 1:] * planes[:, -1:]
+        means = planes[:, self.means[0] : self.means[1]]
+        rate = rate * (1 - shares.sum(dim=1, keepdim=True)) + (shares * means).sum(dim=1, keepdim=True)
+        kept = torch.tanh(self.keep(joined).float())
+        rate = rate[..., :height, :width]
+        return rate, (rate[:, -1:].clamp(0.0, 1.0), kept)

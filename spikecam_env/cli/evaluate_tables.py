@@ -1,0 +1,185 @@
+"""`spikecam evaluate table1 | table2 | table3 | table4 | still`: the paper's tables, and scenes at rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from spikecam_env.checked import checked_count, checked_number
+from spikecam_env.cli.options import Checked, Count, Size, Workers
+from spikecam_env.errors import InputError
+
+if TYPE_CHECKING:
+    from denoiser.evaluate.rows import Weights
+
+MOST_SCENES = 1000
+SHORTEST, LONGEST = 1.0, 1e4
+"""Mean intervals [frames]; the longest is a spike in a quarter of a second at 40 kHz."""
+FASTEST = 100.0
+"""Pixels a frame; a picture of 400 is crossed in 4 frames."""
+
+
+def _each(values: tuple[float, ...], name: str, least: float, most: float) -> None:
+    """Raises InputError for no numbers, and for one that is out of range."""
+    if not values:
+        raise InputError(f"{name} has no value; give one or more")
+    for value in values:
+        checked_number(value, name, least, most)
+
+
+@dataclass
+class Making:
+    """What every table has."""
+
+    out: Path | None = None
+    """Folder for the table as text, JSON and a page of pictures; a run that was stopped goes on in it."""
+    rows: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROW...", help_behavior_hint="(default: the table's)")] = ()
+    """Rows to show, of noisy, tfp, ssml, spk2img-clean, spk2img-noisy, baseline-held, baseline-mus, baseline,
+    paper-held, paper-mus, paper, best, best-overlap, best-map, before, clean, light-held, light-mus, light; noisy is
+    always there."""
+    weights: Path | None = None
+    """Folder whose paper.pt, paper-no-refine.pt, best.pt, spk2img-clean.pt, spk2img-noisy.pt and ssml.pt count before
+    the shipped ones."""
+    paper: Path | None = None
+    """Weights of `paper` to evaluate instead of the shipped ones."""
+    no_refine: Path | None = None
+    """Weights of `paper` without its refine module, instead of the shipped ones."""
+    best: Path | None = None
+    """Weights of `best` to evaluate instead of the shipped ones."""
+    before: Path | None = None
+    """Earlier weights of `best`, as a row to compare with."""
+    jobs: Workers = 1
+    """Worker processes, one thread each; 1 works in this one, with all threads."""
+
+    def given(self) -> Weights:
+        """The files that were given."""
+        from denoiser.evaluate.rows import Weights
+
+        given = {"paper": self.paper, "paper-no-refine": self.no_refine, "best": self.best, "before": self.before}
+        if self.weights is not None and not self.weights.is_dir():
+            raise InputError(f"--weights {self.weights}: there is no such folder")
+        return Weights.found(self.weights, {name: path for name, path in given.items() if path is not None})
+
+    def show(self, table: str, **options: Any) -> None:
+        """Make a table and print it."""
+        from denoiser.evaluate.report import report
+        from denoiser.evaluate.tables import Asked, evaluate_table
+
+        asked = Asked(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
+        print(report(evaluate_table(table, asked, progress=True)), end="")
+        if self.out is not None:
+            print(f"wrote {table}.txt, {table}.json and {table}.png in {self.out}")
+
+
+@dataclass
+class OnScenes(Making):
+    """A table on PHM_N."""
+
+    scenes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...", help_behavior_hint="(default: the ten)")] = ()
+    """Other scenes of the catalogue; `spikecam scenes` lists them."""
+    size: Size = (250, 400)
+    """Rows and columns."""
+    seeds: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 3
+    """Cameras before each scene, each with a fixed pattern and noise of its own; their spread is printed."""
+    intervals: Annotated[tuple[float, ...], Checked(_each, least=SHORTEST, most=LONGEST)] = (10.0,)
+    """Mean frames between spikes, a group of the table each; 3 10 40 100 go from bright to dim."""
+    speeds: Annotated[tuple[float, ...], Checked(_each, least=0.0, most=FASTEST)] = (0.0,)
+    """Speed of the motion [pixels a frame], a group each; 0: as the scene has it."""
+    frames: Count | None = None
+    """Frames of each stream, whose middle one is the picture; by default as many as the interval asks for."""
+    data: Path | None = None
+    """Dataset of `spikecam dataset phm-n` to take streams from, instead of simulating them."""
+
+    def make(self, table: str) -> None:
+        """Make a table on PHM_N and print it."""
+        from denoiser.evaluate.phm import SCENES
+
+        self.show(
+            table,
+            scenes=self.scenes or SCENES,
+            shape=self.size,
+            seeds=self.seeds,
+            intervals=self.intervals,
+            speeds=self.speeds,
+            frames=self.frames,
+            data=self.data,
+        )
+
+
+@dataclass
+class OnRecordings(Making):
+    """A table on real recordings."""
+
+    recordings: Path | None = None
+    """Folder with wall.npz and helicopter_low_light.npz; by default ../shared/data/real beside the checkout."""
+
+    def make(self, table: str) -> None:
+        """Make a table on real recordings and print it."""
+        self.show(table, **({} if self.recordings is None else {"real": self.recordings}))
+
+
+@dataclass
+class Table1(OnScenes):
+    """The paper's table 1: noisy, the pipelines, both modes and the clean twin, against the true light.
+
+    example:  spikecam evaluate table1 --jobs 2 --out evaluation
+    """
+
+    def run(self) -> None:
+        self.make("table1")
+
+
+@dataclass
+class Table2(OnRecordings):
+    """The paper's table 2: the same rows on real recordings, by NIQE.
+
+    example:  spikecam evaluate table2 --out evaluation
+    """
+
+    def run(self) -> None:
+        self.make("table2")
+
+
+@dataclass
+class Table3(OnScenes):
+    """The paper's table 3: `paper` with and without its refine module and its multi-stage update.
+
+    example:  spikecam evaluate table3 --jobs 2 --out evaluation
+    """
+
+    def run(self) -> None:
+        self.make("table3")
+
+
+@dataclass
+class Table4(OnRecordings):
+    """The paper's table 4: the ablation on real recordings, by NIQE.
+
+    example:  spikecam evaluate table4 --out evaluation
+    """
+
+    def run(self) -> None:
+        self.make("table4")
+
+
+@dataclass
+class StillScenes(Making):
+    """Scenes in which nothing moves: the mean of 400 frames, with and without a calibration of the camera.
+
+    example:  spikecam evaluate still --out evaluation
+    """
+
+    scenes: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 2
+    """Scenes at each of two light levels."""
+    size: Size = (96, 96)
+    """Rows and columns."""
+    seeds: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 3
+    """Cameras before each scene."""
+    frames: Count = 400
+    """Frames whose mean is judged."""
+
+    def run(self) -> None:
+        self.show("still", still_scenes=self.scenes, shape=self.size, seeds=self.seeds, frames=self.frames)

@@ -1,0 +1,57 @@
+"""`spikecam evaluate truth`: the denoiser where the light is not known, or the camera is a measured one."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+from spikecam_env.checked import checked_count
+from spikecam_env.cli.mode_weights import ModeWeights
+from spikecam_env.cli.options import Checked, Seed
+
+
+@dataclass
+class Truth:
+    """Compare with light that was seen: a recording's other half, fixed pattern where all moves, measured cameras.
+
+    Without recordings the simulated tests alone are run.  Options of reading a recording go into a side file beside
+    it (docs/recordings.md).
+
+    example:  spikecam evaluate truth --static wall.npz --moving helicopter.npz --out evaluation
+    """
+
+    static: Path | None = None
+    """A recording of a scene at rest: one half is denoised, the mean of the other is the truth."""
+    moving: Path | None = None
+    """A recording in which everything moves: what stays at a pixel is the camera's own pattern."""
+    out: Path | None = None
+    """Folder for truth.json and truth.txt."""
+    modes: tuple[Literal["paper", "best"], ...] = ("paper", "best")
+    """Modes to evaluate."""
+    scenes: Annotated[int, Checked(checked_count, most=1000)] = 1
+    """Simulated scenes for each camera, and in each class of speed and light."""
+    seed: Seed = 0
+    """Seed of the simulated scenes, cameras and noise."""
+    weights: ModeWeights = field(default_factory=ModeWeights)
+
+    def run(self) -> None:
+        from denoiser.evaluate.truth import evaluate_truth, report
+        from denoiser.evaluate.writing import write_result
+        from spikecam_env.cli.files import out_folder
+
+        with nullcontext() if self.out is None else out_folder(self.out):
+            result = evaluate_truth(
+                self.static,
+                self.moving,
+                self.modes,
+                weights=self.weights.by_mode(),
+                scenes=self.scenes,
+                seed=self.seed,
+            )
+            if self.out is not None:
+                write_result(self.out, "truth", result, report(result))
+        print(report(result), end="")
+        if self.out is not None:
+            print(f"wrote truth.json and truth.txt in {self.out}")

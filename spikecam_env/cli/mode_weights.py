@@ -1,0 +1,21 @@
+"""Weights of the denoiser's modes, as options say them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class ModeWeights:
+    """Weights to evaluate instead of the shipped ones."""
+
+    paper: Path | None = None
+    """Weights of the `paper` mode."""
+    best: Path | None = None
+    """Weights of the `best` mode."""
+
+    def by_mode(self) -> dict[str, Path]:
+        """Those that were given."""
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {mode: path for mode, path in given.items() if path is not None}

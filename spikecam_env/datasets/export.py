@@ -1,0 +1,124 @@
+"""Recordings with ground truth in the layout of others, so that their networks can be run on our noisy streams.
+
+A clip is cut out about a frame whose light is known: `frames` frames, the known one in the middle.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from spikecam_env.checked import checked_count
+from spikecam_env.datasets.manifest import Manifest
+from spikecam_env.datasets.spikezoo import CLIP_FRAMES, RATE, Bits, write_clip
+from spikecam_env.errors import InputError
+from spikecam_env.names import distinct
+from spikecam_env.streams.hdf5 import open_recording, read_hdf5
+from spikecam_env.untrusted import hdf5_values, numbers
+from spikecam_env.whole import whole_folder, write_text_whole
+
+RECORD = "export.json"
+"""Beside the clips: how they were made."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A clip: split and name, the recording and the frame it is about, its mean light [spikes/frame], the share of its
+    pixels that are brighter than white."""
+
+    split: str
+    name: str
+    source: str
+    frame: int
+    light: float
+    cut: float
+
+
+def export_spikezoo(
+    sources: Sequence[str | Path],
+    out: str | Path,
+    *,
+    frames: int = CLIP_FRAMES,
+    clips: int = 1,
+    rate: float = RATE,
+    bits: Bits = 8,
+    stream: str = "spikes",
+    progress: bool = False,
+) -> list[Exported]:
+    """Write Spike-Zoo's layout (`datasets.spikezoo`) from recordings (.h5) and folders of datasets.
+
+    out      a new folder, which appears whole: test/ and train/ as a dataset has them, test/ for recordings by
+             themselves, and `export.json`
+    frames   of a clip, odd; the frame of known light is in the middle
+    clips    most from one recording, spread evenly over its frames of known light
+    rate     light [spikes/frame] that is white
+    stream   "spikes", or "clean" for the noise-free twin's
+    Errors: InputError for no source, a recording without truth, or without enough frames about it, an even number of
+    frames, two recordings of one name, and what `write_clip` refuses; WriteError for a folder that is there already.
+    """
+    if not sources:
+        raise InputError("nothing to export; give folders of datasets or .h5 recordings")
+    if checked_count(frames, "frames") % 2 == 0:
+        raise InputError(f"frames = {frames}; it must be odd: the frame of known light is in the middle")
+    clips = checked_count(clips, "clips")
+    found = [(split, path) for source in sources for split, path in _recordings(Path(source))]
+    distinct((f"{split}/{path.stem}" for split, path in found), "recording")
+    done: list[Exported] = []
+    with whole_folder(out) as folder:
+        for split, path in tqdm(found, desc="export", unit="recording", leave=False, disable=not progress):
+            for row, frame in _middles(path, frames, clips):
+                name = f"{path.stem}-{frame}"
+                spikes = read_hdf5(path, first=frame - frames // 2, count=frames, stream=stream)[0]
+                light = _light(path, row, spikes.shape[1:])
+                cut = write_clip(folder / split, name, spikes, light, rate, bits)
+                done.append(Exported(split, name, path.name, frame, float(light.mean()), cut))
+        settings = {"layout": "spikezoo", "rate": rate, "bits": bits, "frames": frames, "stream": stream}
+        record: dict[str, Any] = {**settings, "clips": [asdict(clip) for clip in done]}
+        write_text_whole(folder / RECORD, json.dumps(record, indent=1) + "\n")
+    return done
+
+
+def _recordings(source: Path) -> list[tuple[str, Path]]:
+    """(split, path) of every recording that a source means."""
+    if not source.is_dir():
+        return [("test", source)]
+    files = Manifest.read(source).files
+    if any(file["sha256"] is None for file in files):
+        raise InputError(f"{source} is not finished; run its `spikecam dataset` command again")
+    return [(file["path"].rpartition("/")[0].partition("/")[0] or "test", source / file["path"]) for file in files]
+
+
+def _middles(path: Path, frames: int, most: int) -> list[tuple[int, int]]:
+    """(row of its truth, frame) of frames of known light with room about them, at most so many, spread evenly."""
+    with open_recording(path) as recording:
+        if "truth" not in recording.file.keys():  # noqa: SIM118 - `in` follows links
+            raise InputError(f"{path} holds no truth; record it with --truth-every")
+        instants = numbers(hdf5_values(recording.file, "truth/frame", str(path)), "truth/frame", str(path))
+        length = recording.frames("spikes")
+    reach = frames // 2
+    whole = np.floor(instants.ravel())
+    room = [(row, int(frame)) for row, frame in enumerate(whole) if reach <= frame < length - reach]
+    if not room:
+        raise InputError(
+            f"{path}: of {length} frames, none of known light has {reach} before and after it; record more, "
+            "or give fewer --frames"
+        )
+    count = min(most, len(room))
+    return [room[(2 * i + 1) * len(room) // (2 * count)] for i in range(count)]
+
+
+def _light(path: Path, row: int, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """(H, W) light of a truth [spikes/frame]."""
+    with open_recording(path) as recording:
+        held = hdf5_values(recording.file, "truth/radiance", str(path), slice(row, row + 1))
+    light = numbers(held, "truth/radiance", str(path)).astype(np.float64)
+    if light.shape != (1, *shape) or not np.isfinite(light).all():
+        raise InputError(f"{path}: truth/radiance has frames of {light.shape[1:]}; need finite numbers of {shape}")
+    return light[0]

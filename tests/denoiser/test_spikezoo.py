@@ -1,0 +1,127 @@
+"""Spike-Zoo's protocol: its measures on pictures whose error is known, and on one of its own clips."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from skimage.metrics import peak_signal_noise_ratio, structural_similarity
+
+from denoiser.evaluate.spikezoo import evaluate_spikezoo, interval_picture, report, score
+from spikecam_env.cli.main import run
+from spikecam_env.datasets.spikezoo import find_clips, read_clip, write_clip
+from spikecam_env.errors import InputError
+from spikecam_env.streams import read_recording, read_truth
+
+SYNTHETIC = Path(__file__).parents[2].parent / "shared" / "data" / "synthetic"
+
+
+def test_an_offset_of_a_tenth_is_20_db():
+    truth = np.linspace(0.1, 0.8, 400).reshape(20, 20)
+    assert score(0.6 * (truth + 0.1), truth)["PSNR"] == pytest.approx(20.0)
+    same = score(0.6 * truth, truth)
+    assert same["PSNR"] > 150 and same["SSIM"] == pytest.approx(1) and same["SSIM [0, 1]"] == pytest.approx(1)
+
+
+def test_a_picture_is_cut_at_black_and_white():
+    truth = np.linspace(0, 1, 400).reshape(20, 20)
+    wild = 0.6 * np.where(truth > 0.5, 1.5, -0.5)
+    assert score(wild, truth) == score(0.6 * np.where(truth > 0.5, 1.0, 0.0), truth)
+
+
+def test_the_measures_are_those_of_pictures_from_minus_one_to_one():
+    """In single precision and with scikit-image's own range, as Spike-Zoo computes them."""
+    rng = np.random.default_rng(8)
+    truth = rng.random((30, 40))
+    picture = np.clip(truth + 0.1 * rng.standard_normal((30, 40)), 0, 1)
+    a, b = (np.float32(2 * p - 1) for p in (picture, truth))
+    found = score(0.6 * picture, truth)
+    assert found["PSNR"] == pytest.approx(peak_signal_noise_ratio(a, b), abs=1e-3)
+    assert found["SSIM"] == pytest.approx(structural_similarity(a, b, data_range=2), abs=1e-4)
+    assert found["SSIM [0, 1]"] == pytest.approx(structural_similarity(picture, truth, data_range=1), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "last, following, interval",
+    [(50, 51, 1), (48, 53, 5), (31, 70, 39), (30, 60, 40), (45, 71, 40), (None, 55, 40), (45, None, 40)],
+)
+def test_an_interval_is_seen_20_frames_either_way(last, following, interval):
+    """Of 101 frames, about frame 50: the last spike in 31 .. 50, the next in 51 .. 70, else 40 frames."""
+    spikes = np.zeros((101, 1, 1), np.uint8)
+    spikes[[t for t in (last, following) if t is not None]] = 1
+    assert interval_picture(spikes, 50)[0, 0] == pytest.approx(1 / interval)
+
+
+def test_a_stream_of_even_light_has_the_picture_that_it_should(tmp_path):
+    """A spike in every third frame is grey 1/3 / 0.6."""
+    spikes = np.zeros((63, 16, 24), np.uint8)
+    spikes[::3] = 1
+    write_clip(tmp_path, "a", spikes, np.full((16, 24), 1 / 3), bits=16)
+    result = evaluate_spikezoo(tmp_path, ())
+    tfp, tfi = (next(r for r in result["rows"] if r["row"] == f"noisy {kind}") for kind in ("TFP", "TFI"))
+    assert tfp["PSNR"] == pytest.approx(-20 * np.log10(abs(14 / 41 - 1 / 3) / 0.6), abs=0.05)
+    assert tfi["PSNR"] > 90
+    assert "1 clips" in report(result)
+
+
+def test_a_clip_of_too_few_frames_is_refused(tmp_path):
+    write_clip(tmp_path, "a", np.zeros((40, 16, 24), np.uint8), np.zeros((16, 24)))
+    with pytest.raises(InputError, match="40 frames"):
+        evaluate_spikezoo(tmp_path, ())
+
+
+def test_a_film_is_exported_and_evaluated_with_its_own_spikes_and_truth(tmp_path, capsys):
+    """Film to noisy spikes to Spike-Zoo's layout to figures, each by its command."""
+    y, x = np.mgrid[:32, :48]
+    film = [np.uint8(120 + 100 * np.sin((x + 2 * i) / 5) * np.cos(y / 4)) for i in range(9)]
+    np.save(tmp_path / "wave.npy", film)
+    steps = (
+        f"film {tmp_path}/wave.npy --film-rate 1600 --transfer linear --size 32 48 --truth-every 25 --seed 1 "
+        f"--mean-interval 5 --out {tmp_path}/wave.h5",
+        f"export {tmp_path}/wave.h5 --frames 121 --out {tmp_path}/zoo",
+        f"evaluate spikezoo {tmp_path}/zoo --modes best --out {tmp_path}/result",
+    )
+    for step in steps:
+        assert run(step.split()) == 0
+    printed = capsys.readouterr().out
+    assert "best rate" in printed and "white is 0.6 spikes/frame" in printed
+    spikes, picture = read_clip(*find_clips(tmp_path / "zoo"))
+    truth = read_truth(tmp_path / "wave.h5")
+    row = list(truth["frame"]).index(100.5)
+    assert np.array_equal(spikes, read_recording(tmp_path / "wave.h5", first=40, count=121).spikes)
+    assert np.abs(picture - np.minimum(truth["radiance"][row] / 0.6, 1)).max() <= 0.5 / 255 + 1e-6
+    assert {p.name for p in (tmp_path / "result").iterdir()} == {"spikezoo.json", "spikezoo.txt"}
+
+
+@pytest.fixture(scope="module")
+def reds(tmp_path_factory) -> Path:
+    """Spike-Zoo's REDS clip, laid out as it has it."""
+    if not SYNTHETIC.is_dir():
+        pytest.skip("the shared REDS clip is not here")
+    folder = tmp_path_factory.mktemp("reds")
+    for source, kind, name in (
+        ("reds_200_part1.dat", "spike", "a.dat"),
+        ("reds_200_part1_frame151.png", "gt", "a.png"),
+    ):
+        (folder / kind).mkdir()
+        shutil.copyfile(SYNTHETIC / source, folder / kind / name)
+    return folder
+
+
+def test_the_reds_clip_is_upright_and_its_white_is_0_6(reds):
+    spikes, picture = read_clip(*find_clips(reds))
+    rate = spikes[130:171].mean(axis=0)
+    print(f"mean rate / mean picture {rate.mean() / picture.mean():.4f}; upright {score(rate, picture)['PSNR']:.2f} dB")
+    assert spikes.shape == (301, 250, 400)
+    assert rate.mean() / picture.mean() == pytest.approx(0.6, rel=0.02)
+    assert score(rate, picture)["PSNR"] > 30 > 20 > score(rate[::-1], picture)["PSNR"]
+
+
+def test_rate_planes_are_nearer_to_the_reds_picture_than_tfp(reds):
+    result = evaluate_spikezoo(reds, ("best",))
+    rows = {row["row"]: row for row in result["rows"]}
+    print(report(result))
+    assert rows["noisy TFP"]["PSNR"] == pytest.approx(31.60, abs=0.01)
+    assert rows["best rate"]["PSNR"] > rows["noisy TFP"]["PSNR"] + 2

@@ -1,0 +1,312 @@
+"""The tables: rows that are there, rows that are not, going on after a stop, and the figures beside the wanted ones."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+
+from denoiser.evaluate import exposed, still, tables, work
+from denoiser.evaluate.exposed import Case
+from denoiser.evaluate.figures import figures
+from denoiser.evaluate.judge import Record, Score
+from denoiser.evaluate.report import report
+from denoiser.evaluate.rows import ROWS, Weights, why_not
+from denoiser.evaluate.summary import groups, mean_and_spread
+from denoiser.evaluate.tables import TABLES, Asked, evaluate_table
+from spikecam_env.datasets import build, phm_n
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import SensorModel, SpikeSensor
+from spikecam_env.streams import middleTFP
+
+SMALL = Asked(
+    scenes=("disk",), shape=(32, 48), seeds=2, frames=200, rows=("noisy", "tfp", "clean", "light", "light-mus")
+)
+CLASSICAL = ("tfp21", "tfp41", "tfi")
+
+
+@pytest.fixture(scope="module")
+def result() -> dict:
+    return evaluate_table("table1", SMALL)
+
+
+def test_noisy_is_at_0_and_clean_at_1_and_the_light_through_the_ideal_pixel_is_no_better(result: dict) -> None:
+    (group,) = result["groups"]
+    for column in CLASSICAL:
+        db = {row: found["pictures"][column]["db"] for row, found in group["rows"].items()}
+        gap = {row: found["pictures"][column].get("gap_closed") for row, found in group["rows"].items()}
+        print(column, db, gap)
+        assert db["noisy"] < db["clean"]
+        assert (gap["noisy"], gap["clean"]) in ((0, 1), (None, None))  # none where clean gains under half a dB
+        assert abs(db["light"] - db["clean"]) < 0.5
+    assert group["seeds"] == 2 and group["rows"]["clean"]["pictures"]["tfi"]["db_spread"] > 0
+
+
+def test_the_multi_stage_update_of_the_true_light_is_worse_than_its_accumulation(result: dict) -> None:
+    rows = result["groups"][0]["rows"]
+    for column in CLASSICAL:
+        by_mus, summed = (rows[row]["pictures"][column]["db"] for row in ("light-mus", "light"))
+        print(f"{column}: true light by MUS {by_mus:.2f} dB, accumulated {summed:.2f} dB")
+        assert by_mus < summed
+
+
+def test_rows_without_weights_are_named_with_the_reason(tmp_path: Path) -> None:
+    found = evaluate_table("table3", replace(SMALL, seeds=1, rows=("baseline", "clean"), out=tmp_path / "out"))
+    text = report(found)
+    if "baseline" not in found["missing"]:
+        pytest.skip("weights without the refine module are shipped")
+    assert "paper-no-refine.pt" in found["missing"]["baseline"]
+    assert "baseline: no weights are shipped yet" in text
+    line = next(line for line in text.splitlines() if line.startswith("no refine, accumulated"))
+    assert set(line.removeprefix("no refine, accumulated")) <= set(" -|")
+    with pytest.raises(InputError, match=r"there is no file .*none\.pt"):
+        evaluate_table(
+            "table3", replace(SMALL, weights=Weights({"paper-no-refine": tmp_path / "none.pt"}), rows=("baseline",))
+        )
+
+
+def test_shipped_weights_of_another_network_are_a_reason_and_given_ones_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    damaged = tmp_path / "best.pt"
+    damaged.write_bytes(b"no weights")
+    with monkeypatch.context() as patch:
+        patch.setattr(Weights, "path", lambda self, name: damaged if name == "best" else tmp_path / "none.pt")
+        found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("best",)))
+    assert "best.pt" in found["missing"]["best"] and "noisy" in found["groups"][0]["rows"]
+    with pytest.raises(InputError, match=r"best\.pt"):
+        evaluate_table("table1", replace(SMALL, seeds=1, rows=("best",), weights=Weights({"best": damaged})))
+
+
+def test_the_folder_has_text_json_lines_and_a_page(tmp_path: Path, result: dict) -> None:
+    found = evaluate_table("table1", replace(SMALL, out=tmp_path))
+    assert found["scenes"] == result["scenes"]
+    assert json.loads((tmp_path / "table1.json").read_text())["scenes"] == found["scenes"]
+    assert (tmp_path / "table1.txt").read_text() == report(found)
+    assert len((tmp_path / "table1.jsonl").read_text().splitlines()) == 1 + 2 * 5
+    assert {"disk-noisy-tfp21.png", "disk-light-light.png"} <= {p.name for p in (tmp_path / "pictures").iterdir()}
+    assert (tmp_path / "table1.png").stat().st_size > 1000
+
+
+class Counted:
+    """Stands in for `work.do`: counts tasks, and fails at one of them."""
+
+    def __init__(self, fail_at: int | None = None) -> None:
+        self.tasks: list[tuple[str, int, str]] = []
+        self.fail_at = fail_at
+
+    def __call__(self, task: work.Task) -> list[Record]:
+        if len(self.tasks) == self.fail_at:
+            raise KeyboardInterrupt
+        self.tasks.append((task.case.scene, task.case.seed, task.source))
+        return DO(task)
+
+
+DO = work.do
+
+
+def run(monkeypatch: pytest.MonkeyPatch, asked: Asked, fail_at: int | None = None) -> list[tuple[str, int, str]]:
+    """The tasks that were done for a table."""
+    counted = Counted(fail_at)
+    monkeypatch.setattr(work, "do", counted)
+    if fail_at is None:
+        evaluate_table("table1", asked)
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            evaluate_table("table1", asked)
+    return counted.tasks
+
+
+def test_a_table_that_was_stopped_goes_on_where_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: dict
+) -> None:
+    asked = replace(SMALL, out=tmp_path / "out")
+    done = run(monkeypatch, asked, fail_at=3)
+    rest = run(monkeypatch, asked)
+    assert len(done) == 3 and not set(done) & set(rest)
+    assert {*done, *rest} == {("disk", seed, s) for seed in (0, 1) for s in ("noisy", "tfp41", "clean", "light")}
+    assert json.loads((tmp_path / "out" / "table1.json").read_text())["scenes"] == result["scenes"]
+    assert run(monkeypatch, asked) == []
+
+
+def test_more_scenes_seeds_and_intervals_are_added_to_what_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = replace(SMALL, seeds=1, rows=("noisy",), out=tmp_path)
+    assert run(monkeypatch, asked) == [("disk", 0, "noisy")]
+    more = replace(asked, seeds=2, scenes=("disk", "collage"), rows=("noisy", "clean"))
+    assert len(run(monkeypatch, more)) == 2 * 2 * 2 - 1
+    assert len(run(monkeypatch, replace(more, intervals=(10.0, 20.0)))) == 2 * 2 * 2
+
+
+def test_other_weights_are_measured_again_and_other_settings_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = replace(SMALL, seeds=1, rows=("noisy", "paper"), out=tmp_path)
+    assert len(run(monkeypatch, asked)) == 2
+    copy = tmp_path / "paper.pt"
+    copy.write_bytes(Weights().path("paper").read_bytes())
+    same = replace(asked, weights=Weights({"paper": copy}))
+    assert run(monkeypatch, same) == []
+    monkeypatch.setattr(Weights, "digest", lambda self, name: "other")
+    assert run(monkeypatch, same) == [("disk", 0, "paper")]
+    for other in (replace(asked, shape=(32, 40)), replace(asked, frames=210)):
+        with pytest.raises(InputError, match="other settings"):
+            evaluate_table("table1", other)
+
+
+def test_two_processes_find_what_one_does(result: dict) -> None:
+    asked = replace(SMALL, rows=("noisy",), jobs=2)
+    rows = [r for r in result["scenes"] if r["row"] in asked.rows]
+    assert evaluate_table("table1", asked)["scenes"] == rows
+
+
+def test_rate_planes_are_judged_beside_spikes() -> None:
+    if why := why_not("best", Weights()):
+        pytest.skip(why)
+    found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("best", "paper-mus"), shape=(24, 32)))
+    best, mus = (found["groups"][0]["rows"][row] for row in ("best", "paper-mus"))
+    assert best["pictures"]["plane"]["db"] > 10 and "plane" not in mus["pictures"]
+    assert len(best["db_by_place"]) > 1 and np.isfinite(best["flicker"])
+    assert abs(best["lag"]) < 6 and abs(best["bias"]) < 0.2
+
+
+def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """TFP 41 stands in for them: their columns and rows are then its own."""
+    for name in ("ssml", "spk2img-clean", "spk2img-noisy"):
+        torch.save({"state_dict": {"weight": torch.zeros(3, 4)}}, tmp_path / f"{name}.pt")
+    stand_in = SimpleNamespace(
+        reconstruct=lambda name, spikes, t, weights: middleTFP(spikes, t, 41),
+        reconstruct_many=lambda name, spikes, frames, weights: np.stack([middleTFP(spikes, t, 41) for t in frames]),
+    )
+    monkeypatch.setattr(exposed, "_reconstruction", lambda: stand_in)
+    asked = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
+    found = evaluate_table("table1", replace(asked, weights=Weights.found(tmp_path, {})))
+    rows = found["groups"][0]["rows"]
+    assert found["parameters"] == {"noisy": None, "tfp": None, "ssml": 12, "spk2img-noisy": 12}
+    assert "SSML, then spikes, 0.00 M" in report(found)
+    assert rows["ssml"] == rows["tfp"] == rows["spk2img-noisy"]
+    pictures = rows["noisy"]["pictures"]
+    assert pictures["spk2img-clean"] == pictures["spk2img-noisy"] == pictures["tfp41"]
+    weights = next(r["weights"] for r in found["scenes"] if r["row"] == "ssml")
+    assert set(weights) == {"ssml", "spk2img-clean", "spk2img-noisy"} and None not in weights.values()
+
+
+def test_streams_come_from_a_dataset_too(tmp_path: Path) -> None:
+    """Seed 0 is the dataset's camera: the same streams, so the same figures."""
+    plan = phm_n(scenes=("disk",), shape=(32, 48), frames=264)
+    build(plan, tmp_path / "data")
+    asked = replace(SMALL, seeds=1, frames=264, rows=("noisy", "clean"))
+    simulated = evaluate_table("table1", asked)
+    assert evaluate_table("table1", replace(asked, data=tmp_path / "data"))["groups"] == simulated["groups"]
+    (tmp_path / "data" / "test" / "disk.h5").unlink()
+    with pytest.raises(InputError, match=r"disk\.h5"):
+        evaluate_table("table1", replace(asked, data=tmp_path / "data"))
+
+
+def test_real_recordings_are_judged_by_niqe_or_named_as_absent(tmp_path: Path) -> None:
+    spikes = (np.random.default_rng(0).random((120, 250, 400)) < 0.3).astype(np.uint8)
+    np.savez(tmp_path / "wall.npz", arr_0=spikes)
+    found = evaluate_table("table2", replace(SMALL, rows=("noisy",), real=tmp_path))
+    (group,) = found["groups"]
+    assert group["scenes"] == ["wall.npz"] and group["rows"]["noisy"]["pictures"]["tfp41"]["niqe"] > 0
+    assert "helicopter_low_light.npz" in found["missing"] and "there is no recording" in report(found)
+    with pytest.raises(InputError, match="true light"):
+        evaluate_table("table2", replace(SMALL, rows=("clean",), real=tmp_path))
+
+
+def test_at_rest_the_mean_of_clean_frames_is_the_light_and_that_of_noisy_ones_has_the_fixed_pattern() -> None:
+    found = evaluate_table("still", Asked(still_scenes=1, seeds=1, shape=(40, 40), rows=("noisy", "clean")))
+    rows = found["groups"][0]["rows"]
+    print({row: m["mean_db"] for row, m in rows.items()})
+    assert rows["clean"]["mean_db"] > 45 > 35 > rows["noisy"]["mean_db"]
+    assert rows["clean"]["lag"] is None
+
+
+def test_unknown_names_and_short_streams_are_refused() -> None:
+    for asked, why in (
+        (replace(SMALL, scenes=("disks",)), "disk"),
+        (replace(SMALL, rows=("bests",)), "best"),
+        (replace(SMALL, frames=150), "200"),
+        (replace(SMALL, seeds=0), "seeds"),
+    ):
+        with pytest.raises(InputError, match=why):
+            evaluate_table("table1", asked)
+    with pytest.raises(InputError, match="table1"):
+        evaluate_table("table9")
+
+
+def test_every_table_has_rows_that_there_are() -> None:
+    for table in TABLES.values():
+        assert set(table.rows) <= set(ROWS) and table.rows[0] == "noisy"
+    assert set(tables.ABLATION) >= {"baseline-held", "baseline-mus", "paper-held", "paper-mus"}
+
+
+def test_the_spread_is_over_seeds_of_the_mean_over_scenes() -> None:
+    assert mean_and_spread([(0, 1.0), (0, 3.0), (1, 3.0), (1, 5.0), (1, None)]) == (
+        3.0,
+        pytest.approx(2**0.5, abs=1e-4),
+    )
+    assert mean_and_spread([(0, 1.0)]) == (1.0, None)
+    assert mean_and_spread([(0, None)]) == (None, None)
+
+
+def record(row: str, scene: str, db: dict[str, float], niqe: float | None = None, **measures: float) -> Record:
+    pictures = {column: Score(db=level, ssim=0.5) for column, level in db.items()}
+    pictures |= {} if niqe is None else {"tfi": Score(niqe=niqe)}
+    return Record(
+        scene=scene, seed=0, interval=10.0, speed=0.0, row=row, weights={}, pictures=pictures, **measures
+    )  # fmt: skip
+
+
+def test_the_figures_name_what_holds_and_what_does_not() -> None:
+    noisy, best, clean = {"spk2img-clean": 20.0, "tfp21": 20.0}, {"spk2img-clean": 21.0, "tfp21": 21.8}, {"tfp21": 22.0}
+    worse = best | {"spk2img-clean": 19.9}
+    records = [
+        *(record(row, "a", db) for row, db in (("noisy", noisy), ("clean", clean))),
+        record("best", "a", best, bias=-0.02, flicker=1.05, texture=0.8),
+        *(record(row, "b", db) for row, db in (("noisy", noisy), ("clean", clean), ("best", worse))),
+    ]
+    found = {f["what"]: f for f in figures("table1", groups(records), records)}
+    mean = found["best, Spk2Img, clean: mean over noisy [dB]"]
+    assert (mean["found"], mean["holds"]) == (0.45, False)
+    least = found["best, Spk2Img, clean: least over noisy of any scene [dB]"]
+    assert (least["found"], least["holds"]) == (-0.1, False)
+    gap = found["best, TFP 21: share of the gap closed"]
+    assert (gap["found"], gap["holds"]) == (0.9, True)
+    assert found["best: bias"]["holds"] is False
+    assert found["best: frame-to-frame error across passes / within"]["holds"] is True
+    assert found["best: slope of low-contrast texture"]["holds"] is True
+    assert found["best, rate planes: mean [dB]"]["holds"] is None
+    dim = [r.model_copy(update={"interval": 40.0}) for r in records]
+    assert all("over noisy (" in f["what"] or "worst" in f["what"] for f in figures("table1", groups(dim), dim))
+
+
+def test_naturalness_counts_downwards() -> None:
+    records = [
+        record(row, "a", {}, niqe=niqe) for row, niqe in (("noisy", 5.0), ("paper-held", 4.6), ("paper-mus", 4.5))
+    ]
+    found = {f["what"]: f for f in figures("table2", groups(records), records)}
+    assert (found["TFI: paper-mus over noisy [NIQE]"]["found"], found["TFI: paper-mus over noisy [NIQE]"]["holds"]) == (
+        -0.5,
+        True,
+    )
+    ablation = {f["what"]: f for f in figures("table4", groups(records), records)}
+    assert ablation["TFI: MUS over intervals kept, paper [NIQE]"]["found"] == -0.1
+    assert ablation["TFI: refine over none, mus [NIQE]"]["holds"] is None
+
+
+def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:
+    """Against the rates of the same camera before even light: its gain and dark explain nearly all of their spread."""
+    case = Case("still", "bright 0", 3, (24, 32), 400)
+    gain, dark = still.calibrated(case)
+    camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, still.unit_seed(case))
+    rate = camera.step(np.full(case.shape, 0.3, np.float32), 4000).mean(axis=0)
+    left = np.std(rate - (0.3 * gain + dark)) / np.std(rate)
+    print(f"spread of the rates that the maps leave: {left:.3f}")
+    assert left < 0.1
