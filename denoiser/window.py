@@ -132,13 +132,11 @@ class Window:
 class RollingWindow:
     """Cuts a stream that comes in chunks of any length into passes; the cut does not depend on the chunks."""
 
-    def __init__(
-        self, layout: WindowLayout, shape: tuple[int, int], unit: PixelMap | None = None, first: int = 0
-    ) -> None:
+    def __init__(self, layout: WindowLayout, shape: tuple[int, int], unit: PixelMap | None = None) -> None:
         self.layout = layout
         self.shape = shape
         self.unit = unit
-        self.start = first  # first frame of the next pass
+        self.start = 0  # first frame of the next pass
         self.seen = 0  # frames pushed
         self._frames = np.empty((0, *shape), np.uint8)  # the last frames, up to `seen`
         self._last = np.full(shape, -1, np.int32)  # last spike before the window
