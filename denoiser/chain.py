@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from torch import nn
 
 from denoiser import infer
+from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
-from denoiser.window import PixelMap, RollingWindow, Window, check_like
+from denoiser.window import RollingWindow, Window, check_like
 
 Rates = NDArray[np.float32]
 

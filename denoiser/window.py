@@ -31,59 +31,19 @@ real frames only.  The state is the frames of one window, the last spike before 
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from denoiser.pixel_map import PixelMap
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 
 WINDOW_PRIOR = 2.0
 """Spikes that a pixel's gain of 1 weighs against what the sums say."""
-
-
-@dataclass(frozen=True)
-class PixelMap:
-    """A calibrated unit: its light l fires gain * l + dark times a frame.
-
-    gain, dark: (H, W) float32; gain 0.01 to 100; dark [spikes/frame], 0 to 1.
-    Raises InputError for other shapes, and for values that are not finite or out of range.
-    """
-
-    gain: NDArray[np.float32]
-    dark: NDArray[np.float32]
-
-    def __post_init__(self) -> None:
-        gain, dark = (np.ascontiguousarray(value, np.float32) for value in (self.gain, self.dark))
-        if gain.ndim != 2 or gain.shape != dark.shape or not gain.size:
-            raise InputError(f"a calibration map has gain and dark of one shape (H, W); got {gain.shape}, {dark.shape}")
-        if not (np.all((gain >= 0.01) & (gain <= 100)) and np.all((dark >= 0) & (dark <= 1))):
-            raise InputError("a calibration map must have gains from 0.01 to 100 and dark rates from 0 to 1")
-        object.__setattr__(self, "gain", gain)
-        object.__setattr__(self, "dark", dark)
-
-    @classmethod
-    def of(cls, unit: Any) -> PixelMap:
-        """A map as it is, or of a pair (gain, dark).  Raises InputError for anything else."""
-        if isinstance(unit, cls):
-            return unit
-        try:
-            gain, dark = unit
-            return cls(np.asarray(gain, np.float32), np.asarray(dark, np.float32))
-        except (TypeError, ValueError) as error:
-            raise InputError(
-                f"unit is {type(unit).__name__}; give a PixelMap or a pair of maps (gain, dark)"
-            ) from error
-
-    @cached_property
-    def digest(self) -> str:
-        """SHA-256 of both maps."""
-        return hashlib.sha256(self.gain.tobytes() + self.dark.tobytes()).hexdigest()
 
 
 @dataclass(frozen=True)
