@@ -1,7 +1,7 @@
 """Training: minimise the error of the rate along simulated streams, resumable at any minute.
 
     paper   L = mean (ISI_dn - ISI_clean)^2                 paper (22), on normalised intervals (`interval_training`)
-    best    L = mean (rate - light)^2 / (rate + 0.02) ..    light weighs as its count noise does (`rollout`)
+    best    L = mean (rate - light)^2 / (rate + 0.02) + ..  light weighs as its count noise does (`rollout`)
 
 Adam; the rate of learning warms up over 100 steps and falls as a cosine to nothing at the end.  Everything follows from
 the seed and the number of steps; a run limited by `minutes` ends where the clock says.  A resumed run draws other
@@ -108,7 +108,10 @@ class TrainConfig:
 
 
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
-    """Train, or go on training; returns the path of the weights."""
+    """Train, or go on training; returns the path of the weights.
+
+    Raises InputError where `out` holds the run of another mode, or a damaged one.
+    """
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)
@@ -144,17 +147,15 @@ class _Run:
     network: nn.Module
     optimiser: torch.optim.Optimizer
     step: int
-    seconds: float
-    curve: list[dict[str, float]]
+    seconds: float  # spent so far
+    curve: list[dict[str, float]]  # the validations
     resumed_at: list[int]
 
     @classmethod
     def begin(cls, config: TrainConfig, recipe: Recipe) -> _Run:
         network = recipe.network().to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         on_gpu = torch.device(config.device).type == "cuda"
-        lr = (
-            torch.tensor(config.lr, device=config.device) if on_gpu else config.lr
-        )  # in a graph only a tensor can change
+        lr = torch.tensor(config.lr, device=config.device) if on_gpu else config.lr  # replayed steps read tensors
         optimiser = torch.optim.Adam(network.parameters(), lr, capturable=on_gpu)
         return cls(network, optimiser, 0, 0.0, [], [])
 
@@ -197,7 +198,7 @@ def _plain_groups(state: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Progress(Declared):
-    """Where a run is, besides network, optimiser and generator."""
+    """Where a run is, besides network and optimiser."""
 
     step: Whole
     seconds: Annotated[float, Field(ge=0)]
