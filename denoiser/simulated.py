@@ -23,6 +23,7 @@ from tqdm import tqdm
 
 from denoiser.pairs import TRAINING_KINDS, draw_model
 from scenes.textures import random_texture
+from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels import cuda, fast
 from spikecam_env.sensor.kernels.cuda.state import BatchLaw, BatchSegment, BatchState
 from spikecam_env.sensor.light import GRAINS
@@ -145,6 +146,7 @@ class SimulatedStreams:
     compiled: the light by `torch.compile` (a GPU's kernels are then few; other rounding).
 
     After the start only `advance` changes anything, and in place (`denoiser.captured`).
+    Raises InputError for a patch that is larger than the bank's units.
     """
 
     def __init__(
@@ -160,6 +162,8 @@ class SimulatedStreams:
         self.device = torch.device(device)
         self.count, self.patch = count, patch
         self.bank = Bank.drawn(seed, self.device) if bank is None else bank
+        if patch > min(self.bank.gain.shape[1:]):
+            raise InputError(f"patch is {patch}; the sensor units have {min(self.bank.gain.shape[1:])} pixels a side")
         self.rng = torch.Generator(self.device).manual_seed(seed)
         self._background: Background = torch.compile(_background, dynamic=False) if compiled else _background
         self._over: Over = torch.compile(_over, dynamic=False) if compiled else _over

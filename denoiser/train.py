@@ -17,7 +17,7 @@ import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Protocol
 
@@ -32,6 +32,7 @@ from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.recipe import Recipe, recipe_of
 from denoiser.rollout import Rollouts
 from denoiser.simulated import Bank, SimulatedStreams
+from denoiser.training_record import training_record
 from denoiser.weights import save_weights, write_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
@@ -315,37 +316,13 @@ class Judge:
 
 def _save(config: TrainConfig, recipe: Recipe, run: _Run) -> Path:
     weights = config.out / f"{config.mode}.pt"
-    save_weights(weights, config.mode, recipe, run.network, _training_record(config, run))
+    record = training_record(config, run.step, run.seconds, run.resumed_at)
+    save_weights(weights, config.mode, recipe, run.network, record)
     run.save(config.out / "last.pt")
     write_text_whole(config.out / "curve.json", json.dumps(run.curve, indent=1))
     if run.curve:
         _plot(run.curve, config.out / "curve.png")
     return weights
-
-
-def _training_record(config: TrainConfig, run: _Run) -> dict[str, Any]:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        package = version("spikecam-env")
-    except PackageNotFoundError:
-        package = "not installed"
-    options = {k: v for k, v in asdict(config).items() if k not in ("out", "resume", "save_every_s")}
-    return {
-        "command": _command(config),
-        "options": options,
-        "steps": run.step,
-        "minutes": round(run.seconds / 60, 1),
-        "resumed_at": run.resumed_at,
-        "package": package,
-    }
-
-
-def _command(config: TrainConfig) -> str:
-    """What to type to train so."""
-    given = [f for f in fields(config) if f.name != "out" and getattr(config, f.name) != f.default]
-    options = " ".join(f"--{f.name.replace('_', '-')} {getattr(config, f.name)}" for f in given)
-    return f"spikecam train --out OUT {options}".rstrip()
 
 
 def _plot(curve: list[dict[str, float]], path: Path) -> None:
