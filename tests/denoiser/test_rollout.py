@@ -147,7 +147,7 @@ def test_an_error_in_the_dark_weighs_eleven_times_as_much_as_at_a_fifth(flats, m
 
 
 def test_an_error_that_flickers_weighs_three_times_as_much(flats):
-    """Of errors +e and -e in turn the steps are 2 e, and a half of their squares is added; those that stay have none."""
+    """Of errors +e and -e in turn the steps are 2 e, and half of their squares is added; those that stay have none."""
     flats.loss(Answers([0.25] * 16), 1)
     steady = float(flats.loss(Answers([0.26] * 16), 2))
     flats.streams.renewed = [0, 1]
@@ -194,7 +194,7 @@ def test_a_stream_keeps_its_map(bank):
 
 
 def test_errors_are_by_what_guessed(flats):
-    """Regular spikes at 1/4: the intervals are right, the network is off by 0.1 with or without a map."""
+    """The network is off by 0.1 with or without a map; regular spikes are nearer, but for the gain that it taught."""
     flats.loss(Answers([0.35] * 16), 1)
     flats._windows.mapped = torch.tensor([0.0, 1.0])
     flats._windows.gain = torch.ones_like(flats._windows.gain)

@@ -168,7 +168,7 @@ MIXTURE = {
     "the brightest light of all": (lambda s: brightest(s).max(), 1.0, 1.05),
     "contrast": (lambda s: (s["levels"].amax((1, 2)) / s["levels"].amin((1, 2))).median(), 6.9, 1.3),
 }
-"""What is measured in many scenes, about how much, and within which factor: twice or half a constant is another mixture."""
+"""What is measured in many scenes, about how much it is, within which factor: twice a constant is another mixture."""
 
 
 def at_rest(scene):
