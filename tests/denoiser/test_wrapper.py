@@ -68,8 +68,8 @@ def test_reset_forgets_the_last_episode():
 
 def test_info_says_how_late_the_block_is():
     env = DenoiseObservation(Noise(), denoiser("spikes"))
-    assert env.reset(seed=0)[1] == {"time_s": 0.0, "denoiser_latency": 27}
-    assert env.step(0)[4] == {"denoiser_latency": 27}
+    assert env.reset(seed=0)[1] == {"time_s": 0.0, "denoiser_latency": 31}
+    assert env.step(0)[4] == {"denoiser_latency": 31}
 
 
 def test_packed_observations_are_refused():

@@ -61,12 +61,15 @@ class Writing:
 
 
 @cache
-def _few_textures_and_units() -> object:
+def _bank(*_: object, **__: object) -> object:
+    """A texture and an ideal unit: nothing is drawn."""
     import torch
 
-    from denoiser.simulated import Bank
+    from denoiser.simulated import TEXTURE_SIZE, UNIT_SHAPE, Bank
+    from spikecam_env.sensor.light import GRAINS
 
-    return Bank.drawn(0, torch.device("cpu"), textures=2, units=1)
+    nothing = torch.zeros(1, *UNIT_SHAPE)
+    return Bank(torch.rand(1, TEXTURE_SIZE, TEXTURE_SIZE), nothing + GRAINS, nothing, nothing, torch.zeros(1, 8))
 
 
 def _evaluation(**options) -> dict[str, object]:
@@ -86,7 +89,7 @@ def _film(*_: object) -> list[np.ndarray]:
 
 def _streamed(**_: object) -> SimpleNamespace:
     return SimpleNamespace(
-        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, denoiser_s=1.0, times_real=1.0, latency=27
+        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, denoiser_s=1.0, times_real=1.0, latency=31
     )
 
 
@@ -98,7 +101,7 @@ DEMO: Work = {
     "spikecam_env.cli.showcase:film_frames": _film,
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
-TRAINING: Work = {"denoiser.simulated:Bank.drawn": lambda *_, **__: _few_textures_and_units()}
+TRAINING: Work = {"denoiser.simulated:Bank.drawn": _bank}
 EVALUATION: Work = {
     "denoiser.evaluate:evaluate_quick": _evaluation,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,
