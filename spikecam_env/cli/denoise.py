@@ -25,7 +25,7 @@ class Denoise:
     out: Path = Path("denoised")
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Literal["best", "paper"] = "best"
-    """Which DnSS: `best`, or `paper` (the paper's network and decoder; slower)."""
+    """Which DnSS: `best`, or `paper` (the paper's network; slower)."""
     window: Count = 41
     """Frames averaged in the pictures (TFP window); odd."""
     film: bool = True
