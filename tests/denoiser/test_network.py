@@ -69,6 +69,21 @@ def test_an_uncalibrated_unit_ignores_the_shares_of_the_means():
     assert torch.equal(after[0], before[0]) and torch.allclose(after[1], mean, atol=1e-5)
 
 
+def test_the_means_have_a_fifth_of_the_rate_at_first():
+    """Of a calibrated unit, where the network says nothing: neither all nor next to nothing."""
+    recipe = RECIPES["best"]
+    network, layout = recipe.network().eval(), recipe.layout
+    for part in (network.out, network.head[-1]):
+        torch.nn.init.zeros_(part.weight)
+        torch.nn.init.zeros_(part.bias)
+    spikes, planes = torch.rand(1, layout.span, 8, 8), torch.rand(1, layout.layers, 8, 8)
+    planes[:, slice(*layout.means)], planes[:, -1] = 1.0, 1.0
+    with torch.inference_mode():
+        share = float(network(spikes, planes)[0].mean())
+    print(f"share of the means {share:.3f}")
+    assert 0.1 < share < 0.4
+
+
 def test_blend_starts_at_the_inferred_interval():
     """Theta starts at sigmoid(2) = 0.88: a head that starts at the noisy plane stays there."""
     network = DnSS(refine=False).eval()

@@ -166,6 +166,12 @@ MIXTURE = {
     "scenes darker than a spike in seven frames": (lambda s: (brightest(s) < 0.15).float().mean(), 0.37, 1.3),
     "the brightest light of the darkest scenes": (lambda s: brightest(s).quantile(0.01), 0.012, 1.4),
     "the brightest light of all": (lambda s: brightest(s).max(), 1.0, 1.05),
+    "shapes shown": (lambda s: s["shown"][:, 1:].float().mean(), 0.7, 1.3),
+    "shapes that turn in scenes that move": (lambda s: (motion(s)[1][~still(s), 1:] > 0).float().mean(), 0.4, 1.4),
+    "the fastest turn": (lambda s: motion(s)[1].max(), 0.05, 1.4),
+    "extent of a shape, of the picture's side": (lambda s: s["extent"].mean() / 8, 0.28, 1.4),
+    "the thinnest shape, of the picture's side": (lambda s: s["extent"].min() / 8, 0.06, 1.4),
+    "texels a pixel": (lambda s: s["zoom"].mean(), 0.95, 1.4),
     "contrast": (lambda s: (s["levels"].amax((1, 2)) / s["levels"].amin((1, 2))).median(), 6.9, 1.3),
 }
 """What is measured in many scenes, about how much it is, within which factor: twice a constant is another mixture."""
