@@ -37,7 +37,7 @@ class PixelMap:
     dark: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        gain, dark = (np.ascontiguousarray(value, np.float32) for value in (self.gain, self.dark))
+        gain, dark = (_real(value) for value in (self.gain, self.dark))
         if gain.ndim != 2 or gain.shape != dark.shape or not gain.size:
             raise InputError(f"a calibration map has gain and dark of one shape (H, W); got {gain.shape}, {dark.shape}")
         if not (np.all((gain >= GAINS[0]) & (gain <= GAINS[1])) and np.all((dark >= 0) & (dark <= 1))):
@@ -62,11 +62,11 @@ class PixelMap:
             return cls._read(Path(unit))
         try:
             gain, dark = unit
-            return cls(np.asarray(gain, np.float32), np.asarray(dark, np.float32))
         except (TypeError, ValueError) as error:
             raise InputError(
                 f"unit is {type(unit).__name__}; give maps (gain, dark), a Calibration, or the path of a maps.h5"
             ) from error
+        return cls(gain, dark)
 
     @classmethod
     def _read(cls, path: Path) -> PixelMap:
@@ -93,3 +93,15 @@ class PixelMap:
     def digest(self) -> str:
         """SHA-256 of both maps."""
         return hashlib.sha256(self.gain.tobytes() + self.dark.tobytes()).hexdigest()
+
+
+def _real(value: Any) -> NDArray[np.float32]:
+    """As float32, infinite where that cannot hold it; raises InputError unless it is an array of real numbers."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise InputError(f"a calibration map is no array: {error}") from error
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"a calibration map holds {array.dtype}; it must hold real numbers")
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(array, np.float32)

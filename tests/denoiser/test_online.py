@@ -380,7 +380,7 @@ def _passes(chain, spikes):
     [3, (MAP[0],), (MAP[0][0], MAP[1][0]), (-MAP[0], MAP[1]), (MAP[0], np.full(SHAPE, np.nan)), (MAP[0][:2], MAP[1])],
 )
 def test_what_is_no_calibration_map_is_refused(unit):
-    with pytest.raises(InputError, match="map|unit"):
+    with pytest.raises(InputError, match=r"map|unit"):
         denoiser("best", unit=unit)
 
 
