@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from torch import nn
 
 from denoiser import infer
+from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
-from denoiser.window import PixelMap, RollingWindow, Window, check_like
+from denoiser.window import RollingWindow, Window, check_like
 
 Rates = NDArray[np.float32]
 
@@ -26,6 +27,7 @@ Rates = NDArray[np.float32]
 class Chain:
     """Passes over one stream from frame `first` on; what a pass leaves, the next gets.
 
+    The chain knows nothing of the frames before: to its network the stream begins there, as streams do in training.
     stride: evaluate the network in every stride-th frame and hold its plane in between (networks of one plane a pass).
     """
 
@@ -41,7 +43,9 @@ class Chain:
         first: int = 0,
     ) -> None:
         self._recipe, self._network, self._type, self._stride = recipe, network, number_type, stride
-        self._window = RollingWindow(recipe.layout, shape, unit, first)
+        self._window = RollingWindow(recipe.layout, shape, unit)
+        self._first = first
+        self._skipped = 0  # frames before the first
         self._held: Rates | None = None
         self._carried: infer.Carried = ()
 
@@ -53,11 +57,13 @@ class Chain:
     @property
     def covered(self) -> int:
         """Frames of the stream up to which passes are done."""
-        return self._window.start
+        return self._first + self._window.start
 
     def push(self, chunk: NDArray[np.uint8]) -> Iterator[tuple[int, Rates]]:
         """(K, H, W) more frames -> the passes they complete: first frame, and rates (count, H, W)."""
-        return map(self._passed, self._window.push(chunk))
+        skip = min(self._first - self._skipped, len(chunk))
+        self._skipped += skip
+        return map(self._passed, self._window.push(chunk[skip:]))
 
     def end(self) -> Iterator[tuple[int, Rates]]:
         """The stream is over -> the passes that are left."""
@@ -66,7 +72,7 @@ class Chain:
     def state(self) -> dict[str, Any]:
         """Everything that later passes depend on (copies)."""
         held, carried = copy.deepcopy(self._held), copy.deepcopy(self._carried)
-        return {"window": self._window.state(), "held": held, "carried": carried}
+        return {"window": self._window.state(), "held": held, "carried": carried, "skipped": self._skipped}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from `state()`; raises InputError for arrays of another size or type."""
@@ -77,12 +83,13 @@ class Chain:
             for found, size in zip(state["carried"], self._recipe.carries(self.shape), strict=True):
                 check_like(found, np.empty(size, np.float32), "carried")
         self._held, self._carried = copy.deepcopy(state["held"]), copy.deepcopy(tuple(state["carried"]))
+        self._skipped = int(state["skipped"])
 
     def _passed(self, window: Window) -> tuple[int, Rates]:
         if window.start % self._stride == 0 or self._held is None:
             self._held, self._carried = infer.rates(self._network, window, self._type, self._carried)
         self._window.learn(window, self._held)
-        return window.start, self._held
+        return self._first + window.start, self._held
 
 
 class Crossfade:

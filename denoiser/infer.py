@@ -33,7 +33,7 @@ Carried = tuple[NDArray[np.float32], ...]
 def rates(
     network: nn.Module, window: Window, number_type: torch.dtype, carried: Carried = ()
 ) -> tuple[NDArray[np.float32], Carried]:
-    """(count, H, W) float32 rates in the frames the window covers, cut to [0, 1] [spikes/frame], and what is carried."""
+    """Rates (count, H, W) float32 of the frames that the window covers, in [0, 1] [spikes/frame]; what is carried."""
     return where_torch_can(lambda: _rates(network, window, number_type, carried))
 
 

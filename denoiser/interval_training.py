@@ -9,6 +9,9 @@ frames beyond it; a pixel that is darker than that is taught the interval up to 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import torch
 from torch import Tensor, nn
 
@@ -17,6 +20,8 @@ from denoiser.simulated import Bank, SimulatedStreams
 from denoiser.window import WindowLayout
 
 LOOK_AHEAD = 96
+"""Frames after the middle one in which the clean interval's end is looked for; chosen here."""
+
 ADVANCE = 16
 """Frames between the windows of a stream."""
 
@@ -24,10 +29,25 @@ POOL = 4
 """Streams for each one that a step takes on."""
 
 
-class IntervalWindows:
-    """Simulated streams, cut to the windows of a network of one plane a pass.
+class Taught(NamedTuple):
+    """Windows of N streams at their middle frames.
 
-    taken: windows a step.  patch: their side [pixels].
+    predicted, target, light: (N, 1, H, W), the network's rate, the clean interval, the light [spikes/frame].
+    noisy: (N, 1, H, W), the noisy interval, which the network saw.  valid: (N,) float32, 1 where the window counts.
+    """
+
+    predicted: Tensor
+    target: Tensor
+    light: Tensor
+    noisy: Tensor
+    valid: Tensor
+
+
+class IntervalWindows:
+    """Simulated streams, cut to the windows of a network of one plane a pass; streams are taken in turn.
+
+    taken: windows a step.  pool: streams for each of them.  patch: their side [pixels].  seed: everything follows from
+    it.  bank, compiled: as for `SimulatedStreams`.
     """
 
     def __init__(
@@ -45,7 +65,7 @@ class IntervalWindows:
         self.layout, self.taken = layout, taken
         count = pool * taken
         self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled)
-        self._next = torch.zeros((), dtype=torch.int64, device=device)  # streams are taken in turn
+        self._next = torch.zeros((), dtype=torch.int64, device=device)
         span = layout.past + 1 + LOOK_AHEAD
         full = (count, span, patch, patch)
         self._noisy, self._clean = (torch.zeros(full, dtype=torch.uint8, device=device) for _ in range(2))
@@ -56,7 +76,7 @@ class IntervalWindows:
     def loss(self, network: nn.Module, passes: int) -> Tensor:
         """Mean loss of `passes` windows of some streams, with gradients."""
         losses = []
-        for predicted, target, _, valid in self._passes(network, passes):
+        for predicted, target, _, _, valid in self._windows(network, passes):
             error = (predicted - target).square().mean(dim=(1, 2, 3))
             losses.append((valid * error).sum() / valid.sum().clamp(min=1))
         return torch.stack(losses).mean()
@@ -65,28 +85,27 @@ class IntervalWindows:
     def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
         """Mean squared errors against the light: of the network, of the noisy and of the clean interval."""
         sums, count = torch.zeros(3, device=self.streams.device), torch.zeros((), device=self.streams.device)
-        for predicted, target, light, valid in self._passes(network, passes):
-            for i, guess in enumerate((predicted, self._interval, target)):
+        for predicted, target, light, noisy, valid in self._windows(network, passes):
+            for i, guess in enumerate((predicted, noisy, target)):
                 sums[i] += (valid * (guess - light).square().mean(dim=(1, 2, 3))).sum()
             count += valid.sum()
         return dict(zip(("network", "interval", "clean interval"), (sums / count.clamp(min=1)).tolist(), strict=True))
 
-    def _passes(self, network: nn.Module, passes: int):
-        """(rate, target, light, valid) of each window."""
-        layout, device = self.layout, self.streams.device
+    def _windows(self, network: nn.Module, passes: int) -> Iterator[Taught]:
+        """The next windows of the streams whose turn it is, and of those after them."""
+        device, middle, span = self.streams.device, self.layout.past, self.layout.span
         for _ in range(passes):
             rows = torch.remainder(self._next + torch.arange(self.taken, device=device), self.streams.count)
             self._next += self.taken
             part = self.streams.advance(ADVANCE, rows)
             self._take(rows, part.noisy, part.clean, part.light, part.begins)
             noisy, clean = self._noisy[rows], self._clean[rows]
-            middle, span = layout.past, layout.span
-            self._interval = inverse_interval(noisy[:, :span], self._last[rows, 0], middle)
+            interval = inverse_interval(noisy[:, :span], self._last[rows, 0], middle)
             target = inverse_interval(clean, self._last[rows, 1], middle)
             with torch.autocast(device.type, torch.bfloat16):
-                predicted, _ = network(noisy[:, :span].to(torch.bfloat16), self._interval)
+                predicted, _ = network(noisy[:, :span].to(torch.bfloat16), interval)
             valid = (self._age[rows] >= noisy.shape[1] + WARM_UP).float()
-            yield predicted.float(), target, self._light[rows, middle, None], valid
+            yield Taught(predicted.float(), target, self._light[rows, middle, None], interval, valid)
 
     def _take(self, rows: Tensor, noisy: Tensor, clean: Tensor, light: Tensor, begins: Tensor) -> None:
         """Move the windows of these streams on."""

@@ -22,9 +22,11 @@ from torch import nn
 
 from denoiser import accumulate, infer, mus
 from denoiser.chain import Chain, Crossfade, Rates
+from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
 from denoiser.weights import digest, load_weights, pretrained_path
-from denoiser.window import PixelMap, check_like
+from denoiser.window import check_like
+from spikecam_env.calibration import Calibration
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.sensor.sensor import checked_count
 from spikecam_env.streams.packing import as_spikes
@@ -45,7 +47,8 @@ class OnlineDnSS:
     precision: of the network; "auto" is bfloat16 where the processor has it, else float32.
     decoder: how rates become spikes, "accumulate" (`denoiser.accumulate`) or "mus" (`denoiser.mus`, the paper's);
         default: the recipe's.
-    unit: `best` mode only: the calibrated unit, maps (gain, dark) of shape (H, W), or a `PixelMap`; SNEE measures them.
+    unit: `best` mode only: the calibrated unit: maps (gain, dark) of shape (H, W), a `Calibration` of SNEE, the path of
+        its maps.h5, or a `PixelMap`.
     overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`denoiser.chain`): less error,
         no seams, twice the work.
     The network is copied: training it further changes nothing here.  One object denoises one stream: for another stream
@@ -62,7 +65,7 @@ class OnlineDnSS:
         stride: int = 1,
         precision: str = "auto",
         decoder: str | None = None,
-        unit: PixelMap | tuple[ArrayLike, ArrayLike] | None = None,
+        unit: PixelMap | Calibration | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
         overlap: bool = False,
     ) -> None:
         self.output = _checked_output(output)

@@ -60,7 +60,7 @@ _Memory = Annotated[float, Field(ge=1, le=1e6)]
 
 
 class _DeclaredLayout(Declared):
-    """Ranges: a network of any such layout has fewer than a million weights."""
+    """Ranges: a network of any such layout has fewer than two million weights."""
 
     past: _Frames
     planes: Annotated[int, Field(ge=1, le=64)]

@@ -5,7 +5,8 @@ gain that the network found, and adds up the losses of the passes; gradients rea
 the streams then are, the next step that takes them goes on.
 
     loss = mean (rate - light)^2 / (rate + OFFSET)            the divisor is not differentiated: no bias
-         + STEADY mean (step of rate - step of light)^2 / (rate + OFFSET)       step: from frame to frame, passes included
+         + STEADY mean (step of rate - step of light)^2 / (rate + OFFSET)
+                                                              step: from frame to frame, across passes too
 
 The light divides as its count noise does, so that dim scenes count.
 """
@@ -13,7 +14,9 @@ The light divides as its count noise does, so that dim scenes count.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -24,36 +27,62 @@ from denoiser.window import WindowLayout
 from denoiser.window_torch import Windows, learned, pushed
 
 OFFSET = 0.02
-"""Spikes a frame."""
+"""Rate below which errors weigh the same [spikes/frame]; chosen here."""
 
 STEADY = 0.5
+"""Weight of the steps in the loss; chosen here."""
 
 MAPPED = 0.5
 """Share of the streams whose unit is calibrated."""
 
 MAP_ERRORS = (0.001, 0.01)
-"""Relative error of a map's gains, and of its dark rates, from least to greatest, even in its logarithm; SNEE's maps of
-13 flats of 8000 frames are near the lower end."""
+"""Relative error of a map's gains, and of its dark rates to their mean, from least to greatest, even in its logarithm.
+SNEE's maps of 13 flats of 8000 frames are near the lower end."""
 
 POOL = 16
 """Streams for each one that a step takes on."""
 
 
+class Pass(NamedTuple):
+    """One pass of N streams.
+
+    rate, light: (N, planes, H, W) [spikes/frame].  before: (N, 2, H, W), the last rate and the last light of the pass
+    before; of a stream's first pass the first of this one.  planes: (N, layers, H, W), what the network saw.
+    valid, mapped: (N,) float32, 1 where the pass counts, and where the unit is calibrated, else 0.
+    """
+
+    rate: Tensor
+    light: Tensor
+    before: Tensor
+    planes: Tensor
+    valid: Tensor
+    mapped: Tensor
+
+
 @dataclass
 class _Past:
-    """What a stream brings to its next pass besides its windows: light (N, planes, H, W), last, hidden, final (N, H, W):
-    the last rate and the last light of the pass before."""
+    """What a stream brings to its next pass besides its windows.
+
+    light: (N, planes, H, W), of the frames that came last.  last: (N, 1, H, W), hidden: (N, CARRY, H/2, W/2), what the
+    network carried on.  final: (N, 2, H, W), the last rate and the last light of the pass before.
+    """
 
     light: Tensor
     last: Tensor
     hidden: Tensor
     final: Tensor
 
+    @classmethod
+    def begin(cls, layout: WindowLayout, streams: int, patch: int, device: torch.device) -> _Past:
+        shapes = ((layout.planes, patch), (1, patch), (CARRY, patch // 2), (2, patch))
+        return cls(*(torch.zeros((streams, count, side, side), device=device) for count, side in shapes))
+
 
 class Rollouts:
-    """Simulated streams before a network of this layout.
+    """Simulated streams before a network of this layout, taken in turn.
 
-    taken: streams a step.  patch: their side [pixels].
+    taken: streams a step.  pool: streams for each of them.  patch: their side [pixels].  seed: everything follows from
+    it.  bank, compiled: as for `SimulatedStreams`.  Raises InputError for a layout that `Windows` cannot begin.
     """
 
     def __init__(
@@ -71,40 +100,36 @@ class Rollouts:
         self.layout, self.taken = layout, taken
         count = pool * taken
         self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled)
-        self._next = torch.zeros((), dtype=torch.int64, device=device)  # streams are taken in turn
-        shape = (patch, patch)
-        self._windows = Windows.begin(layout, count, shape, device)
-        zeros = lambda *size: torch.zeros((count, *size), device=device)  # noqa: E731
-        self._past = _Past(
-            zeros(layout.planes, *shape), zeros(1, *shape), zeros(CARRY, patch // 2, patch // 2), zeros(2, *shape)
-        )
+        self._next = torch.zeros((), dtype=torch.int64, device=device)
+        self._windows = Windows.begin(layout, count, (patch, patch), device)
+        self._past = _Past.begin(layout, count, patch, device)
 
     def loss(self, network: nn.Module, passes: int) -> Tensor:
         """Take some streams on by this many passes; mean loss of the passes, with gradients."""
         total: list[Tensor] = []
-        for rate, light, final, valid in self._passes(network, passes):
+        for rate, light, before, _, valid, _ in self._passes(network, passes):
             weight = valid[:, None, None, None] / (rate.detach().clamp(min=0.0) + OFFSET)
             error = rate - light
-            steps = torch.diff(torch.cat([(final[:, :1] - final[:, 1:]), error], dim=1), dim=1)
+            steps = torch.diff(torch.cat([(before[:, :1] - before[:, 1:]), error], dim=1), dim=1)
             total.append((weight * error.square()).mean() + STEADY * (weight * steps.square()).mean())
         return torch.stack(total).mean()
 
     @torch.no_grad()
     def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
-        """Mean squared errors over passes: of the network, without and with a map, of 1/ISI and of the mean over 64."""
+        """Mean squared errors over some streams' passes: of the network without a map ("network") and with one
+        ("mapped"); without one, of 1/ISI ("interval") and of the running mean of the shortest memory ("mean")."""
         names = ("network", "mapped", "interval", "mean")
         sums, counts = torch.zeros(4, device=self.streams.device), torch.zeros(4, device=self.streams.device)
-        for rate, light, _, valid in self._passes(network, passes):
-            mapped = self._mapped
-            guesses = (rate, rate, self._planes[:, : self.layout.planes], self._planes[:, self.layout.means[0], None])
+        for rate, light, _, planes, valid, mapped in self._passes(network, passes):
+            guesses = (rate, rate, planes[:, : self.layout.planes], planes[:, self.layout.means[0], None])
             for i, (guess, share) in enumerate(zip(guesses, (1 - mapped, mapped, 1 - mapped, 1 - mapped), strict=True)):
                 weight = valid * share
                 sums[i] += (weight * (guess.clamp(0, 1) - light).square().mean(dim=(1, 2, 3))).sum()
                 counts[i] += weight.sum()
         return dict(zip(names, (sums / counts.clamp(min=1)).tolist(), strict=True))
 
-    def _passes(self, network: nn.Module, passes: int):
-        """(rate, light, last rate and light of the pass before, valid) of each pass of some streams."""
+    def _passes(self, network: nn.Module, passes: int) -> Iterator[Pass]:
+        """The next passes of the streams whose turn it is."""
         layout, device = self.layout, self.streams.device
         rows = torch.remainder(self._next + torch.arange(self.taken, device=device), self.streams.count)
         self._next += self.taken
@@ -120,9 +145,8 @@ class Rollouts:
                 rate, kept = network(windows.frames.to(torch.bfloat16), planes, carried)
             rate = rate.float()
             valid = (windows.start >= 0).float()
-            final = torch.where(alive > 0, past.final, torch.cat([rate[:, :1], past.light[:, :1]], dim=1))
-            self._planes, self._mapped = planes, windows.mapped
-            yield rate, past.light, final, valid
+            before = torch.where(alive > 0, past.final, torch.cat([rate[:, :1], past.light[:, :1]], dim=1))
+            yield Pass(rate, past.light, before, planes, valid, windows.mapped)
             windows = learned(layout, windows, rate.detach().clamp(0.0, 1.0))
             past = _Past(part.light, kept[0], kept[1], torch.cat([rate[:, -1:], past.light[:, -1:]], dim=1))
         self._windows.put(rows, windows)
@@ -132,13 +156,17 @@ class Rollouts:
     def _calibrated(self, windows: Windows, begins: Tensor, rows: Tensor) -> None:
         """Give the streams that begin a map, or none; in place."""
         gain, dark = self.streams.unit(rows)
-        count, device = len(rows), self.streams.device
-        draw = lambda *size: torch.randn(size, generator=self.streams.rng, device=device)  # noqa: E731
         low, high = map(math.log, MAP_ERRORS)
-        size = torch.exp(low + (high - low) * torch.rand((count, 1, 1), generator=self.streams.rng, device=device))
+        size = torch.exp(low + (high - low) * self._uniform(len(rows), 1, 1))
         wide = begins[:, None, None]
         typical = dark.mean(dim=(1, 2), keepdim=True)
-        windows.gain = torch.where(wide, gain * (1 + size * draw(*gain.shape)), windows.gain)
-        windows.dark = torch.where(wide, (dark + size * typical * draw(*dark.shape)).clamp(min=0.0), windows.dark)
-        chosen = torch.rand(count, generator=self.streams.rng, device=device) < MAPPED
-        windows.mapped = torch.where(begins, chosen.float(), windows.mapped)
+        windows.gain = torch.where(wide, gain * (1 + size * self._normal(*gain.shape)), windows.gain)
+        measured = (dark + size * typical * self._normal(*dark.shape)).clamp(min=0.0)
+        windows.dark = torch.where(wide, measured, windows.dark)
+        windows.mapped = torch.where(begins, (self._uniform(len(rows)) < MAPPED).float(), windows.mapped)
+
+    def _uniform(self, *shape: int) -> Tensor:
+        return torch.rand(shape, generator=self.streams.rng, device=self.streams.device)
+
+    def _normal(self, *shape: int) -> Tensor:
+        return torch.randn(shape, generator=self.streams.rng, device=self.streams.device)

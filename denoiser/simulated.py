@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import torch
@@ -24,6 +23,7 @@ from tqdm import tqdm
 
 from denoiser.pairs import TRAINING_KINDS, draw_model
 from scenes.textures import random_texture
+from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels import cuda, fast
 from spikecam_env.sensor.kernels.cuda.state import BatchLaw, BatchSegment, BatchState
 from spikecam_env.sensor.light import GRAINS
@@ -31,17 +31,38 @@ from spikecam_env.sensor.light import GRAINS
 SHAPES = 5
 """Shapes before the background; each stream shows a part of them."""
 
+SHOWN = 0.7
+"""Share of the shapes that are shown."""
+
+EXTENTS = (0.06, 0.5)
+"""Half a shape's height and width, from least to greatest [sides of the picture]."""
+
+BLADES = (2, 5)
+"""Of a fan, from fewest to most."""
+
 TEXTURE_SIZE = 256
+"""Side of a texture [texels]; a power of two."""
+
+ZOOMS = (0.5, 1.4)
+"""Texels a pixel, from least to greatest."""
+
 UNIT_SHAPE = (192, 192)
+"""Pixels of the units that streams' patches are cut from."""
 
 AGES = ((96, 0.2), (192, 0.25), (384, 0.25), (960, 0.3))
 """Frames after which a stream begins anew, and how often."""
+
+AGE_STEP = 96
+"""First streams begin at ages that are multiples of this [frames], so that not all begin anew together."""
 
 STILL = 0.3
 """Share of scenes in which nothing moves."""
 
 SPEEDS = (0.02, 3.0)
 """Speed of the fastest layer of the others, from least to greatest, even in its logarithm [pixels/frame]."""
+
+TURNING, FASTEST_TURN = 0.4, 0.05
+"""Share of shapes that turn; the most that they do [radians/frame], where that is slower than the fastest layer."""
 
 STILL_BACKGROUND, STILL_SHAPE = 0.5, 0.15
 """Shares of backgrounds and of shapes that stay where they are in scenes that move."""
@@ -57,7 +78,7 @@ CONTRAST = (2.0, 50.0)
 class Simulated:
     """The next frames of all streams (or of those asked for).
 
-    noisy, clean: (B, K, H, W) uint8, 0 or 1.  light: (B, K, H, W) float32, mean of each frame, at most 1 [spikes/frame].
+    noisy, clean: (B, K, H, W) uint8, 0 or 1.  light: (B, K, H, W) float32 in [0, 1], each frame's mean [spikes/frame].
     begins: (B,) bool, whether the stream began anew with the first of these frames.
     """
 
@@ -91,7 +112,10 @@ class Bank:
         pictures: NDArray[np.float32] | None = None,
         progress: bool = False,
     ) -> Bank:
-        """`textures` procedural ones beside `pictures` (n, size, size), and `units` sensor units."""
+        """Everything follows from the seed.
+
+        textures, units: how many.  pictures: (n, size, size) in [0, 1], textures besides.  progress: shows a bar.
+        """
         rng = np.random.default_rng([seed, 0xBA2C])
         bar = tqdm(total=textures + units, desc="textures, units", disable=not progress, leave=False)
         painted = []
@@ -99,7 +123,7 @@ class Bank:
             painted.append(random_texture(rng, TEXTURE_SIZE, TRAINING_KINDS))
             bar.update()
         laws = []
-        for number in range(units):
+        for _ in range(units):
             unit = draw_model(rng).draw_unit(UNIT_SHAPE, int(rng.integers(2**31)))
             laws.append(fast.PixelLaw.of(unit))
             bar.update()
@@ -120,6 +144,9 @@ class SimulatedStreams:
 
     device: where they are.  seed: everything follows from it.  bank: default, drawn from the seed.
     compiled: the light by `torch.compile` (a GPU's kernels are then few; other rounding).
+
+    After the start only `advance` changes anything, and in place (`denoiser.captured`).
+    Raises InputError for a patch that is larger than the bank's units.
     """
 
     def __init__(
@@ -135,17 +162,18 @@ class SimulatedStreams:
         self.device = torch.device(device)
         self.count, self.patch = count, patch
         self.bank = Bank.drawn(seed, self.device) if bank is None else bank
+        if patch > min(self.bank.gain.shape[1:]):
+            raise InputError(f"patch is {patch}; the sensor units have {min(self.bank.gain.shape[1:])} pixels a side")
         self.rng = torch.Generator(self.device).manual_seed(seed)
-        self._background, self._over = _background, _over
-        if compiled:
-            self._background, self._over = (torch.compile(f, dynamic=False) for f in (_background, _over))
+        self._background: Background = torch.compile(_background, dynamic=False) if compiled else _background
+        self._over: Over = torch.compile(_over, dynamic=False) if compiled else _over
         self._timing = torch.tensor([[0, 2, 1 << 17]], dtype=torch.int32, device=self.device)  # of one frame
         self._half = torch.full((1, 1), 0.5, device=self.device)
         self._lengths = torch.tensor([float(age) for age, _ in AGES], device=self.device)
         self._shares = torch.tensor([share for _, share in AGES], device=self.device).cumsum(0)[:-1]
         self._state = self._drawn(count)
-        spread = torch.rand(count, generator=self.rng, device=self.device)  # so that not all begin anew together
-        self._state["age"] = torch.floor(spread * self._state["length"] / 96) * 96
+        spread = torch.rand(count, generator=self.rng, device=self.device)
+        self._state["age"] = torch.floor(spread * self._state["length"] / AGE_STEP) * AGE_STEP
         self._fresh = torch.ones(count, dtype=torch.bool, device=self.device)
 
     def advance(self, frames: int, rows: Tensor | None = None) -> Simulated:
@@ -167,7 +195,7 @@ class SimulatedStreams:
         return Simulated(noisy, clean, light, begins)
 
     def unit(self, rows: Tensor) -> tuple[Tensor, Tensor]:
-        """True gain and dark rate [spikes/frame] of the units of these streams, (B, H, W) each."""
+        """True gain and dark rate [spikes/frame] of the units of these streams, (B, H, W) float32 each."""
         shape = (len(rows), self.patch, self.patch)
         return self._state["gain"][rows].reshape(shape) / GRAINS, self._state["dark"][rows].reshape(shape) / GRAINS
 
@@ -175,13 +203,9 @@ class SimulatedStreams:
         """Spikes (B, K, H, W) of the noisy units or of their noise-free twins, whose pixels `mine` moves on."""
         count, keys = pictures.shape[:2]
         light = pictures.reshape(count, keys, -1)
-        if twin == "noisy":
-            law = BatchLaw(mine["gain"], mine["dark"], mine["spread"], mine["polynomial"])
-        else:
-            nothing = torch.zeros_like(mine["dark"])
-            law = BatchLaw(
-                torch.full_like(nothing, float(GRAINS)), nothing, nothing, torch.zeros_like(mine["polynomial"])
-            )
+        law = BatchLaw(mine["gain"], mine["dark"], mine["spread"], mine["polynomial"])
+        if twin == "clean":
+            law = BatchLaw(torch.full_like(law.gain, float(GRAINS)), *(torch.zeros_like(t) for t in law.tensors[1:]))
         state = BatchState(law, mine[f"{twin} remaining"], mine[f"{twin} fired"], mine["seeds"])
         spikes = torch.empty((count, keys - 1, light.shape[2]), dtype=torch.uint8, device=self.device)
         for k in range(keys - 1):
@@ -198,54 +222,60 @@ class SimulatedStreams:
         chosen = torch.bucketize(self._uniform(0, 1, count), self._shares)
         return {"length": self._lengths[chosen], "age": torch.zeros(count, device=self.device)}
 
-    def _uniform(self, low: float, high: float, *shape: int) -> Tensor:
-        return low + (high - low) * torch.rand(shape, generator=self.rng, device=self.device)
-
     def _scene(self, count: int) -> dict[str, Tensor]:
-        """Layer 0 is the background.  All (B, layers) but what is said."""
-        layers = SHAPES + 1
-        moving = self._uniform(0, 1, count) >= STILL
-        speed = moving * torch.exp(self._uniform(*map(math.log, SPEEDS), count))
-        dim = self._uniform(0, 1, count) < DIM
-        peak = torch.exp(
-            torch.where(
-                dim,
-                self._uniform(*map(math.log, DIM_LIGHT), count),
-                self._uniform(*map(math.log, LIGHT), count),
-            )
-        )
-        contrast = torch.exp(self._uniform(*map(math.log, CONTRAST), count))
-        levels = torch.exp(-torch.log(contrast)[:, None, None] * self._uniform(0, 1, count, layers, 2))
-        moves = self._uniform(0, 1, count, layers) >= STILL_SHAPE
-        moves[:, 0] = self._uniform(0, 1, count) >= STILL_BACKGROUND
-        pace = torch.where(moves, speed[:, None] * self._uniform(0, 1, count, layers), 0.0)
-        heading = self._uniform(0, 2 * math.pi, count, layers)
-        extent = self._uniform(0.06, 0.5, count, layers, 2) * self.patch
-        radius = torch.hypot(extent[..., 0], extent[..., 1])
-        spins = self._uniform(0, 1, count, layers) < 0.4
-        fastest = torch.minimum(speed[:, None] / radius, torch.full_like(radius, 0.05))
-        spin = torch.where(spins, self._uniform(-1, 1, count, layers) * fastest, 0.0)
-        spin[:, 0] = 0.0
+        """Layer 0 is the background.  All (B, layers) but levels, corner, centre, velocity, extent: (B, layers, 2)."""
+        layers = (count, SHAPES + 1)
+        speed = (self._uniform(0, 1, count) >= STILL) * torch.exp(self._uniform_logarithm(SPEEDS, count))
+        levels = self._levels(count)
+        velocity = self._velocity(speed)
+        extent = self._uniform(*EXTENTS, *layers, 2) * self.patch
+        spin = self._spin(speed, torch.hypot(extent[..., 0], extent[..., 1]))
         return {
-            "levels": peak[:, None, None] * levels,
-            "texture": torch.randint(len(self.bank.textures), (count, layers), generator=self.rng, device=self.device),
-            "corner": self._uniform(0, TEXTURE_SIZE, count, layers, 2),
-            "zoom": self._uniform(0.5, 1.4, count, layers),
-            "centre": self._uniform(0, self.patch, count, layers, 2),
-            "velocity": torch.stack([pace * torch.cos(heading), pace * torch.sin(heading)], dim=-1),
-            "angle": self._uniform(0, 2 * math.pi, count, layers),
+            "levels": levels,
+            "texture": self._whole(0, len(self.bank.textures), *layers),
+            "corner": self._uniform(0, TEXTURE_SIZE, *layers, 2),
+            "zoom": self._uniform(*ZOOMS, *layers),
+            "centre": self._uniform(0, self.patch, *layers, 2),
+            "velocity": velocity,
+            "angle": self._uniform(0, 2 * math.pi, *layers),
             "spin": spin,
             "extent": extent,
-            "shape": torch.randint(3, (count, layers), generator=self.rng, device=self.device),
-            "blades": torch.randint(2, 6, (count, layers), generator=self.rng, device=self.device),
-            "shown": self._uniform(0, 1, count, layers) < 0.7,
+            "shape": self._whole(0, 3, *layers),
+            "blades": self._whole(BLADES[0], BLADES[1] + 1, *layers),
+            "shown": self._uniform(0, 1, *layers) < SHOWN,
         }
 
+    def _levels(self, count: int) -> Tensor:
+        """Light at both ends of each layer's texture, (B, layers, 2) [spikes/frame]."""
+        dim = self._uniform(0, 1, count) < DIM
+        dim_peak, peak = self._uniform_logarithm(DIM_LIGHT, count), self._uniform_logarithm(LIGHT, count)
+        brightest = torch.exp(torch.where(dim, dim_peak, peak))
+        contrast = torch.exp(self._uniform_logarithm(CONTRAST, count))
+        levels = torch.exp(-torch.log(contrast)[:, None, None] * self._uniform(0, 1, count, SHAPES + 1, 2))
+        return brightest[:, None, None] * levels
+
+    def _velocity(self, speed: Tensor) -> Tensor:
+        """Of each layer of scenes with this speed of the fastest, (B, layers, 2), along x and y [pixels/frame]."""
+        count = len(speed)
+        moves = self._uniform(0, 1, count, SHAPES + 1) >= STILL_SHAPE
+        moves[:, 0] = self._uniform(0, 1, count) >= STILL_BACKGROUND
+        pace = torch.where(moves, speed[:, None] * self._uniform(0, 1, count, SHAPES + 1), 0.0)
+        heading = self._uniform(0, 2 * math.pi, count, SHAPES + 1)
+        return torch.stack([pace * torch.cos(heading), pace * torch.sin(heading)], dim=-1)
+
+    def _spin(self, speed: Tensor, radius: Tensor) -> Tensor:
+        """Turn of each layer, whose rim is no faster than the fastest layer, (B, layers) [radians/frame]."""
+        turns = self._uniform(0, 1, *radius.shape) < TURNING
+        fastest = torch.minimum(speed[:, None] / radius, torch.full_like(radius, FASTEST_TURN))
+        spin = torch.where(turns, self._uniform(-1, 1, *radius.shape) * fastest, 0.0)
+        spin[:, 0] = 0.0
+        return spin
+
     def _unit(self, count: int) -> dict[str, Tensor]:
+        """Units and the first charge of their pixels: maps (B, P), polynomial (B, 8), seeds (B, 2)."""
         bank, size = self.bank, self.patch
-        chosen = torch.randint(len(bank.gain), (count,), generator=self.rng, device=self.device)
-        room = [side - size + 1 for side in bank.gain.shape[1:]]
-        y, x = (torch.randint(n, (count, 1), generator=self.rng, device=self.device) for n in room)
+        chosen = self._whole(0, len(bank.gain), count)
+        y, x = (self._whole(0, side - size + 1, count, 1) for side in bank.gain.shape[1:])
         along = torch.arange(size, device=self.device)
         where = (chosen[:, None, None], (y + along)[:, :, None], (x + along)[:, None, :])
         maps = {name: getattr(bank, name)[where].reshape(count, -1) for name in ("gain", "dark", "spread")}
@@ -254,7 +284,6 @@ class SimulatedStreams:
         normal = torch.randn((count, pixels), generator=self.rng, device=self.device)
         left = (1 - phase) * GRAINS
         zero = torch.zeros((count, pixels), dtype=torch.int32, device=self.device)
-        seeds = torch.randint(-(1 << 31), (1 << 31) - 1, (count, 2), generator=self.rng, device=self.device)
         return {
             **maps,
             "polynomial": bank.polynomial[chosen],
@@ -262,8 +291,18 @@ class SimulatedStreams:
             "noisy fired": zero,
             "clean remaining": left.ceil().clamp(min=1).to(torch.int32),
             "clean fired": zero.clone(),
-            "seeds": seeds.to(torch.int32),
+            "seeds": self._whole(-(1 << 31), (1 << 31) - 1, count, 2).to(torch.int32),
         }
+
+    def _uniform(self, low: float, high: float, *shape: int) -> Tensor:
+        return low + (high - low) * torch.rand(shape, generator=self.rng, device=self.device)
+
+    def _uniform_logarithm(self, limits: tuple[float, float], *shape: int) -> Tensor:
+        """Logarithms, even between those of the limits."""
+        return self._uniform(math.log(limits[0]), math.log(limits[1]), *shape)
+
+    def _whole(self, least: int, stop: int, *shape: int) -> Tensor:
+        return torch.randint(least, stop, shape, generator=self.rng, device=self.device)
 
 
 def _where(mask: Tensor, new: dict[str, Tensor], old: dict[str, Tensor]) -> dict[str, Tensor]:
@@ -271,17 +310,24 @@ def _where(mask: Tensor, new: dict[str, Tensor], old: dict[str, Tensor]) -> dict
     return {n: torch.where(mask.reshape(-1, *[1] * (v.ndim - 1)), new[n], v) for n, v in old.items()}
 
 
-Painter = Callable[[Tensor, dict[str, Tensor], Tensor, int], Tensor]
+Background = Callable[[Tensor, dict[str, Tensor], Tensor, int], Tensor]
+Over = Callable[[Tensor, Tensor, dict[str, Tensor], Tensor], Tensor]
 
 
 def _paint(
-    textures: Tensor, scene: dict[str, Tensor], times: Tensor, size: int, background: Painter, over: Any
+    textures: Tensor, scene: dict[str, Tensor], times: Tensor, size: int, background: Background, over: Over
 ) -> Tensor:
     """Light (B, K, size, size) of the collages at times (B, K) [frames]."""
     picture = background(textures, _layer(scene, 0), times, size)
     for number in range(1, SHAPES + 1):
         picture = over(picture, textures, _layer(scene, number), times)
     return picture
+
+
+_OF_LAYERS = (
+    *("levels", "texture", "corner", "zoom", "centre", "velocity", "angle", "spin", "extent", "shape", "blades"),
+    "shown",
+)
 
 
 def _layer(scene: dict[str, Tensor], number: int) -> dict[str, Tensor]:
@@ -319,12 +365,6 @@ def _light(textures: Tensor, layer: dict[str, Tensor], u: Tensor, v: Tensor) -> 
     seen = _texture(textures, layer["texture"], u * zoom + corner[..., 0], v * zoom + corner[..., 1])
     low, high = (layer["levels"][:, i, None, None, None] for i in (0, 1))
     return low + (high - low) * seen
-
-
-_OF_LAYERS = (
-    *("levels", "texture", "corner", "zoom", "centre", "velocity", "angle", "spin", "extent", "shape", "blades"),
-    "shown",
-)
 
 
 def _texture(textures: Tensor, chosen: Tensor, x: Tensor, y: Tensor) -> Tensor:

@@ -23,6 +23,9 @@ from denoiser.network import conv, conv_relu, pad_to_multiple
 CARRY = 16
 """Channels of the hidden picture."""
 
+MEANS_BEGIN = -2.0
+"""Logit of each mean's share where the head says nothing, that of the window's rate being 0: 0.11 of two means each."""
+
 Carried = tuple[Tensor, Tensor] | None
 """(last, hidden), float32."""
 
@@ -81,7 +84,9 @@ class StreamDnSS(nn.Module):
         change = self.head(torch.cat([first, seen.to(first.dtype)], dim=1)).float()
         count = first.shape[1]
         rate = first.float() + change[:, :count]
-        shares = functional.pad(change[:, count:] - 2.0, (0, 0, 0, 0, 1, 0)).softmax(dim=1)[:, 1:] * planes[:, -1:]
+        shares = (
+            functional.pad(change[:, count:] + MEANS_BEGIN, (0, 0, 0, 0, 1, 0)).softmax(dim=1)[:, 1:] * planes[:, -1:]
+        )
         means = planes[:, self.means[0] : self.means[1]]
         rate = rate * (1 - shares.sum(dim=1, keepdim=True)) + (shares * means).sum(dim=1, keepdim=True)
         kept = torch.tanh(self.keep(joined).float())

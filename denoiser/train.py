@@ -1,7 +1,7 @@
 """Training: minimise the error of the rate along simulated streams, resumable at any minute.
 
     paper   L = mean (ISI_dn - ISI_clean)^2                 paper (22), on normalised intervals (`interval_training`)
-    best    L = mean (rate - light)^2 / (rate + 0.02) ..    light weighs as its count noise does (`rollout`)
+    best    L = mean (rate - light)^2 / (rate + 0.02) + ..  light weighs as its count noise does (`rollout`)
 
 Adam; the rate of learning warms up over 100 steps and falls as a cosine to nothing at the end.  Everything follows from
 the seed and the number of steps; a run limited by `minutes` ends where the clock says.  A resumed run draws other
@@ -17,7 +17,7 @@ import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Protocol
 
@@ -32,6 +32,7 @@ from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.recipe import Recipe, recipe_of
 from denoiser.rollout import Rollouts
 from denoiser.simulated import Bank, SimulatedStreams
+from denoiser.training_record import training_record
 from denoiser.weights import save_weights, write_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
@@ -108,7 +109,10 @@ class TrainConfig:
 
 
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
-    """Train, or go on training; returns the path of the weights."""
+    """Train, or go on training; returns the path of the weights.
+
+    Raises InputError where `out` holds the run of another mode, or a damaged one.
+    """
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)
@@ -144,17 +148,15 @@ class _Run:
     network: nn.Module
     optimiser: torch.optim.Optimizer
     step: int
-    seconds: float
-    curve: list[dict[str, float]]
+    seconds: float  # spent so far
+    curve: list[dict[str, float]]  # the validations
     resumed_at: list[int]
 
     @classmethod
     def begin(cls, config: TrainConfig, recipe: Recipe) -> _Run:
         network = recipe.network().to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         on_gpu = torch.device(config.device).type == "cuda"
-        lr = (
-            torch.tensor(config.lr, device=config.device) if on_gpu else config.lr
-        )  # in a graph only a tensor can change
+        lr = torch.tensor(config.lr, device=config.device) if on_gpu else config.lr  # replayed steps read tensors
         optimiser = torch.optim.Adam(network.parameters(), lr, capturable=on_gpu)
         return cls(network, optimiser, 0, 0.0, [], [])
 
@@ -197,7 +199,7 @@ def _plain_groups(state: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Progress(Declared):
-    """Where a run is, besides network, optimiser and generator."""
+    """Where a run is, besides network and optimiser."""
 
     step: Whole
     seconds: Annotated[float, Field(ge=0)]
@@ -314,37 +316,13 @@ class Judge:
 
 def _save(config: TrainConfig, recipe: Recipe, run: _Run) -> Path:
     weights = config.out / f"{config.mode}.pt"
-    save_weights(weights, config.mode, recipe, run.network, _training_record(config, run))
+    record = training_record(config, run.step, run.seconds, run.resumed_at)
+    save_weights(weights, config.mode, recipe, run.network, record)
     run.save(config.out / "last.pt")
     write_text_whole(config.out / "curve.json", json.dumps(run.curve, indent=1))
     if run.curve:
         _plot(run.curve, config.out / "curve.png")
     return weights
-
-
-def _training_record(config: TrainConfig, run: _Run) -> dict[str, Any]:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        package = version("spikecam-env")
-    except PackageNotFoundError:
-        package = "not installed"
-    options = {k: v for k, v in asdict(config).items() if k not in ("out", "resume", "save_every_s")}
-    return {
-        "command": _command(config),
-        "options": options,
-        "steps": run.step,
-        "minutes": round(run.seconds / 60, 1),
-        "resumed_at": run.resumed_at,
-        "package": package,
-    }
-
-
-def _command(config: TrainConfig) -> str:
-    """What to type to train so."""
-    given = [f for f in fields(config) if f.name != "out" and getattr(config, f.name) != f.default]
-    options = " ".join(f"--{f.name.replace('_', '-')} {getattr(config, f.name)}" for f in given)
-    return f"spikecam train --out OUT {options}".rstrip()
 
 
 def _plot(curve: list[dict[str, float]], path: Path) -> None:

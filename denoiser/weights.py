@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import torch
 from torch import Tensor, nn
@@ -27,6 +27,13 @@ from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.whole import whole_file
 
 FORMAT = "spikecam-denoiser/1"
+
+
+class Described(Protocol):
+    """A recipe of any kind of network."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values that say what the network is."""
 
 
 def save_weights(path: str | os.PathLike[str], mode: str, recipe: Recipe, network: nn.Module, training: dict) -> None:
@@ -45,7 +52,7 @@ def load_weights(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[
     return where_torch_can(lambda: _load(path))
 
 
-def digest(recipe: Recipe, weights: Mapping[str, Tensor]) -> str:
+def digest(recipe: Described, weights: Mapping[str, Tensor]) -> str:
     """SHA-256 of what a network computes with: its recipe, and its weights by name."""
     found = hashlib.sha256(json.dumps(recipe.to_dict(), sort_keys=True).encode())
     for name in sorted(weights):

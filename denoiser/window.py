@@ -22,8 +22,8 @@ Gain.  Where things move, the ratio of a pixel's spikes to its denoised rate, bo
 is the pixel's fixed pattern: light passes, the pattern stays (correlation with the true gain 0.92 after 256 frames in
 slow and fast scenes, 0.83 in still ones, which leave texture in it).  The rate planes are divided by g and the
 planes 4 (g - 1) and 0 are added.  The sums forget with the layout's `gain_memory`; `learn` feeds them the network's own
-rates.  Where a calibration map gives the pixel's gain and dark rate, the planes are (plane - dark) / gain, and 1 is added
-instead of 0: texture and pattern are then told apart in still scenes too.
+rates.  Where a calibration map gives the pixel's gain and dark rate, the planes are (plane - dark) / gain, and 1 is
+added instead of 0: texture and pattern are then distinct in still scenes too.
 
 Edges: before the first and after the last frame the spikes are mirrored (frame -1 - i is frame i); the planes use
 real frames only.  The state is the frames of one window, the last spike before it, the running means and the sums.
@@ -31,59 +31,19 @@ real frames only.  The state is the frames of one window, the last spike before 
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from denoiser.pixel_map import PixelMap
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 
 WINDOW_PRIOR = 2.0
 """Spikes that a pixel's gain of 1 weighs against what the sums say."""
-
-
-@dataclass(frozen=True)
-class PixelMap:
-    """A calibrated unit: its light l fires gain * l + dark times a frame.
-
-    gain, dark: (H, W) float32; gain 0.01 to 100; dark [spikes/frame], 0 to 1.
-    Raises InputError for other shapes, and for values that are not finite or out of range.
-    """
-
-    gain: NDArray[np.float32]
-    dark: NDArray[np.float32]
-
-    def __post_init__(self) -> None:
-        gain, dark = (np.ascontiguousarray(value, np.float32) for value in (self.gain, self.dark))
-        if gain.ndim != 2 or gain.shape != dark.shape or not gain.size:
-            raise InputError(f"a calibration map has gain and dark of one shape (H, W); got {gain.shape}, {dark.shape}")
-        if not (np.all((gain >= 0.01) & (gain <= 100)) and np.all((dark >= 0) & (dark <= 1))):
-            raise InputError("a calibration map must have gains from 0.01 to 100 and dark rates from 0 to 1")
-        object.__setattr__(self, "gain", gain)
-        object.__setattr__(self, "dark", dark)
-
-    @classmethod
-    def of(cls, unit: Any) -> PixelMap:
-        """A map as it is, or of a pair (gain, dark).  Raises InputError for anything else."""
-        if isinstance(unit, cls):
-            return unit
-        try:
-            gain, dark = unit
-            return cls(np.asarray(gain, np.float32), np.asarray(dark, np.float32))
-        except (TypeError, ValueError) as error:
-            raise InputError(
-                f"unit is {type(unit).__name__}; give a PixelMap or a pair of maps (gain, dark)"
-            ) from error
-
-    @cached_property
-    def digest(self) -> str:
-        """SHA-256 of both maps."""
-        return hashlib.sha256(self.gain.tobytes() + self.dark.tobytes()).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -132,13 +92,11 @@ class Window:
 class RollingWindow:
     """Cuts a stream that comes in chunks of any length into passes; the cut does not depend on the chunks."""
 
-    def __init__(
-        self, layout: WindowLayout, shape: tuple[int, int], unit: PixelMap | None = None, first: int = 0
-    ) -> None:
+    def __init__(self, layout: WindowLayout, shape: tuple[int, int], unit: PixelMap | None = None) -> None:
         self.layout = layout
         self.shape = shape
         self.unit = unit
-        self.start = first  # first frame of the next pass
+        self.start = 0  # first frame of the next pass
         self.seen = 0  # frames pushed
         self._frames = np.empty((0, *shape), np.uint8)  # the last frames, up to `seen`
         self._last = np.full(shape, -1, np.int32)  # last spike before the window

@@ -42,17 +42,20 @@ class Windows:
         """Before the first frames of every stream; raises InputError for a layout that cannot begin a pass early."""
         if layout.future != layout.planes or layout.past > layout.planes:
             raise InputError(f"{layout}: future must be planes, and past no more, for windows in torch")
-        zeros = {"device": device, "dtype": torch.float32}
+
+        def zeros(*size: int) -> Tensor:
+            return torch.zeros((streams, *size), device=device)
+
         return cls(
             torch.zeros((streams, layout.span, *shape), dtype=torch.uint8, device=device),
             torch.full((streams,), -layout.planes, dtype=torch.int64, device=device),
             torch.zeros((streams, *shape), dtype=torch.int32, device=device),
-            torch.zeros((streams, len(layout.memories), *shape), **zeros),
-            torch.zeros(streams, **zeros),
-            torch.zeros((streams, 2, *shape), **zeros),
-            torch.ones((streams, *shape), **zeros),
-            torch.zeros((streams, *shape), **zeros),
-            torch.zeros(streams, **zeros),
+            zeros(len(layout.memories), *shape),
+            zeros(),
+            zeros(2, *shape),
+            torch.ones((streams, *shape), device=device),
+            zeros(*shape),
+            zeros(),
         )
 
     def rows(self, rows: Tensor) -> Windows:

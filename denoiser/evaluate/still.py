@@ -16,7 +16,7 @@ from denoiser.evaluate.phm import AHEAD
 from denoiser.evaluate.quick import LIGHTS, held_out_textures
 from denoiser.pairs import light_in_frame
 from scenes.collage import Collage
-from spikecam_env.calibration import calibrate, write_flats
+from spikecam_env.calibration import Calibration, calibrate, write_flats
 from spikecam_env.sensor import SensorModel, SpikeSensor
 
 FRAMES = 400
@@ -70,8 +70,8 @@ def unit_seed(case: Case) -> int:
     return int(np.random.default_rng([case.seed, *case.scene.encode()]).integers(2**31))
 
 
-def calibrated(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """SNEE's maps of the case's camera, (gain, dark) of (H, W); a pixel that it could not fit gets the median ones."""
+def calibrated(case: Case) -> Calibration:
+    """SNEE's calibration of the case's camera."""
     with tempfile.TemporaryDirectory() as folder:
         flats = write_flats(
             folder,
@@ -81,9 +81,7 @@ def calibrated(case: Case) -> tuple[np.ndarray, np.ndarray]:
             shape=case.shape,
             seed=unit_seed(case),
         )
-        found = calibrate(flats).main
-    gain, dark = (np.where(np.isfinite(m), m, np.nanmedian(m)).astype(np.float32) for m in (found.gain, found.dark))
-    return gain, np.maximum(dark, 0)
+        return calibrate(flats)
 
 
 @lru_cache(maxsize=1)

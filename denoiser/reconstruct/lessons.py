@@ -22,7 +22,7 @@ from denoiser.reconstruct.recipe import ReconstructorRecipe
 from denoiser.reconstruct.spk2imgnet import CENTRES, WINDOW
 
 FLOOR = 0.05
-"""Light below which errors weigh the same [spikes/frame]; that of `best` (`denoiser.train`)."""
+"""Light below which errors weigh the same [spikes/frame]; chosen here (`denoiser.rollout.OFFSET` is 0.02)."""
 ESTIMATES_SHARE = 0.1
 """Weight of the blocks' own estimates in the loss of Spk2ImgNet (chosen here)."""
 LABEL_REACH = 40

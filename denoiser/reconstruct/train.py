@@ -15,10 +15,8 @@ import math
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from importlib.metadata import PackageNotFoundError, version
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -32,7 +30,8 @@ from denoiser.reconstruct.rolling import RollingWindows
 from denoiser.reconstruct.run import Run
 from denoiser.reconstruct.spk2imgnet import WINDOW
 from denoiser.reconstruct.weights import save_reconstructor
-from denoiser.simulated import Bank, SimulatedStreams
+from denoiser.simulated import UNIT_SHAPE, Bank, SimulatedStreams
+from denoiser.training_record import training_record
 from spikecam_env.checked import checked_count, checked_number, checked_seed
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
@@ -50,7 +49,7 @@ _COUNTS = {
     "steps": 10**9,
     "batch": 65_536,
     "threads": 1024,
-    "patch": 4096,
+    "patch": min(UNIT_SHAPE),
     "frames_a_step": WINDOW,
     "validate_every": 10**9,
 }
@@ -216,35 +215,13 @@ def validate(network: nn.Module, held_out: list[Windows]) -> dict[str, float]:
 
 def _save(config: ReconstructorConfig, run: Run) -> Path:
     weights = config.out / f"{config.mode}.pt"
-    student = run.networks["student"]
-    save_reconstructor(weights, config.mode, config.recipe(), student, _training_record(config, run))
+    student, record = run.networks["student"], training_record(config, run.step, run.seconds, run.resumed_at)
+    save_reconstructor(weights, config.mode, config.recipe(), student, record)
     run.save(config.out / "last.pt")
     write_text_whole(config.out / "curve.json", json.dumps(run.curve, indent=1))
     if run.curve:
         _plot(run.curve, config.out / "curve.png")
     return weights
-
-
-def _training_record(config: ReconstructorConfig, run: Run) -> dict[str, Any]:
-    try:
-        package = version("spikecam-env")
-    except PackageNotFoundError:
-        package = "not installed"
-    return {
-        "command": _command(config),
-        "options": {k: v for k, v in asdict(config).items() if k not in ("out", "resume", "save_every_s")},
-        "steps": run.step,
-        "minutes": round(run.seconds / 60, 1),
-        "resumed_at": run.resumed_at,
-        "package": package,
-    }
-
-
-def _command(config: ReconstructorConfig) -> str:
-    """What to type to train so."""
-    given = [f for f in fields(config) if f.name not in ("out", "mode") and getattr(config, f.name) != f.default]
-    options = "".join(f" --{f.name.replace('_', '-')} {getattr(config, f.name)}" for f in given)
-    return f"spikecam train --mode {config.mode} --out OUT{options}"
 
 
 def _plot(curve: list[dict[str, float]], path: Path) -> None:

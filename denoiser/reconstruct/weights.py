@@ -29,7 +29,7 @@ def save_reconstructor(
     """Write a checkpoint; the file appears whole."""
     state = _halves(network)
     data = {"format": FORMAT, "name": name, "recipe": recipe.to_dict(), "state_dict": state, "training": training}
-    write_whole(path, data | {"sha256": digest(recipe, state)})  # type: ignore[arg-type]  # it asks for to_dict alone
+    write_whole(path, data | {"sha256": digest(recipe, state)})
 
 
 def load_reconstructor(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module, dict[str, Any]]:
@@ -58,7 +58,7 @@ def _load(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module,
     weights = tensors_like(_halves(network), data.get("state_dict"), str(path))
     if not isinstance(training, dict):
         raise InputError(f"{path}: training is {type(training).__name__}; it must be a table; copy the file again")
-    if data.get("sha256") != digest(recipe, weights):  # type: ignore[arg-type]  # it asks for to_dict alone
+    if data.get("sha256") != digest(recipe, weights):
         raise InputError(f"{path} is damaged: its weights are not those of its digest; copy it again or train anew")
     network.load_state_dict(weights)  # in float32, the type of the network
     return recipe, network.eval(), dict(training)

@@ -25,9 +25,13 @@ class Denoise:
     out: Path = Path("denoised")
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Literal["best", "paper"] = "best"
-    """Which DnSS: `best`, or `paper` (the paper's network and decoder; slower)."""
+    """Which DnSS: `best`, or `paper` (the paper's network; slower)."""
     window: Count = 41
     """Frames averaged in the pictures (TFP window); odd."""
+    overlap: bool = False
+    """`best` only: passes that overlap by half: less error, no seams, twice the time."""
+    calibration: Path | None = None
+    """`best` only: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised."""
     reading: Reading = field(default_factory=Reading)
@@ -51,7 +55,7 @@ class Denoise:
         noisy = recording.spikes
         frames = picture_frames(len(noisy), self.window)
         with out_folder(self.out) as folder:
-            clean, rates = restore(noisy, self.mode, self.window, frames)
+            clean, rates = restore(noisy, self.mode, self.window, frames, overlap=self.overlap, unit=self.calibration)
 
             attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
             attributes |= {"denoiser": self.mode, "source": self.file.name}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +31,13 @@ def picture_frames(frames: int, window: int) -> list[int]:
 
 
 def restore(
-    noisy: NDArray[np.uint8], mode: str, window: int, at: Sequence[int]
+    noisy: NDArray[np.uint8], mode: str, window: int, at: Sequence[int], **options: Any
 ) -> tuple[NDArray[np.uint8], dict[int, NDArray[np.float32]]]:
     """Denoise (T, H, W) spikes; returns the spikes and, by frame of `at`, the mean rate (H, W) over `window` frames.
 
-    Rate planes are four bytes a pixel: only those of one window are held at a time.
+    options: of the denoiser.  Rate planes are four bytes a pixel: only those of one window are held at a time.
     """
-    online = OnlineDnSS.pretrained(mode, output="both")
+    online = OnlineDnSS.pretrained(mode, output="both", **options)
     wanted = set(at)
     recent: deque[NDArray[np.float32]] = deque(maxlen=window)
     pictures: dict[int, NDArray[np.float32]] = {}

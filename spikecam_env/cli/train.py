@@ -1,33 +1,41 @@
-"""`spikecam train`: train a denoiser along simulated streams."""
+"""`spikecam train`: train a denoiser or a reconstructor along simulated streams."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from spikecam_env.checked import checked_count, checked_number
 from spikecam_env.cli.options import Checked, Count, Positive, Seed, Workers
+from spikecam_env.errors import InputError
+
+RECONSTRUCTORS = ("spk2img-clean", "spk2img-noisy", "ssml")
+ONLY_OF = {"refine": ("paper",), "width": RECONSTRUCTORS, "frames_a_step": RECONSTRUCTORS}
+"""Options that not every mode has, with the modes that have them."""
 
 
 @dataclass
 class Train:
-    """Train DnSS on noisy and clean streams simulated on the fly; goes on from its last checkpoint.
+    """Train DnSS or a reconstructor on noisy and clean streams simulated on the fly; goes on from its last checkpoint.
 
     example:  spikecam train --mode best --out runs/best
-    on a GPU: spikecam train --mode best --device cuda --batch 96 --minutes 10 --out runs/best
+    on a GPU: spikecam train --mode best --device cuda --batch 48 --minutes 7.6 --out runs/best
     """
 
     out: Path
     """Folder of the run: weights, checkpoint to resume from, validation curve (JSON, PNG)."""
-    mode: Literal["best", "paper"] = "best"
-    """`paper`: the paper's network and loss; `best`: many rate planes a pass, trained on true light."""
+    mode: Literal["best", "paper", "spk2img-clean", "spk2img-noisy", "ssml"] = "best"
+    """`paper`: the paper's network and loss; `best`: many rate planes a pass, trained on true light.  The others are
+    reconstructors, which make pictures of spikes."""
     steps: Count = 20_000
     """Training steps in all; the rate of learning falls to nothing over them."""
     minutes: Positive | None = None
     """End by the clock instead."""
-    batch: Annotated[int, Checked(checked_count, most=65_536)] = 16
-    """Streams a step, 64 x 64 pixels each."""
+    batch: Annotated[int, Checked(checked_count, most=65_536)] | None = None
+    """Streams a step.  Default: 16, of reconstructors 64."""
+    patch: Count = 64
+    """Side of a stream's frames [pixels], a multiple of 16, at most 128."""
     lr: Annotated[float, Checked(checked_number, least=0.0, most=1.0, above=True)] = 1e-3
     """Highest rate of learning."""
     seed: Seed = 0
@@ -38,15 +46,37 @@ class Train:
     """Where streams and network are: cpu, cuda, cuda:1."""
     refine: bool = True
     """`paper` with its refine module, or for the ablation without."""
-    validate_every: Count = 1000
-    """Steps between validations."""
+    width: Count | None = None
+    """Channels of a reconstructor, a multiple of 12 up to 252.  Default: 48."""
+    frames_a_step: Count | None = None
+    """Frames by which the streams of a reconstructor go on in a step, at most 41.  Default: 12."""
+    validate_every: Count | None = None
+    """Steps between validations.  Default: 1000, of reconstructors 500."""
     resume: bool = True
     """Go on from the folder's checkpoint where there is one."""
 
     def run(self) -> None:
-        from denoiser.train import TrainConfig, train
         from spikecam_env.cli.files import out_folder
 
+        options = self._options()
         with out_folder(self.out):
-            path = train(TrainConfig(**vars(self)))
-            print(f"wrote {path}")
+            print(f"wrote {_train(self.mode, options)}")
+
+    def _options(self) -> dict[str, Any]:
+        """Those that the mode has, where they were given.  Raises InputError for others."""
+        others = [name for name, modes in ONLY_OF.items() if self.mode not in modes]
+        for field in fields(self):
+            if field.name in others and getattr(self, field.name) != field.default:
+                option = field.name.replace("_", "-")
+                raise InputError(f"--{option} is for {', '.join(ONLY_OF[field.name])}; leave it out for {self.mode}")
+        return {name: value for name, value in vars(self).items() if value is not None and name not in others}
+
+
+def _train(mode: str, options: dict[str, Any]) -> Path:
+    if mode in RECONSTRUCTORS:
+        from denoiser.reconstruct.train import ReconstructorConfig, train_reconstructor
+
+        return train_reconstructor(ReconstructorConfig(**options))
+    from denoiser.train import TrainConfig, train
+
+    return train(TrainConfig(**options))

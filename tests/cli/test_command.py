@@ -94,6 +94,12 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
         (("denoise", "good.dat", "--window", "4"), "--window 4"),
         (("denoise", "good.dat", "--out", "good.dat"), "good.dat"),
         (("train", "--out", "runs", "--steps", "0"), "steps 0"),
+        (
+            ("train", "--out", "runs", "--width", "24"),
+            "--width is for spk2img-clean, spk2img-noisy, ssml; leave it out",
+        ),
+        (("train", "--out", "runs", "--mode", "ssml", "--no-refine"), "--refine is for paper; leave it out for ssml"),
+        (("train", "--out", "runs", "--mode", "ssml", "--width", "30"), "width = 30; it must be a multiple of 12"),
         (("evaluate", "quick", "--best", "text.npz"), "text.npz"),
         (("evaluate", "truth", "--static", "text.npz"), "text.npz"),
         (("evaluate", "spikezoo", "."), "no folder spike"),

@@ -368,6 +368,7 @@ def test_overlapping_passes_are_the_mean_of_two_chains():
     other = np.where(np.arange(90)[:, None, None] < 8, 0.0, 8 - weight)
     assert np.allclose(mixed, (weight * alone + other * later) / (weight + other), atol=1e-6)
     assert np.abs(later - alone)[8:].max() > 1e-4
+    assert np.array_equal(later[8:], run(denoiser("best"), [spikes[8:]])[1])  # the chain begins anew there
 
 
 def _passes(chain, spikes):
@@ -379,7 +380,7 @@ def _passes(chain, spikes):
     [3, (MAP[0],), (MAP[0][0], MAP[1][0]), (-MAP[0], MAP[1]), (MAP[0], np.full(SHAPE, np.nan)), (MAP[0][:2], MAP[1])],
 )
 def test_what_is_no_calibration_map_is_refused(unit):
-    with pytest.raises(InputError, match="map|unit"):
+    with pytest.raises(InputError, match=r"map|unit"):
         denoiser("best", unit=unit)
 
 

@@ -356,6 +356,7 @@ BAD = [
     *({"seed": value} for value in (-1, 2**63, None)),
     *({"mode": value} for value in ("best", None)),
     *({"width": value} for value in (13, 0)),
+    {"patch": 193},
     *({"device": value} for value in ("tpu", "cuda:x", 0)),
     *({"resume": value} for value in ("no", None)),
     *({"out": value} for value in (3, None)),

@@ -3,42 +3,31 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
 from denoiser import train as training
-from denoiser.pairs import draw_clip
 from denoiser.recipe import RECIPES
-from denoiser.train import TrainConfig, train
+from denoiser.simulated import Bank
+from denoiser.train import Judge, TrainConfig, train
+from denoiser.training_record import command
 from denoiser.weights import load_weights
 from spikecam_env.errors import InputError
 
 
-class InlineFeed:
-    """ClipFeed without a process of its own, over small clips."""
-
-    def __init__(self, recipe, seed, first=0, weights=None, *, workers=1):
-        self.recipe, self.seed, self.next, self.weights = recipe, seed, first, weights
-
-    def __next__(self):
-        self.next += 1
-        return draw_clip(self.recipe, self.seed, self.next - 1, shape=(24, 24))
-
-    def close(self):
-        pass
-
-
 @pytest.fixture
-def small(monkeypatch):
-    monkeypatch.setattr(training, "ClipFeed", InlineFeed)
-    monkeypatch.setattr(training, "FIRST_CLIPS", 2)
-    monkeypatch.setattr(training, "VALIDATION_CLIPS", 1)
+def small(monkeypatch, bank):
+    """Few textures and units; four streams to validate on, for as few passes as count."""
+    monkeypatch.setattr(Bank, "drawn", lambda *_, **__: bank)
+    monkeypatch.setattr(training, "VALIDATION_STREAMS", 4)
+    monkeypatch.setattr(training, "VALIDATION_PASSES", 3)
 
 
 def weights_after(out, steps, mode="best", **options):
-    config = TrainConfig(mode=mode, out=out, steps=steps, batch=2, patch=16, refresh_every=4, **options)
+    config = TrainConfig(mode=mode, out=out, steps=steps, batch=2, patch=16, **options)
     return load_weights(train(config, progress=False))[1].state_dict()
 
 
@@ -53,23 +42,93 @@ def test_same_seed_same_weights(small, tmp_path):
 
 
 def test_a_resumed_run_goes_on(small, tmp_path, monkeypatch):
-    """Two steps, then the rest of four, are four steps: weights, moments, clips and draws come back."""
-    whole = weights_after(tmp_path / "whole", 4)
-    done = training._done
+    """Two steps, then the rest of four: weights and moments come back, the streams are others."""
+    done, seeds, drawn = training._done, [], training.source
+    monkeypatch.setattr(training, "source", lambda *a, seed, **o: seeds.append(seed) or drawn(*a, seed=seed, **o))
     monkeypatch.setattr(training, "_done", lambda config, run: 1.0 if run.step == 2 else done(config, run))
-    weights_after(tmp_path / "halves", 4)
+    half = weights_after(tmp_path, 4)
+    begun = training._Run.begin(TrainConfig(out=tmp_path), RECIPES["best"])
+    begun.load(tmp_path / "last.pt")
+    assert same(begun.network.state_dict(), half)
     monkeypatch.setattr(training, "_done", done)
-    assert same(weights_after(tmp_path / "halves", 4), whole)
+    whole = weights_after(tmp_path, 4)
+    record = load_weights(tmp_path / "best.pt")[2]
+    moments = torch.load(tmp_path / "last.pt", weights_only=True)["optimiser"]["state"]
+    assert record["resumed_at"] == [2] and record["steps"] == 4 and float(moments[0]["step"]) == 4
+    assert seeds == [0, 2] and not same(half, whole)
 
 
-@pytest.mark.parametrize("mode", ["paper", "best"])
-def test_a_run_leaves_weights_and_a_curve(small, tmp_path, mode):
-    weights_after(tmp_path, 5, mode)
+@pytest.mark.parametrize("mode, passes", [("paper", 13), ("best", 3)])
+def test_a_run_leaves_weights_and_a_curve(small, tmp_path, monkeypatch, mode, passes):
+    monkeypatch.setattr(training, "VALIDATION_PASSES", passes)
+    weights_after(tmp_path, 3, mode, validate_every=2)
     curve = json.loads((tmp_path / "curve.json").read_text())
-    assert [point["step"] for point in curve] == [4] and np.isfinite(curve[0]["network_vs_light_db"])
-    assert (tmp_path / "curve.png").stat().st_size > 0 and (tmp_path / "last.pt").exists()
-    assert (tmp_path / "rollout-4.pt").exists() == (RECIPES[mode].layout.gain_memory > 0)
-    assert not list(tmp_path.glob("*.part"))
+    assert [point["step"] for point in curve] == [2]
+    assert 0 < curve[0]["network_db"] < 60 and 5 < curve[0]["interval_db"] < 60 and np.isfinite(curve[0]["loss"])
+    assert (tmp_path / "curve.png").stat().st_size > 0
+    assert {path.name for path in tmp_path.iterdir()} == {f"{mode}.pt", "last.pt", "curve.json", "curve.png"}
+    record = load_weights(tmp_path / f"{mode}.pt")[2]
+    assert record["steps"] == 3 and record["command"].startswith(f"spikecam train --mode {mode} --out OUT")
+
+
+def test_a_validation_changes_nothing_in_the_weights(small, tmp_path):
+    never, often = (weights_after(tmp_path / str(every), 2, validate_every=every) for every in (1000, 1))
+    assert same(never, often)
+
+
+def test_the_judge_is_the_same_at_every_validation(small):
+    torch.manual_seed(0)
+    network, judge = RECIPES["best"].network().train(), Judge(RECIPES["best"], 7, torch.device("cpu"))
+    first, again = judge.scores(network), judge.scores(network)
+    print(first)
+    assert first == again and network.training and set(first) == {"network_db", "mapped_db", "interval_db", "mean_db"}
+
+
+def test_the_ablation_has_no_refine_module(small, tmp_path):
+    weights = weights_after(tmp_path, 1, "paper", refine=False)
+    recipe, _, record = load_weights(tmp_path / "paper.pt")
+    assert recipe == replace(RECIPES["paper"], refine=False) and not any("texture" in name for name in weights)
+    assert record["command"].endswith("--no-refine")
+
+
+def test_minutes_end_a_run(small, tmp_path):
+    """A second, of a thousand million steps."""
+    weights_after(tmp_path, 10**9, minutes=1 / 60)
+    record = load_weights(tmp_path / "best.pt")[2]
+    print(record["steps"], "steps")
+    assert 1 <= record["steps"] < 1000
+
+
+def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
+    adam = torch.optim.Adam([torch.zeros(1, requires_grad=True)])
+    rates = []
+    for step, done in ((0, 0.0), (99, 0.0), (1000, 0.5), (2000, 1.0)):
+        training._set_rate(adam, 2.0, step, done)
+        rates.append(adam.param_groups[0]["lr"])
+    assert rates == pytest.approx([0.02, 2.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    "options, expected",
+    [
+        ({}, "spikecam train --mode best --out OUT"),
+        (
+            {"mode": "paper", "refine": False, "batch": 48, "minutes": 7.5, "resume": False},
+            "spikecam train --mode paper --out OUT --batch 48 --minutes 7.5 --no-refine",
+        ),
+    ],
+)
+def test_a_record_says_what_to_type(options, expected, monkeypatch):
+    """And the command takes it for the same options."""
+    from spikecam_env.cli import main, train
+
+    taken = {}
+    monkeypatch.setattr(train, "_train", lambda mode, options: taken.update(options))
+    config = TrainConfig(**options)
+    assert command(config) == expected
+    assert main.run(expected.split()[1:]) == 0
+    given = {name: taken[name] for name in taken if name not in ("out", "resume", "threads")}
+    assert given == {name: getattr(config, name) for name in given} and given["mode"] == config.mode
 
 
 def test_the_run_of_another_mode_is_refused(small, tmp_path):
@@ -80,7 +139,7 @@ def test_the_run_of_another_mode_is_refused(small, tmp_path):
 
 @pytest.mark.parametrize(
     "bad",
-    [{"steps": 0}, {"patch": 97}, {"lr": 0.0}, {"batch": 0}, {"workers": 0}, {"device": "tpu"}, {"device": "cuda:x"}],
+    [{"steps": 0}, {"patch": 97}, {"lr": 0.0}, {"batch": 0}, {"device": "tpu"}, {"device": "cuda:x"}],
 )
 def test_unusable_options_are_named(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
@@ -95,14 +154,12 @@ def test_a_gpu_that_is_not_there_is_refused():
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device on this machine")
 def test_a_network_learns_on_a_gpu(small, tmp_path):
-    """To weights that load on a processor, past a validation and into clips with a gain."""
-    weights = weights_after(tmp_path, 6, device="cuda")
+    """To weights that load on a processor, past a validation."""
+    weights = weights_after(tmp_path, 6, device="cuda", validate_every=4)
     assert all(w.device.type == "cpu" and bool(torch.isfinite(w).all()) for w in weights.values())
 
 
-@pytest.mark.parametrize(
-    "name", ["steps", "batch", "seed", "threads", "patch", "steps_per_clip", "refresh_every", "workers"]
-)
+@pytest.mark.parametrize("name", ["steps", "batch", "seed", "threads", "patch", "validate_every"])
 @pytest.mark.parametrize("value", [-1, 10**30, 1.5, float("nan"), None, True, "8"])
 def test_a_count_out_of_range_is_named(name, value):
     with pytest.raises(InputError, match=name):
@@ -131,11 +188,6 @@ ODD_RUNS = {
     "a curve of text": lambda run: run.update(curve=[{"step": "1"}]),
     "resumed at a list": lambda run: run.update(resumed_at=[[1]]),
     "an unknown entry": lambda run: run.update(more=1),
-    "rng no JSON": lambda run: run.update(rng="{"),
-    "rng nested": lambda run: run.update(rng="[" * 100_000),
-    "rng of another kind": lambda run: run.update(rng=run["rng"].replace("PCG64", "MT19937")),
-    "rng out of range": lambda run: run.update(rng=run["rng"].replace('"state": ', '"state": -').replace("-{", "{")),
-    "rng a number": lambda run: run.update(rng=3),
     "weights NaN": lambda run: next(iter(run["network"].values())).fill_(float("nan")),
     "weights a list": lambda run: run.update(network=[1]),
     "no groups": lambda run: run["optimiser"].pop("param_groups") and None,
@@ -149,14 +201,12 @@ ODD_RUNS = {
 
 
 @pytest.fixture(scope="module")
-def begun(tmp_path_factory):
+def begun(tmp_path_factory, bank):
     """A run of one step."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(training, "ClipFeed", InlineFeed)
-    patch.setattr(training, "FIRST_CLIPS", 2)
     out = tmp_path_factory.mktemp("run")
-    weights_after(out, 1)
-    patch.undo()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Bank, "drawn", lambda *_, **__: bank)
+        weights_after(out, 1)
     return out / "last.pt"
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from denoiser.recipe import RECIPES
-from denoiser.window import RollingWindow, WindowLayout, without_gain
+from denoiser.pixel_map import PixelMap
+from denoiser.window import RollingWindow, WindowLayout
+from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_planes
 
 SHAPE = (5, 7)
@@ -99,13 +101,78 @@ def test_gain_is_the_ratio_of_spikes_to_learned_rates():
     roller = RollingWindow(layout, SHAPE)
     for window in roller.push(spikes):
         roller.learn(window, np.full((window.count, *SHAPE), 0.4, np.float32))
-    found = 1 + window.planes[-1] / 4
+    found = 1 + window.planes[-2] / 4
     worst = abs(found - gains).max()
     print(f"worst gain error {worst:.4f}")
     assert worst < (1 + 2 * 0.1) / (0.4 * window.start)  # one spike more or less, and the prior's pull
     blind = RollingWindow(WindowLayout(planes=8), SHAPE)
     plain = next(w for w in blind.push(spikes) if w.start == window.start)
-    assert np.allclose(without_gain(window).planes[:-1], plain.planes, rtol=1e-6)
+    assert np.allclose(window.planes[:-2] * found, plain.planes, rtol=1e-5) and not window.planes[-1].any()
+
+
+def test_a_gain_of_few_spikes_is_pulled_to_one():
+    """Four spikes where rates say two: 6 / 4 is a gain of 1.5, not of 2; none where they say six: 1/4, cut to 1/2."""
+    layout = WindowLayout(planes=8, gain_memory=1e9)
+    roller = RollingWindow(layout, (1, 2))
+    spikes = np.zeros((48, 1, 2), np.uint8)
+    spikes[:4, 0, 0] = 1
+    rates = np.tile(np.array([[2 / 8, 6 / 8]], np.float32), (8, 1, 1))
+    for window in roller.push(spikes):
+        if window.start == 8:
+            break
+        roller.learn(window, rates)
+    assert (1 + window.planes[-2] / 4).tolist() == [[1.5, 0.5]]
+
+
+def test_a_map_takes_dark_rate_and_gain_out_of_every_plane():
+    layout, spikes = WindowLayout(planes=8, half_widths=(4,), memories=(16.0,), gain_memory=64.0), stream(64, seed=7)
+    rng = np.random.default_rng(8)
+    unit = PixelMap(rng.uniform(0.8, 1.2, SHAPE), rng.uniform(0.0, 0.05, SHAPE))
+    calibrated, plain = (
+        RollingWindow(layout, SHAPE, unit),
+        RollingWindow(WindowLayout(8 + 12, 8, 20, (4,), (16.0,)), SHAPE),
+    )
+    for window, other in zip(calibrated.push(spikes), plain.push(spikes), strict=True):
+        calibrated.learn(window, np.full((window.count, *SHAPE), 0.9, np.float32))  # changes nothing
+        expected = np.maximum(other.planes - unit.dark, 0) / unit.gain
+        assert np.allclose(window.planes[:-2], expected, rtol=1e-6)
+        assert np.allclose(window.planes[-2], 4 * (unit.gain - 1)) and (window.planes[-1] == 1).all()
+
+
+GOOD = np.ones(SHAPE, np.float32)
+BAD_MAPS = {
+    "one map": GOOD,
+    "three maps": (GOOD, GOOD, GOOD),
+    "none": None,
+    "text for a map": ("gain", "dark"),
+    "other shapes": (GOOD, GOOD[:3]),
+    "of one axis": (GOOD[0], GOOD[0]),
+    "empty": (GOOD[:0], GOOD[:0]),
+    "gain nought": (0 * GOOD, GOOD),
+    "gain NaN": (np.nan * GOOD, GOOD),
+    "gain infinite": (np.inf * GOOD, GOOD),
+    "gain of a thousand": (1000 * GOOD, GOOD),
+    "dark negative": (GOOD, -0.1 * GOOD),
+    "dark over one": (GOOD, 1.1 * GOOD),
+    "dark NaN": (GOOD, np.nan * GOOD),
+    "complex": (GOOD + 1j, GOOD),
+    "ragged": ([[1.0], [1.0, 2.0]], GOOD),
+    "beyond float32": (np.full(SHAPE, 1e300), GOOD),
+}
+
+
+@pytest.mark.parametrize("name", BAD_MAPS)
+def test_a_bad_map_is_refused_in_one_line(name):
+    with pytest.raises(InputError, match="map") as caught:
+        PixelMap.of(BAD_MAPS[name])
+    assert "\n" not in str(caught.value)
+
+
+def test_maps_of_other_types_are_taken_and_told_apart():
+    unit = PixelMap.of(([[1, 2], [3, 4]], np.zeros((2, 2))))
+    assert unit.gain.dtype == unit.dark.dtype == np.float32 and PixelMap.of(unit) is unit
+    others = [PixelMap(unit.gain, unit.dark), PixelMap(2 * unit.gain, unit.dark), PixelMap(unit.gain, unit.dark + 0.1)]
+    assert [other.digest == unit.digest for other in others] == [True, False, False]
 
 
 def test_mirrored_spikes_fill_both_edges():

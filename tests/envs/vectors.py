@@ -20,7 +20,7 @@ from spikecam_env.envs.registration import ENVIRONMENTS
 
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20}
 STEPS = 2
-"""The denoiser's frames come 27 late: they are seen from the first step on."""
+"""The denoiser's frames come 31 late: they are seen from the first step on."""
 
 Makers = list[Callable[[], gymnasium.Env]]
 

@@ -60,24 +60,16 @@ class Writing:
         return self.run(out, inputs, patch, dict.fromkeys(self.work, begun))
 
 
-class InlineFeed:
-    """The same training clip again and again, without a process of its own."""
-
-    def __init__(self, recipe, seed, first=0, weights=None, *, workers=1) -> None:
-        self.recipe = recipe
-
-    def __next__(self):
-        return _clip(self.recipe)
-
-    def close(self) -> None:
-        pass
-
-
 @cache
-def _clip(recipe):
-    from denoiser.pairs import draw_clip
+def _bank(*_: object, **__: object) -> object:
+    """A texture and an ideal unit: nothing is drawn."""
+    import torch
 
-    return draw_clip(recipe, 0, 0, shape=(64, 64))
+    from denoiser.simulated import TEXTURE_SIZE, UNIT_SHAPE, Bank
+    from spikecam_env.sensor.light import GRAINS
+
+    nothing = torch.zeros(1, *UNIT_SHAPE)
+    return Bank(torch.rand(1, TEXTURE_SIZE, TEXTURE_SIZE), nothing + GRAINS, nothing, nothing, torch.zeros(1, 8))
 
 
 def _evaluation(**options) -> dict[str, object]:
@@ -97,7 +89,7 @@ def _film(*_: object) -> list[np.ndarray]:
 
 def _streamed(**_: object) -> SimpleNamespace:
     return SimpleNamespace(
-        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, denoiser_s=1.0, times_real=1.0, latency=27
+        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, denoiser_s=1.0, times_real=1.0, latency=31
     )
 
 
@@ -109,11 +101,7 @@ DEMO: Work = {
     "spikecam_env.cli.showcase:film_frames": _film,
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
-TRAINING: Work = {
-    "denoiser.train:ClipFeed": InlineFeed,
-    "denoiser.train:FIRST_CLIPS": 2,
-    "denoiser.train:POOL_CLIPS": 2,
-}  # type: ignore[dict-item]
+TRAINING: Work = {"denoiser.simulated:Bank.drawn": _bank}
 EVALUATION: Work = {
     "denoiser.evaluate:evaluate_quick": _evaluation,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,
@@ -149,7 +137,8 @@ WRITINGS: dict[str, Writing] = {
     "scenes gif": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.gif", SCENE),
     "scenes png": Writing(f"scenes disk --out {{out}} {' '.join(SMALL)}", "disk.png", SCENE),
     "dataset": Writing(f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}),
-    "train": Writing("train --out {out} --steps 2 --batch 2", "run", TRAINING),
+    "train": Writing("train --out {out} --steps 2 --batch 2 --patch 16", "run", TRAINING),
+    "train ssml": Writing("train --mode ssml --out {out} --steps 2 --batch 2 --patch 16 --width 12", "run", TRAINING),
     "evaluate": Writing("evaluate quick --out {out}", "evaluation", EVALUATION),
     "evaluate table": Writing(
         f"evaluate table1 --out {{out}} --rows noisy --scenes disk --seeds 1 --frames 200 {' '.join(SMALL)}",
