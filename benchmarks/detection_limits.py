@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.campaign.design import standard_design
+from spikecam_env.gap.acquisition.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.fit.candidate import with_pattern

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, CampaignRecording
-from spikecam_env.gap.campaign.recording_kinds import Planned
+from spikecam_env.gap.acquisition.recording_kinds import Planned
 from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.sensor import Keyframes
 

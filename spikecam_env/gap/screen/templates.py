@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.campaign.design import standard_design
+from spikecam_env.gap.acquisition.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
 from spikecam_env.gap.compare.prediction import Null, values_of

@@ -30,7 +30,7 @@ from spikecam_env.campaign.reading import USES, read_light, read_rates
 from spikecam_env.campaign.writing import finish_campaign, save_light, save_rates, save_spikes
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.gap.campaign.labels import READING, RELATIVE, UNKNOWN, Label
+from spikecam_env.gap.acquisition.labels import READING, RELATIVE, UNKNOWN, Label
 from spikecam_env.names import file_name, inside
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import read_recording
