@@ -34,7 +34,7 @@ from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound
-from spikecam_env.gap.screen.templates import Templates, load
+from spikecam_env.gap.screen.templates import Templates, shipped_templates
 from spikecam_env.gap.search.forward import of_fit
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import at_any_phase
@@ -84,7 +84,7 @@ def stated() -> list[Bound]:
     case = recorded(MODEL, CAMERA - 1)
     null, values = judged(case)
     names, _ = testable(chosen(MODEL, None, ()), case.conditions)
-    return bounds(case, MODEL, null, values, names, load())[0]
+    return bounds(case, MODEL, null, values, names, shipped_templates())[0]
 
 
 def trial(bound: Bound, number: int) -> Trial:
@@ -101,7 +101,7 @@ def trial(bound: Bound, number: int) -> Trial:
 def _of_shape(bound: Bound) -> Templates:
     """The templates, of the effect those of the bound's shape alone."""
 
-    shipped = load()
+    shipped = shipped_templates()
     alike = [
         e for e in shipped.weakest if e.name == bound.name and all(e.parameters[k] == v for k, v in bound.at.items())
     ]

@@ -18,10 +18,11 @@ from spikecam_env.gap.candidates.strength import bounded, is_linear, with_effect
 from spikecam_env.gap.candidates.table import CANDIDATES, candidate, is_pattern
 from spikecam_env.gap.compare.prediction import TOLERANCE
 from spikecam_env.gap.fit.candidate import predict
-from spikecam_env.gap.screen.templates import load, standard_case
+from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.unit.indirect_inference import FURTHEST
 from spikecam_env.gap.unit.refit import within
 from spikecam_env.sensor import CATALOGUE
+from tools.standard_case import standard_case
 
 PEAK, TWINS = 15.0, 4
 
@@ -29,7 +30,7 @@ PEAK, TWINS = 15.0, 4
 def report(preset: str) -> None:
     """Print a line an effect."""
     case, model, null = standard_case(preset=preset)
-    templates = load()
+    templates = shipped_templates()
     told = [case.use(k.recording) == "fit" for k in templates.keys]
     base = within(model, case.base)
     has = {e.name for e in model.effects}

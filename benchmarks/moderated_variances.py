@@ -19,9 +19,9 @@ from tqdm import tqdm
 from spikecam_env.gap.baseline.alarm import ALARM
 from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
 from spikecam_env.gap.compare.prediction import Null, null_of
-from spikecam_env.gap.screen.templates import standard_case
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import within
+from tools.standard_case import standard_case
 
 Array = NDArray[np.float64]
 

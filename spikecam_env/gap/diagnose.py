@@ -29,13 +29,13 @@ from spikecam_env.gap.baseline.null_model import model_null, unit_under
 from spikecam_env.gap.baseline.off_nominal import Off, off_nominal
 from spikecam_env.gap.candidates.table import chosen, is_pattern, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
 from spikecam_env.gap.report.evidence import evidence_of
 from spikecam_env.gap.report.words import sentence, unfinished
 from spikecam_env.gap.result import Diagnosis
-from spikecam_env.gap.screen.own_templates import own_templates
-from spikecam_env.gap.screen.templates import Templates, load
+from spikecam_env.gap.screen.templates import Templates, shipped_templates
 from spikecam_env.gap.search.forward import Round, of_fit, search
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
 from spikecam_env.gap.twins.case import Case, case_of
@@ -112,7 +112,9 @@ def diagnose(
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
-            rounds = harmless(case, null, values, search(case, start, null, values, names, templates or load()))
+            rounds = harmless(
+                case, null, values, search(case, start, null, values, names, templates or shipped_templates())
+            )
     if rounds and not lacking:
         off = replace(
             off, parameters=off_nominal(case, patterned(assumed, rounds[-1].model), rounds[-1].base).parameters
@@ -130,7 +132,7 @@ def diagnose(
     if found.verdict in ("none", "parameter"):
         with timed("bounds"):
             settled = replace(case, base=unit_under(case, start)) if case.scenes_only else case
-            below, open_ = bounds(settled, start, null, values, names, templates or load())
+            below, open_ = bounds(settled, start, null, values, names, templates or shipped_templates())
         found = replace(found, bounds=tuple(below), not_bounded=tuple(open_))
     found = replace(
         found,

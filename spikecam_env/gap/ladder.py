@@ -28,7 +28,7 @@ from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import in_order, read_case
 from spikecam_env.gap.report import plots
-from spikecam_env.gap.screen.templates import load
+from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.search.forward import of_fit, search
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.workers import sums_in_one_order
@@ -132,7 +132,7 @@ def ladder(
         left.pop(best)
     bar.close()
     if rings(null, of_fit(case, null, values)):
-        rounds = search(case, full, null, values, names, load())
+        rounds = search(case, full, null, values, names, shipped_templates())
         for was, now in itertools.pairwise(rounds):
             if now.model is not was.model:
                 fit = was.fits[0]
