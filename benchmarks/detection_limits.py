@@ -22,7 +22,7 @@ from spikecam_env.gap.acquisition.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.fit.candidate import with_pattern
-from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.unit.usual import USUAL_NOISE
@@ -59,7 +59,7 @@ def of_a_reset() -> float:
 
 def heard(keys: Sequence[Key]) -> NDArray[np.bool_]:
     """(S,) which statistics are of recordings that the alarm hears and a fit may take."""
-    names = {c.name for c in planned(standard_design(), SHAPE, FRAMES) if c.use == "fit" or c.moves}
+    names = {c.name for c in planned_conditions(standard_design(), SHAPE, FRAMES) if c.use == "fit" or c.moves}
     return np.array([k.recording in names for k in keys])
 
 

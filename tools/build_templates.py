@@ -27,7 +27,7 @@ from spikecam_env.gap.screen import templates as screened
 from spikecam_env.gap.screen.templates import SEVERE, Template, Templates, about_template, save_templates
 from spikecam_env.gap.twins.case import Case, twins
 from spikecam_env.gap.twins.simulate import simulate
-from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.untrusted import Declared, Name, declared, numbers, parse_json, read_arrays
 from spikecam_env.whole import check_file, made_folder, whole_file
@@ -73,9 +73,9 @@ def severe_template(
     if is_pattern(name):
         return Template(name, dict(parameters), simulated_shift(case, model, null, name, parameters), times)
     seed = case.seed * 1000 + 7
-    made = simulate(there, within(there, case.base), case.conditions, case.shape, seed)
+    made = simulate(there, constrained_refit(there, case.base), case.conditions, case.shape, seed)
     seen = case.of(case.conditions, made)
-    without = twins(seen, model, within(model, seen.base), range(REFITTED))
+    without = twins(seen, model, constrained_refit(model, seen.base), range(REFITTED))
     mean = np.mean([values_of(t.bank, null.keys) for t in without], axis=0)
     shift = np.nan_to_num((values_of(seen.bank, null.keys) - mean) / null.noise)
     of_pattern = np.array([k.group == "pattern" for k in null.keys])

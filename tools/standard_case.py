@@ -8,10 +8,10 @@ from __future__ import annotations
 from spikecam_env.gap.acquisition.design import standard_design
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import simulate
-from spikecam_env.gap.unit.refit import unit_as_base
+from spikecam_env.gap.unit.refit import exact_refit
 from spikecam_env.sensor import SensorModel
 
 SHAPE, FRAMES, SEED = (64, 64), 8000, 20
@@ -23,8 +23,8 @@ def standard_case(
 ) -> tuple[Case, SensorModel, Null]:
     """(the case, its model, what `count` twins of the model predict)."""
     model = SensorModel.preset(preset)
-    conditions = planned(standard_design(), SHAPE, FRAMES)
+    conditions = planned_conditions(standard_design(), SHAPE, FRAMES)
     unit = model.draw_unit(SHAPE, seed)
-    base = unit_as_base(unit)
+    base = exact_refit(unit)
     case = case_of(SHAPE, conditions, simulate(model, base, conditions, SHAPE, seed), seed, jobs)
     return case, model, model_null(case, model, count)

@@ -1,4 +1,4 @@
-"""Campaigns by simulation: one unit of any model, recorded as a real camera would be."""
+"""Campaigns by simulation: designs, and one unit of any model recorded by them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ from spikecam_env.sensor import SensorModel
 from spikecam_env.streams.packing import packed_bytes
 
 FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
+"""Radiance of the flats to fit: even steps of its logarithm, up to below saturation."""
+
 HOLDOUT_LEVELS = (0.05, 0.15, 0.5)
+"""Radiance of the flats held out, between those to fit."""
+
 BRIGHT = 1.4
-"""Of the bars: above one spike a frame, so that what flows over shows."""
+"""Radiance of the bright bars: above one spike a frame, so that blooming shows."""
 
 
 def write_campaign(
@@ -32,7 +36,7 @@ def write_campaign(
     """Record unit `seed` of a model into a campaign (format spikecam-campaign/1) and read it back.
 
     model: a SensorModel, with any effects; a preset's name or a TOML path.  frames: length of recordings that do not
-    say their own.  recordings: default `standard_design()`.
+    state their own.  recordings: default `standard_design()`.
     Same arguments, same bytes; a run that was stopped goes on where it was.
     Errors: InputError as `record_takes`, and for light that a recording cannot have.
     """

@@ -5,11 +5,10 @@ in any other unit proportional to light go through `radiance_per_unit`, the radi
 
 Rates are an npz with `rate` (H, W) [spikes/frame] and `frames` it was counted over.
 
-Flat maps (`calibration.flat_maps`) become recordings of rates, lit and dark, and where its counts can be told the one
-at 153 lux, which is held out.  How many spikes a frame 335 lux
-should give is not known, so the lit one is labelled by the camera itself, `relative`: radiance is the median over
-pixels of its rate less the dark's.  By this label the median pixel has gain 1; only how pixels
-differ, and the dark, can disagree with a model.
+Flat maps (`calibration.flat_maps`) become recordings of rates, lit and dark, and where its counts are known the one at
+153 lux, which is held out.  The radiance of 335 lux is not known, so the lit one is labelled by the camera itself,
+`relative`: radiance is the median over pixels of its rate less the dark's.  By this label the median pixel has gain 1;
+only the differences between pixels, and the dark, can disagree with a model.
 """
 
 from __future__ import annotations
@@ -38,7 +37,8 @@ from spikecam_env.streams.recording import ENDINGS, reading_options
 from spikecam_env.untrusted import array_names
 from spikecam_env.whole import whole_folder
 
-_BLOCK = 256
+_FRAMES_AT_ONCE = 256
+"""Frames written at once."""
 
 
 def import_campaign(
@@ -57,7 +57,7 @@ def import_campaign(
 ) -> Campaign:
     """Make a campaign (format spikecam-campaign/1) of labelled files in `folder`; `out` appears whole.
 
-    frame_rate_hz: of the camera; None where every file says it.  rows, columns: first and stop of the part to keep.
+    frame_rate_hz: of the camera; None where every file states it.  rows, columns: first and stop of the part to keep.
     holdout_share: this share of each stream of use fit, its end, becomes a recording of use holdout.
     outside: read files that lie outside of `folder` too, by `..`, from the root, or over symbolic links.
     reading: options of `read_recording` for all files they apply to; a label's own come first.
@@ -219,7 +219,7 @@ def _write(folder: Path, piece: _Piece) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": piece.name}
     if piece.data.ndim == 3:
         entry |= {"spikes": f"{piece.name}.dat", "frames": piece.frames}
-        blocks = (piece.data[i : i + _BLOCK] for i in range(0, piece.frames, _BLOCK))
+        blocks = (piece.data[i : i + _FRAMES_AT_ONCE] for i in range(0, piece.frames, _FRAMES_AT_ONCE))
         save_spikes(folder / f"{piece.name}.dat", blocks)
     else:
         entry["rates"] = f"{piece.name}-rates.npz"

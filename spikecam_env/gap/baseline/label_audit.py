@@ -1,6 +1,6 @@
-"""What the data contradict about themselves, before any model is asked: labels, order, orientation, missing frames.
+"""Contradictions within the recordings, before any model is compared: labels, order, orientation, missing frames.
 
-Each check looks for one mistake that would explain a recording and leave the others in order; an effect bends all.
+Each check looks for one mistake that explains one recording and leaves the others consistent; an effect changes all.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import BIN, Observation
 from spikecam_env.gap.statistics.film import light_film
 from spikecam_env.gap.twins.case import Case
@@ -25,19 +25,19 @@ from spikecam_env.sensor import SensorModel
 Array = NDArray[np.float64]
 
 LEAST_LABEL = 1e-3
-"""Relative error of a label that is worth a word."""
+"""Relative error of a label from which it is reported."""
 
 LEAST_DARK = 0.02
-"""Relative difference of a dark recording from what the flats extrapolate to that is worth a word: of few spikes a
-pixel, the rate between first and last is biased by their number squared."""
+"""The same of a dark recording, against the extrapolation of the flats: of few spikes a pixel, the rate between first
+and last is biased by their number squared."""
 
-UNEVEN = 0.5
-"""Spread over pixels of what a recording is off by, as a share of it, from which no label is to blame: a label is one
+PIXEL_SPREAD = 0.5
+"""Spread over pixels of a recording's residual, over its mean, from which the label is not at fault: a label is one
 number, and an effect that sets in there depends on the pixel."""
 
-ODD = 0.1
-"""Share of a recording's intervals that are much too short or too long, over what its rate is off by, from which spikes
-are missing or too many: light of another level makes none."""
+IRREGULAR = 0.1
+"""Share of irregular intervals in a recording, over its mean residual, from which the label is not at fault: spikes are
+missing or too many, and light of another level makes no irregular interval."""
 
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
@@ -45,12 +45,12 @@ MENDED = 0.2
 MOST_BINS = 25
 """Largest shift of a moving recording against its light that is looked for [bins of the film]."""
 
-RELABELLED = 6
-"""Twins by which a recording is judged under another label."""
+RELABEL_TWINS = 6
+"""Twins that a recording is compared with under another label."""
 
 OFTEN, PASSES = 0.9, 0.4
-"""Share of a recording in which lateness, away from the largest, has to stay below what share of that, for a gap to be
-there: two gaps are few of its frames, a flicker is many."""
+"""Frames are missing only where the lateness elsewhere, its quantile OFTEN, is below PASSES times the largest: two gaps
+are in few frames of a recording, a flicker in many."""
 
 SEGMENTS = 8
 """Parts of a moving recording whose timing is compared."""
@@ -58,7 +58,7 @@ SEGMENTS = 8
 
 @dataclass(frozen=True)
 class Contradiction:
-    """kind: label, swapped, flipped, dropped or silent.  recordings: concerned; text: what was found, in words.
+    """kind: label, swapped, flipped, dropped or silent.  recordings: concerned; text: the finding, in words.
 
     factor: what a label has to be multiplied by.
     """
@@ -119,11 +119,11 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
     return found
 
 
-def _lit(condition: Shown, o: Observation) -> bool:
+def _lit(condition: Condition, o: Observation) -> bool:
     return condition.kind == "flat" and o.times.count.sum() >= 1000
 
 
-def _expected_film(case: Case, condition: Shown) -> Array:
+def _expected_film(case: Case, condition: Condition) -> Array:
     """(bins, P) spikes of the refitted unit in moving light, at most one a frame."""
     assert condition.light is not None
     light = light_film(condition.light, condition.frames).astype(np.float64)
@@ -135,7 +135,7 @@ def _correlation(a: Array, b: Array) -> float:
     return float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-30))
 
 
-def _levels(case: Case, suspect: set[str]) -> tuple[list[str], Array, Array]:
+def _steady_levels(case: Case, suspect: set[str]) -> tuple[list[str], Array, Array]:
     """Names, labels and mean rates of the uniform, steady recordings of known light below saturation."""
     rows = [
         (c.name, c.level, float(o.rate[case.base.live].mean()))
@@ -157,7 +157,7 @@ def _bend(light: Array, rate: Array) -> tuple[float, Array]:
 
 def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Two steady recordings whose labels, exchanged, make the rates a straight line."""
-    names, light, rate = _levels(case, suspect)
+    names, light, rate = _steady_levels(case, suspect)
     if len(names) < 5:
         return []
     before = _bend(light, rate)[0]
@@ -178,7 +178,7 @@ def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
 
 def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
     """One recording off the straight line that all others lie on."""
-    names, light, rate = _levels(case, suspect)
+    names, light, rate = _steady_levels(case, suspect)
     if len(names) < 5:
         return []
     before = _bend(light, rate)[0]
@@ -192,7 +192,10 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
     off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0) if light[i] > 0 else np.inf
     if left > MENDED * before or abs(off) < max(LEAST_LABEL, 4 * left):
         return []
-    if light[i] > 0 and (uneven(case, names[i], names) > UNEVEN * abs(off) or odd(case, names[i]) > ODD * abs(off)):
+    if light[i] > 0 and (
+        pixel_spread(case, names[i], names) > PIXEL_SPREAD * abs(off)
+        or irregular_share(case, names[i]) > IRREGULAR * abs(off)
+    ):
         return []
     if light[i] == 0:
         off = float(rate[i] / max(dark, 1e-9) - 1)
@@ -208,39 +211,41 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
 
 
 def upheld(case: Case, model: SensorModel, found: Sequence[Contradiction]) -> list[Contradiction]:
-    """The contradictions that stand: the label of the brightest is to blame only where with another label nothing else
-    of its recording is off.  What takes spikes of bright light alone looks like a wrong label of the brightest."""
+    """The contradictions that hold: the label of the brightest flat is at fault only where, relabelled, all else of its
+    recording agrees.  An effect that removes spikes in bright light alone looks like a wrong label of the brightest."""
     levels = {c.name: c.level for c in case.conditions if c.kind == "flat"}
     brightest = max(levels, key=lambda name: levels[name], default="")
-    return [c for c in found if c.kind != "label" or c.recordings != (brightest,) or is_right_but_for(case, model, c)]
+    return [
+        c for c in found if c.kind != "label" or c.recordings != (brightest,) or agrees_when_relabelled(case, model, c)
+    ]
 
 
-def is_right_but_for(case: Case, model: SensorModel, label: Contradiction) -> bool:
-    """Whether a recording is as the model has it, but for its label."""
+def agrees_when_relabelled(case: Case, model: SensorModel, label: Contradiction) -> bool:
+    """Whether a recording agrees with the model under another label."""
     [name] = label.recordings
     conditions = [relabelled(c, label.factor) if c.name == name else c for c in case.conditions]
     again = case.of(conditions, case.observations)
-    null = model_null(again, model, RELABELLED)
+    null = model_null(again, model, RELABEL_TWINS)
     of = np.array([k.recording == name and k.group != "rates" for k in null.keys])
     return not adjusted(deviates(null, values_of(again.bank, null.keys))[of]).min() < GATE
 
 
-def relabelled(condition: Shown, factor: float) -> Shown:
+def relabelled(condition: Condition, factor: float) -> Condition:
     """The same with its light multiplied."""
     assert condition.light is not None
     light = replace(condition.light, radiance=condition.light.radiance * np.float32(factor))
     return replace(condition, level=condition.level * factor, light=light)
 
 
-def odd(case: Case, name: str) -> float:
+def irregular_share(case: Case, name: str) -> float:
     """Share of short and long intervals in recording `name`."""
     [o] = [o for c, o in zip(case.conditions, case.observations, strict=True) if c.name == name]
     return float((o.short + o.long).sum()) / max(float(o.times.count.sum()), 1.0)
 
 
-def uneven(case: Case, name: str, names: Sequence[str]) -> float:
-    """Half of the middle 68 % of pixels by how far their rates in recording `name` are off their own lines, beyond what
-    it is in the recording of nearest light."""
+def pixel_spread(case: Case, name: str, names: Sequence[str]) -> float:
+    """Spread over pixels (half of the middle 68 %) of their relative residuals in recording `name`, beyond that in the
+    recording of nearest light."""
     live, base = case.base.live, case.base
     spread: dict[str, float] = {}
     level = {c.name: c.level for c in case.conditions}
@@ -293,7 +298,7 @@ def _jump_moving(case: Case, condition, o) -> tuple[int, float] | None:  # type:
     """(frame, missing) from how late each segment of the film is against its light."""
     expected = _expected_film(case, condition)
     parts = np.array_split(np.arange(1, len(expected) - 1), SEGMENTS)  # the ends have a change on one side only
-    coarse = [_shift(o.film, expected, part) for part in parts]
+    coarse = [_bins_late(o.film, expected, part) for part in parts]
     if len(set(coarse)) > 1 and coarse[0] == 0:
         k = next(i for i, s in enumerate(coarse) if s != 0)
         return k * condition.frames // SEGMENTS, float(coarse[k] * BIN)
@@ -315,7 +320,7 @@ def _jump_moving(case: Case, condition, o) -> tuple[int, float] | None:  # type:
     return k * condition.frames // SEGMENTS, -steps[k - 1]
 
 
-def _shift(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64]) -> int:
+def _bins_late(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64]) -> int:
     """Bins by which the light has to be moved on to agree best with a part of the film; 0 unless clearly better."""
     seen = film[part].astype(np.float64)
     scores = {}

@@ -23,7 +23,7 @@ from spikecam_env.gap.fit.candidate import predict, with_pattern
 from spikecam_env.gap.fit.gauss_newton import settled_there
 from spikecam_env.gap.screen.templates import Template, Templates
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
@@ -81,11 +81,12 @@ def simulated_template(
 
 def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Array:
     """(S,) change of the statistics, in noise, that a candidate makes: by units drawn, or by a twin of the unit that
-    is refitted as measured, since a refit takes up what bends rates, and saturation would show a unit too bright by
-    as much."""
+    indirect inference gives: else a refit would take up a bend of the rates, and saturation show a unit too bright."""
     there = with_effect(model, name, parameters)
     if is_pattern(name):
         made = with_pattern(case, there, null, null.prediction)
     else:
-        made, _ = settled_there(partial(predict, case, null=null, count=1), null, there, within(there, case.base), [])
+        made, _ = settled_there(
+            partial(predict, case, null=null, count=1), null, there, constrained_refit(there, case.base), []
+        )
     return np.nan_to_num((made.mean - null.mean) / null.noise)

@@ -1,8 +1,8 @@
-"""What each candidate does to the statistics bank: templates, to screen by.
+"""Templates: the change of the statistics bank that each candidate makes, to screen by.
 
-A template is a direction, in noise, at a strength that shows clearly; as statistics bend where an effect is severe,
-there are others of SEVERE times as much.  Screening (`screen`) scales the one that suits best to what was measured.
-The shipped ones are of the standard design, by `python -m tools.build_templates`.
+A template is a direction, in noise, at a strength that shows clearly.  Statistics are not in proportion where an effect
+is severe, so there are others of SEVERE times as much; screening (`screen`) scales the one that fits best.  The shipped
+ones are of the standard design, by `python -m tools.build_templates`.
 """
 
 from __future__ import annotations

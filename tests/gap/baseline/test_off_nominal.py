@@ -7,7 +7,7 @@ from small import MODEL, effect, recorded
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
 from spikecam_env.gap.twins.fresh_units import width
-from spikecam_env.gap.unit.refit import unit_as_base
+from spikecam_env.gap.unit.refit import exact_refit
 
 SHAPE = (128, 128)
 
@@ -17,7 +17,7 @@ def base_of(*effects):
     model = MODEL
     for e in effects:
         model = model.with_effect(e)
-    return unit_as_base(model.draw_unit(SHAPE, 5))
+    return exact_refit(model.draw_unit(SHAPE, 5))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from small import CLEAR, check_reveals, effect, recorded, seen
 
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.statistics.drift import EVEN, PARTS, lateness
+from spikecam_env.gap.statistics.drift import CONSTANCY, PARTS, lateness
 from spikecam_env.streams import pack_frames
 
 SHAPE, FRAMES = (16, 16), 8000
@@ -48,9 +48,9 @@ def test_in_the_dark_a_wave_hardly_passes_for_a_drift():
     times = np.arange(0, FRAMES, 40.0)
     slow = lateness(at(times + 8 * (times / FRAMES) ** 2))
     wave = lateness(at(times + 2 * np.sin(2 * np.pi * times / 1700)))
-    assert lateness(at(times))["late 0"] == pytest.approx(0.0, abs=0.2 * EVEN)
+    assert lateness(at(times))["late 0"] == pytest.approx(0.0, abs=0.2 * CONSTANCY)
     assert max(map(abs, wave.values())) < 0.2 * 2 * 2 * np.pi / 1700
-    assert slow["late 0"] < -2 * EVEN < 2 * EVEN < slow["late 7"]
+    assert slow["late 0"] < -2 * CONSTANCY < 2 * CONSTANCY < slow["late 7"]
 
 
 def test_few_intervals_tell_nothing():

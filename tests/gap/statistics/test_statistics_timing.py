@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import SHAPE, check_reveals, effect, null
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics.timing import statistics
 from spikecam_env.streams import pack_frames
@@ -33,7 +33,7 @@ def test_a_few_slow_pixels_of_uneven_intervals_are_no_later_together_than_alone(
         ends = rng.integers(0, mean) + np.cumsum(rng.integers(mean - by, mean + by + 1, 6000 // mean))
         spikes.reshape(6000, -1)[ends[ends < 6000], p] = 1
     seen_by = observe(pack_frames(spikes), SHAPE)
-    shown = Shown("flat", "flat", 0.03, None, 6000, "fit")
+    shown = Condition("flat", "flat", 0.03, None, 6000, "fit")
     late = statistics(SimpleNamespace(conditions=[shown], observations=[seen_by]), 0)["late"]
     slow = np.sort(seen_by.variance)[-21:].sum() / seen_by.variance.sum()
     print(f"{late:.3f}; slow pixels have {slow:.2f} of all variance")

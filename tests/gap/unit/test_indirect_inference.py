@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import MODEL, unit
 
-from spikecam_env.gap.unit.indirect_inference import FURTHEST, settled, shifted
+from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED, extrapolated_unit, inferred_unit
 
 
 def test_a_unit_is_settled_along_a_line_and_not_to_the_noise_of_each_pixel():
@@ -18,7 +18,7 @@ def test_a_unit_is_settled_along_a_line_and_not_to_the_noise_of_each_pixel():
     x = (base.gain - base.gain.min()) / np.ptp(base.gain)
     noise = 0.005 * np.random.default_rng(0).standard_normal(x.size)
     seen = replace(base, gain=base.gain * np.exp(-(0.01 + 0.02 * x) + noise))
-    ratio = np.log(settled(MODEL, base, base, [seen]).gain / base.gain)
+    ratio = np.log(inferred_unit(MODEL, base, base, [seen]).gain / base.gain)
     off = ratio - (0.01 + 0.02 * x)
     print(f"off by {np.abs(off).max():.2g} at most, noise {noise.std():.2g}")
     assert np.abs(off).max() < 4.5 * 4 * 0.005 / np.sqrt(x.size)
@@ -27,15 +27,15 @@ def test_a_unit_is_settled_along_a_line_and_not_to_the_noise_of_each_pixel():
 def test_a_unit_stays_where_an_effect_silences_its_twins():
     base = unit()
     silent = replace(base, gain=np.zeros_like(base.gain))
-    assert settled(MODEL, base, base, [silent]) is base
+    assert inferred_unit(MODEL, base, base, [silent]) is base
 
 
 @pytest.mark.parametrize("factor", [0.5, 3.0, 1e3, 1e6])
 def test_a_unit_is_shifted_in_proportion_but_never_out_of_the_world(factor):
     base = unit()
     there = replace(base, gain=1.01 * base.gain, dark=0.9 * base.dark, white=3.0 * base.white)
-    found = shifted(base, there, factor)
-    reach = min(factor, FURTHEST)
+    found = extrapolated_unit(base, there, factor)
+    reach = min(factor, MOST_EXTRAPOLATED)
     assert np.allclose(found.gain, base.gain * 1.01**reach) and found.white == pytest.approx(base.white * 3.0**reach)
     assert np.allclose(found.dark, np.maximum(base.dark * (1 - 0.1 * reach), 0.0))
 
@@ -46,5 +46,5 @@ def test_a_pixel_of_which_light_tells_nothing_keeps_its_gain(factor):
     base = unit()
     gain = 1.01 * base.gain
     gain[:2] = -1e-4 * base.gain[0], 0.0
-    found = shifted(base, replace(base, gain=gain), factor)
+    found = extrapolated_unit(base, replace(base, gain=gain), factor)
     assert np.array_equal(found.gain[:2], base.gain[:2]) and np.isfinite(found.gain).all()

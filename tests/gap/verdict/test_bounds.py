@@ -13,7 +13,7 @@ from spikecam_env.gap import Bars, Dark, Flat
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import expected_events
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.report.words import at_most, bounded_parameter
 from spikecam_env.gap.result import Bound
@@ -25,7 +25,7 @@ from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames
 
 SHAPE, FRAMES = (24, 24), 800
-CONDITIONS = planned((Dark(), *(Flat(radiance=x) for x in (0.1, 0.2, 0.4)), Bars(high=1.4)), SHAPE, FRAMES)
+CONDITIONS = planned_conditions((Dark(), *(Flat(radiance=x) for x in (0.1, 0.2, 0.4)), Bars(high=1.4)), SHAPE, FRAMES)
 COUNTED = ("spurious_spikes", "missed_spikes", "hot_pixels", "dead_pixels")
 
 
