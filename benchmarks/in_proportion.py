@@ -2,10 +2,10 @@
 
     python -m benchmarks.in_proportion [PRESET ...]      by default scsim and physical, whose noise is smaller
 
-Each effect as strong as its clearest statistic of recordings to fit is PEAK noises off, and FURTHEST times as strong,
-TWINS of the same draws each.  of the effect: correlation of what both do to all statistics.  worst: what the stronger,
-scaled down, has most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Those marked `mixed`
-are not scaled.
+Each effect as strong as its clearest statistic of recordings to fit is PEAK noises off, and MOST_EXTRAPOLATED times as
+strong, TWINS of the same draws each.  of the effect: correlation of what both do to all statistics.  worst: what the
+stronger, scaled down, has most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Those
+marked `mixed` are not scaled.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 Of many twins of the standard design twelve are drawn at a time, and one more to be measured.  By group, how far the
 logarithm of a standard deviation (with its floor) is off that of all; how often Holm's smallest p-value is below
-ALARM, which should be as often as ALARM says; and the share of statistics on which SHIFT noises would be seen.
+ALARM_LEVEL, which should be as often as that says; and the share of statistics on which SHIFT noises would be seen.
 """
 
 from __future__ import annotations

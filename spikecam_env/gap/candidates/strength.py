@@ -12,8 +12,8 @@ from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import build
 
 AS_LOUD = 60.0
-"""Noises that a weak effect is simulated to show at best, FURTHEST times as strong at most.  Scaled down, what twins
-scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
+"""Noises that a weak effect is simulated to show at best, MOST_EXTRAPOLATED times as strong at most.  Scaled down, what
+twins scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
 
 
 def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:

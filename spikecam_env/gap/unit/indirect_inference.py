@@ -23,10 +23,12 @@ refits of twins do not identify it (`fit.joint` does, by all statistics)."""
 
 CONVERGED = 3e-4
 """Relative change of a unit's median gain up to which it need not be simulated again.  Beyond, a unit so much brighter
-has other statistics where pixels saturate."""
+has other statistics where pixels saturate.  A thirtieth of what four kicks of 0.0025 of crosstalk add to a rate
+(`tests/gap/fit/test_candidate.py`)."""
 
 MOST_EXTRAPOLATED = 4.0
-"""Times as far as it was inferred that a unit is extrapolated at once for a stronger effect."""
+"""Times as far as it was inferred that a unit is extrapolated at once for a stronger effect: statistics are
+in proportion so far (`python -m benchmarks.in_proportion`)."""
 
 
 def inferred_unit(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:

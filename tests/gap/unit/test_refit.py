@@ -61,7 +61,7 @@ def test_jitter_is_found_without_being_told_its_parts(kappa_mV, electrons):
 
 
 def test_a_few_false_spikes_are_no_jitter(monkeypatch):
-    """Two in a recording of a thousand pixels: s^2 to 3.2 % as without them, as long as irregular pixels are left out."""
+    """Two in a recording of a thousand pixels: s^2 to 3.2 % as without them, while irregular pixels are left out."""
     model = MODEL.with_effect(effect("spurious_spikes", probability=1e-6))
     case, without = recorded(model=model), recorded().base.white
     print(f"s^2 {case.base.white:.3e}, without {without:.3e}: {case.base.white / without - 1:+.2%}")
