@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from small import CLEAR, check_reveals, effect, recorded, seen
@@ -64,3 +66,31 @@ def test_what_all_pixels_do_is_no_variance_within_a_pixel():
         print(f"{flat}: trend {trend:.0f}, pixels {pixels:.1f}")
         assert abs(trend) > 2 * CLEAR
         assert abs(pixels) < CLEAR
+
+
+def dark(late: np.ndarray, timed: int) -> SimpleNamespace:
+    """A dark recording of 6400 frames, mean interval 1, with `timed` intervals in each of its 64 pieces, in each of
+    which they are longer by `late` (64,) on average."""
+    frames = np.zeros(6400)
+    frames[::100] = 1.0
+    return SimpleNamespace(
+        frames=6400,
+        shape=(1, 1),
+        frame=np.ones(6400, np.int32),
+        late=np.repeat(late * timed, 100) * frames,
+        timed=(timed * frames).astype(np.int32),
+    )
+
+
+@pytest.mark.parametrize("timed, stated", [(8, False), (19, True)])
+def test_a_part_of_a_hundred_intervals_has_a_mean(timed, stated):
+    """Eight pieces make a part."""
+    assert len(lateness(dark(np.zeros(64), timed))) == (PARTS if stated else 0)
+
+
+@pytest.mark.parametrize("error", [0.5e-4, 2e-4, 8e-4])
+def test_lateness_is_in_units_of_its_standard_error_where_that_is_above_two_in_ten_thousand(error):
+    """Pieces scatter by +- s about their part, whose mean then has the standard error s / sqrt(8)."""
+    pieces = 1e-3 + error * np.sqrt(8) * np.tile([1.0, -1.0], 32)
+    found = lateness(dark(pieces, 20))["late 3"]
+    assert found == pytest.approx(1e-3 / np.sqrt(1.0 + (error / 2e-4) ** 2), rel=1e-6)
