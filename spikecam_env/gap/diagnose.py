@@ -22,8 +22,9 @@ from tqdm import tqdm
 from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.baseline.alarm import is_discrepant
+from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
-from spikecam_env.gap.baseline.label_audit import Contradiction, audit, upheld
+from spikecam_env.gap.baseline.label_audit import audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
 from spikecam_env.gap.baseline.null_model import model_null, unit_under
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal

@@ -36,7 +36,7 @@ def write_campaign(
     """Record unit `seed` of a model into a campaign (format spikecam-campaign/1) and read it back.
 
     model: a SensorModel, with any effects; a preset's name or a TOML path.  frames: length of recordings that do not
-    state their own.  recordings: default `standard_design()`.
+    say their own.  recordings: default `standard_design()`.
     Same arguments, same bytes; a run that was stopped goes on where it was.
     Errors: InputError as `record_takes`, and for light that a recording cannot have.
     """

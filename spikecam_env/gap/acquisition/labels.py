@@ -32,7 +32,7 @@ _COLUMNS = ("file", "radiance", "name", "use", "v_d", "temperature_k", "note", *
 
 @dataclass(frozen=True)
 class Label:
-    """One file of a real camera with its light and settings.
+    """One file of a real camera and what is known of it.
 
     file: in the folder.  radiance: a number, or text as above.  name: default the file's.  use: fit or holdout.
     v_d: V_D - V_ref [V].  temperature_k: [K].  reading: options of `read_recording` for this file.

@@ -57,7 +57,7 @@ def import_campaign(
 ) -> Campaign:
     """Make a campaign (format spikecam-campaign/1) of labelled files in `folder`; `out` appears whole.
 
-    frame_rate_hz: of the camera; None where every file states it.  rows, columns: first and stop of the part to keep.
+    frame_rate_hz: of the camera; None where every file says it.  rows, columns: first and stop of the part to keep.
     holdout_share: this share of each stream of use fit, its end, becomes a recording of use holdout.
     outside: read files that lie outside of `folder` too, by `..`, from the root, or over symbolic links.
     reading: options of `read_recording` for all files they apply to; a label's own come first.

@@ -34,7 +34,7 @@ SLOWEST = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Planned:
-    """A recording to be made: the settings that all kinds have.
+    """What all recordings have.
 
     name: of its files; empty: made from the kind and its level.  use: fit, or holdout for judging.
     v_d: V_D - V_ref [V], None is the model's own.  frames: length, None is the campaign's.

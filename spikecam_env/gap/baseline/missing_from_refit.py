@@ -27,7 +27,7 @@ COMPARABLE_ERROR = 2.0
 two in the dark some have a rate there, and others thirty times the error."""
 
 LEAST_JITTER = 1e-7
-"""s^2 above which there is noise at all: that of a pixel of 10 million electrons."""
+"""s^2 above which a refit has noise at all: that of a pixel of 10 million electrons."""
 
 NOISELESS_TWINS, NOISE_EXCESS = 4, 5.0
 """Twins without noise, whose refits show the s^2 of equal pixels that beat with the read-out's clock; and the number of

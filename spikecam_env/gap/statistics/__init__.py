@@ -1,4 +1,4 @@
-"""The statistics bank: statistics in named groups, one file a group; each says which effects it reveals."""
+"""The statistics bank: statistics in named groups, one file a group; each names the effects that it reveals."""
 
 from __future__ import annotations
 

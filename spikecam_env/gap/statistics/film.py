@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import BIN
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes
 
 Pictures = NDArray[np.float32]
@@ -27,7 +28,7 @@ FEATURES = ("level", "square", "delay", "skew", "lag 16", "lag 64", "lag 256", "
 class Film:
     """light: (bins, P) collected in each bin at gain 1.  basis: (n, bins P) its orthonormal features.
 
-    size: (n,) of each feature before it was scaled, 0 where those before it say the same.
+    size: (n,) of each feature before it was scaled, 0 where those before it span it.
     """
 
     light: Pictures
@@ -64,6 +65,13 @@ def light_film(light: Keyframes, frames: int) -> Pictures:
         for k, weight in weights.items():
             out[b] += np.float32(weight) * keys[k]
     return out
+
+
+def refitted_film(condition: Condition, base: BaseFit) -> NDArray[np.float64]:
+    """(F // BIN, P) spikes that a refitted unit gives in moving light, at most one a frame."""
+    assert condition.light is not None
+    light = light_film(condition.light, condition.frames).astype(np.float64)
+    return np.minimum(light * base.gain + BIN * base.dark, BIN)
 
 
 def film_features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray[np.float64]]:

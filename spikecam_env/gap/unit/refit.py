@@ -145,7 +145,7 @@ def common_level(values: Array, errors: Array) -> float:
 
 
 def unit_from_refit(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
-    """The unit to simulate: N as the model says and the rest of s^2 as reset noise; less is all shot noise.
+    """The unit to simulate: N of the model, and the rest of s^2 as reset noise; an s^2 below 1/N is all shot noise.
 
     Both follow a pixel's swing, as its response lets expect it: N = N0 swing, kappa = sigma / swing.
     """

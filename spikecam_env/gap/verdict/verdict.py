@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.label_audit import Contradiction
+from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.baseline.off_nominal import OffNominal, with_strengths
 from spikecam_env.gap.candidates.table import candidate

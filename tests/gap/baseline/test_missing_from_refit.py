@@ -100,7 +100,7 @@ def test_dark_levels_that_differ_by_their_errors_alone_are_no_spread():
 
 
 def test_dark_levels_that_are_not_known_alike_are_no_spread():
-    """Of alike pixels that fire once or twice in the dark, two fifths have no rate there: thirty times the error."""
+    """Of equal pixels that fire once or twice in the dark, two fifths have no rate there: thirty times the error."""
     case, rng = recorded(model=IDEAL.with_effect(effect("dark_current", mean_pA=0.1))), np.random.default_rng(0)
     sd = np.where(np.arange(PIXELS) % 5 < 2, 6e-7, 2e-8)
     base = replace(case.base, dark=2e-4 + sd * rng.standard_normal(PIXELS), dark_sd=sd)
@@ -121,7 +121,7 @@ def test_what_one_voltage_cannot_tell_apart_is_said():
 
 @pytest.mark.parametrize("quanta", [np.inf, 2e6])
 def test_noise_that_twins_without_it_seem_to_have_is_not_missing(quanta):
-    """Alike pixels at rates where they beat with the read-out's clock as if they had 3.5 million electrons' noise."""
+    """Equal pixels at rates where they beat with the read-out's clock as if they had 3.5 million electrons' noise."""
     camera = IDEAL if np.isinf(quanta) else IDEAL.with_effect(effect("shot_noise", quanta=quanta))
     flats = (0.008892, 0.026286, 0.07269, 0.16783, 0.34862, 0.54416)
     shown = planned_conditions((Dark(), *(Flat(radiance=radiance) for radiance in flats)), SHAPE, 8000)

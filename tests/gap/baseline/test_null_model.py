@@ -1,4 +1,4 @@
-"""What a model predicts: how many campaigns tell each statistic, and what noise of one recording alone is worth."""
+"""The null model: how many twins each statistic is learnt from, and the freedom of its noise."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def base_of(*effects):
     ids=lambda e: e.name,
 )
 def test_a_strength_that_is_off_is_measured_in_its_own_unit(other):
-    """Noise that is more than shot noise is told as reset noise: one V_d cannot tell."""
+    """Noise beyond shot noise is stated as reset noise: at one V_d the two are the same."""
     off = off_nominal(recorded(), MODEL, base_of(other)).parameters
     print(off)
     name = "reset_noise" if other.name == "shot_noise" else other.name

@@ -99,7 +99,7 @@ def test_screening_starts_near_the_truth_weak_or_severe(hidden):
 
 
 def test_the_template_of_crosstalk_is_of_its_neighbours_and_not_of_a_unit_too_bright():
-    """What bends rates makes bars that saturate brighter, until the unit has settled: 46 noises, beside 14."""
+    """A bend of the rates makes bars that saturate brighter, until the unit is inferred anew: 46 noises, beside 14."""
     templates = shipped_templates()
     [shift] = [e.shift for e in templates.weakest if e.name == "crosstalk"]
     peak = {
