@@ -43,6 +43,9 @@ missing or too many, and light of another level makes no irregular interval."""
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
 
+OUTSTANDING = 4.0
+"""Times the distance of all others from their line that one recording has to be off it."""
+
 RELABEL_TWINS = 6
 """Twins that a recording is compared with under another label."""
 
@@ -115,33 +118,45 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
     names, light, rate = _steady_levels(case, suspect)
     if len(names) < 5:
         return []
-    before = _bend(light, rate)[0]
     best: tuple[float, int] = (np.inf, 0)
     for i in range(len(names)):
         keep = np.arange(len(names)) != i
         best = min(best, (_bend(light[keep], rate[keep])[0], i))
     left, i = best
+    if left > MENDED * _bend(light, rate)[0]:
+        return []
     keep = np.arange(len(names)) != i
     slope, dark = np.polyfit(light[keep], rate[keep], 1, w=1.0 / np.maximum(rate[keep], 1e-6))
-    off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0) if light[i] > 0 else np.inf
-    if left > MENDED * before or abs(off) < max(LEAST_LABEL, 4 * left):
-        return []
-    if light[i] > 0 and (
-        pixel_spread(case, names[i], names) > PIXEL_SPREAD * abs(off)
-        or irregular_share(case, names[i]) > IRREGULAR * abs(off)
-    ):
-        return []
     if light[i] == 0:
-        off = float(rate[i] / max(dark, 1e-9) - 1)
-        if off < LEAST_DARK or rate[i] - dark < 4 * left * rate[keep].min():  # none is darker than dark
-            return []
-        text = f"{names[i]}: labelled dark, but {100 * off:+.2g} % off what the flats extrapolate to"
-    else:
-        text = (
-            f"{names[i]}: its rate is that of {100 * off:+.2g} % more light than its label says; all others agree to "
-        )
-        text += f"{100 * left:.1g} %"
-    return [Contradiction("label", (names[i],), text, 1.0 + off if light[i] > 0 else 1.0)]
+        return _wrong_dark(names[i], rate[i], dark, left, rate[keep].min())
+    off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0)
+    return _wrong_flat(case, names[i], names, off, left)
+
+
+def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: float) -> list[Contradiction]:
+    """A flat whose rate is `off` the line of the others, relative; left: how far these are off it at most."""
+    if abs(off) < max(LEAST_LABEL, OUTSTANDING * left):
+        return []
+    differs = pixel_spread(case, name, names) > PIXEL_SPREAD * abs(off)
+    if differs or irregular_share(case, name) > IRREGULAR * abs(off):
+        return []
+    text = (
+        f"{name}: its rate is that of {100 * off:+.2g} % more light than its label says; all others agree to "
+        f"{100 * left:.1g} %"
+    )
+    return [Contradiction("label", (name,), text, 1.0 + off)]
+
+
+def _wrong_dark(name: str, rate: float, dark: float, left: float, lowest: float) -> list[Contradiction]:
+    """A recording labelled dark whose rate is above `dark`, the extrapolation of the others; none is darker than dark.
+
+    left: how far the others are off their line at most, relative; lowest: their lowest rate.
+    """
+    off = float(rate / max(dark, 1e-9) - 1)
+    if off < LEAST_DARK or rate - dark < OUTSTANDING * left * lowest:
+        return []
+    text = f"{name}: labelled dark, but {100 * off:+.2g} % off what the flats extrapolate to"
+    return [Contradiction("label", (name,), text)]
 
 
 def upheld(case: Case, model: SensorModel, found: Sequence[Contradiction]) -> list[Contradiction]:

@@ -6,10 +6,12 @@ the effect is missing, and the refit's value is its parameter; nothing has to be
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.gap.twins.case import Case, rests_on, twins
 from spikecam_env.gap.twins.fresh_units import width
@@ -21,6 +23,9 @@ from spikecam_env.sensor.effects.base import build
 
 LEAST_WIDTH = 5e-4
 """Relative spread of pixels' gain beyond the refit's own error."""
+
+LEAST_DARK_ERRORS = 5.0
+"""Errors of the mean dark level of all pixels, over the root of 2, above which there is a dark current."""
 
 COMPARABLE_ERROR = 2.0
 """Times the median error of a dark level up to which a pixel counts for their spread: of equal pixels with a spike or
@@ -45,33 +50,62 @@ class Missing:
 
 def missing_effects(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missing]:
     """Effects that the refit shows and the model lacks, of the candidates in `names`; in the order of the pixel."""
-    has = {e.name for e in model.effects}
+    found = [_built(one) for one in (*_response(case, model), *_dark(case, model)) if one.name in names]
+    return found + [_built(one) for one in _noise(case, with_missing(model, found)) if one.name in names]
+
+
+class _Size(NamedTuple):
+    """A strength that the refit shows, its standard deviation, and names of effects that are the same at one V_d."""
+
+    name: str
+    value: float
+    sd: float
+    also: tuple[str, ...] = ()
+
+
+def _built(one: _Size) -> Missing:
+    return Missing(build(CATALOGUE, one.name, {CATALOGUE[one.name].strength: one.value}), one.sd, one.also)
+
+
+def _response(case: Case, model: SensorModel) -> Iterator[_Size]:
+    """The spread of pixels' gain, where the model has none."""
     live = case.base.live
-    gain, dark, white = case.base.gain[live], case.base.dark[live], case.base.white
-    known = case.base.dark_sd[live] <= COMPARABLE_ERROR * np.median(case.base.dark_sd[live])
-    count = float(np.sqrt(2 * live.sum()))
+    spread = width(case.base.gain[live])
+    if not _has(model, RESPONSE) and spread > LEAST_WIDTH:
+        sd = spread / _root_of_twice(live)
+        yield _Size("conversion_gain_spread", spread, sd, ("bias_voltage_spread", "capacitor_spread"))
+
+
+def _dark(case: Case, model: SensorModel) -> Iterator[_Size]:
+    """The dark level of all pixels, and its spread, where the model has none."""
+    live = case.base.live
+    gain, dark, sd = case.base.gain[live], case.base.dark[live], case.base.dark_sd[live]
+    count = _root_of_twice(live)
     to_pA = model.circuit.capacitance_fF * model.circuit.swing_V * model.frame_rate_hz * 1e-3
-    found: list[Missing] = []
-
-    def add(name: str, value: float, sd: float, also: tuple[str, ...] = ()) -> None:
-        if name in names:
-            effect = build(CATALOGUE, name, {CATALOGUE[name].strength: value})
-            found.append(Missing(effect, sd, also))
-
-    spread = width(gain)
-    if not has & set(RESPONSE) and spread > LEAST_WIDTH:
-        add("conversion_gain_spread", spread, spread / count, ("bias_voltage_spread", "capacitor_spread"))
-    level = common_level(dark, case.base.dark_sd[live])
-    error = float(np.median(case.base.dark_sd[live]))
-    if not has & set(DARK) and level > 5 * error / count and fires_in_the_dark(case, level):
-        add("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
-    if not has & set(DARK_PATTERN) and level > 0:
+    level, error = common_level(dark, sd), float(np.median(sd))
+    if not _has(model, DARK) and level > LEAST_DARK_ERRORS * error / count and fires_in_the_dark(case, level):
+        yield _Size("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
+    if not _has(model, DARK_PATTERN) and level > 0:
+        known = sd <= COMPARABLE_ERROR * np.median(sd)
         own = float(np.sqrt(max(scatter(dark[known]) ** 2 - (level * width(gain)) ** 2 - error**2, 0.0)))
         if own > error:
-            add("dark_current_spread", own * to_pA, own * to_pA / count)
-    if not has & set(NOISE) and white > LEAST_JITTER and is_noise(case, with_missing(model, found)):
-        add("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
-    return found
+            yield _Size("dark_current_spread", own * to_pA, own * to_pA / count)
+
+
+def _noise(case: Case, model: SensorModel) -> Iterator[_Size]:
+    """The noise of a spike, where the model has none."""
+    white = case.base.white
+    if not _has(model, NOISE) and white > LEAST_JITTER and is_noise(case, model):
+        yield _Size("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
+
+
+def _has(model: SensorModel, names: Sequence[str]) -> bool:
+    return any(e.name in names for e in model.effects)
+
+
+def _root_of_twice(live: NDArray[np.bool_]) -> float:
+    """By which the standard deviation of a spread over pixels is smaller than the spread."""
+    return float(np.sqrt(2 * live.sum()))
 
 
 def with_missing(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
