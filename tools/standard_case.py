@@ -11,7 +11,7 @@ from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import simulate
-from spikecam_env.gap.unit.refit import exact_refit
+from spikecam_env.gap.unit.conversion import exact_refit
 from spikecam_env.sensor import SensorModel
 
 SHAPE, FRAMES, SEED = (64, 64), 8000, 20

@@ -19,7 +19,8 @@ from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import expose
-from spikecam_env.gap.unit.refit import BaseFit, exact_refit, unit_from_refit
+from spikecam_env.gap.unit.conversion import exact_refit, unit_from_refit
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 from spikecam_env.streams import pack_frames, unpack_frames
 

@@ -25,8 +25,9 @@ from spikecam_env.gap.fit.candidate import (
 )
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import drawn
+from spikecam_env.gap.unit.conversion import LINES
 from spikecam_env.gap.unit.indirect_inference import IDENTIFIABLE, extrapolated_unit
-from spikecam_env.gap.unit.refit import LINES, BaseFit, constrained_refit
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import LABEL_ERROR, Condition
 from spikecam_env.gap.observe.observation import Observation, observe
-from spikecam_env.gap.unit.refit import BaseFit, unit_from_refit
+from spikecam_env.gap.unit.conversion import unit_from_refit
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.streams import pack_frames

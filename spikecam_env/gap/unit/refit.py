@@ -16,20 +16,25 @@ from spikecam_env.calibration.jitter import fit_jitter
 from spikecam_env.calibration.response import fit_lines, rates_from_times, together
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import DIFFERENCES, Observation
-from spikecam_env.gap.unit.traps import less_traps
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.unit import PixelArray, Unit, firing_law
 
 Array = NDArray[np.float64]
 
 RESPONSE = ("conversion_gain_spread", "bias_voltage_spread", "capacitor_spread", "vignetting", "row_fixed_pattern",
             "column_fixed_pattern", "dead_pixels")  # fmt: skip
+"""Effects that make pixels' gain differ."""
+
 DARK = ("dark_current", "dark_current_spread", "dark_current_tail", "hot_pixels")
+"""Effects that have a dark level."""
+
 DARK_PATTERN = (*DARK[1:], *RESPONSE)
+"""Effects that make pixels' dark level differ."""
+
 NOISE = ("shot_noise", "reset_noise", "excess_threshold_noise")
-LINES = {"row_fixed_pattern": 1, "column_fixed_pattern": 0}
-"""Offsets of the swing by row and column, and the axis along which they are the same: they change how noisy pixels are,
-too, and not the pattern alone."""
+"""Effects of white noise, s^2 a spike."""
+
+UNSEEN_JITTER = 3e-5
+"""s^2 of a unit whose recordings do not show it: that of 33 000 electrons a spike."""
 
 NOISY = 3.0
 """Times the median relative A_16 from which a pixel is left out of the jitter."""
@@ -97,14 +102,14 @@ def _of_scenes(observations: list[Observation]) -> BaseFit:
 
 
 def pooled_jitter(observations: list[Observation]) -> float:
-    """s^2 pooled over static recordings; 3e-5 where nothing can be seen."""
+    """s^2 pooled over steady recordings; UNSEEN_JITTER where they have too few second differences."""
     rate = np.stack(
         [np.where((o.times.count / o.frames > 0.9) | noisy_pixels(o), np.nan, o.times.rate) for o in observations]
     )
     square = np.stack([o.times.square for o in observations])
     terms = np.stack([o.times.terms for o in observations]).astype(np.float64)
     jitter = fit_jitter(np.array(DIFFERENCES), square, terms, rate)
-    return jitter.white if jitter else 3e-5
+    return jitter.white if jitter else UNSEEN_JITTER
 
 
 def noisy_pixels(o: Observation) -> NDArray[np.bool_]:
@@ -142,65 +147,3 @@ def common_level(values: Array, errors: Array) -> float:
     middle = np.median(values)
     equal = np.abs(values - middle) <= EQUAL_WITHIN * errors
     return float(values[equal].mean()) if equal.mean() > 0.5 else float(middle)
-
-
-def unit_from_refit(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
-    """The unit to simulate: N of the model, and the rest of s^2 as reset noise; an s^2 below 1/N is all shot noise.
-
-    Both follow a pixel's swing, as its response lets expect it: N = N0 swing, kappa = sigma / swing.
-    """
-    nominal = PixelArray.nominal(model.circuit, model.frame_rate_hz, shape)
-    names = {e.name: e for e in model.effects}
-    for name in NOISE:
-        if name in names:
-            nominal = names[name].imprint(nominal, np.random.default_rng(0))
-    law = firing_law(nominal)
-    shot = law.shot and base.white > 0
-    inverse = 1.0 / law.electrons[0] if shot else 0.0
-    if "reset_noise" not in names and "excess_threshold_noise" not in names:
-        inverse = base.white if shot else 0.0
-    inverse = min(inverse, base.white)
-    swing = _swings(model, base.gain, shape)
-    reset = max(base.white - inverse, 0.0)
-    more = np.mean(inverse / swing + reset / swing**2) / base.white if base.white > 0 else 1.0
-    electrons = swing * more / inverse if inverse > 0 else law.electrons
-    kappa = np.sqrt(reset / more) / swing
-    dark = less_traps(model, law, base.dark)
-    return replace(law, gain=base.gain, dark=dark, electrons=electrons, kappa=kappa,
-                   swing_V=law.swing_V * swing, shot=inverse > 0).limited()  # fmt: skip
-
-
-def exact_refit(unit: Unit) -> BaseFit:
-    """A drawn unit in the refit's terms: what a refit without error would find."""
-    white = float(np.mean((1 / unit.electrons if unit.shot else 0.0) + unit.kappa**2))
-    zero = np.zeros_like(unit.gain)
-    return BaseFit(unit.gain, unit.dark, zero, zero, white, np.zeros((0, unit.gain.size)), unit.gain > 0)
-
-
-def _swings(model: SensorModel, gain: Array, shape: tuple[int, int]) -> Array:
-    """(P,) swing of each pixel over nominal, as its response lets expect: of what makes pixels differ by the model, a
-    share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less.
-
-    What all pixels of a row or column share is its offset, where the model has such, and a matter of swing alone.
-    """
-    usual = float(np.median(gain))
-    if usual <= 0:
-        return np.ones_like(gain)
-    names = {e.name for e in model.effects}
-    own, lines = (gain / usual).reshape(shape), np.ones(shape)
-    for name, along in LINES.items():
-        if name in names:
-            line = np.median(own, axis=along, keepdims=True)
-            own, lines = own / np.maximum(line, 1e-9), lines * line
-    return np.asarray(np.clip(lines, 0.5, 2.0) ** -1 * np.clip(own, 0.5, 2.0) ** -_share_of_bias(model)).reshape(-1)
-
-
-def _share_of_bias(model: SensorModel) -> float:
-    """Share of bias in the variance of pixels' response, rows and columns apart."""
-    circuit, spreads = model.circuit, {e.name: e.parameters() for e in model.effects}
-    bias = spreads.get("bias_voltage_spread", {}).get("sigma_V", 0.0) / circuit.swing_V
-    others = np.hypot(
-        spreads.get("conversion_gain_spread", {}).get("sigma", 0.0),
-        spreads.get("capacitor_spread", {}).get("sigma_fF", 0.0) / circuit.capacitance_fF,
-    )
-    return float(bias**2 / (bias**2 + others**2)) if bias > 0 else 0.0

@@ -13,7 +13,7 @@ from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.result import Gap
 from spikecam_env.gap.twins.simulate import expose
-from spikecam_env.gap.unit.refit import unit_from_refit
+from spikecam_env.gap.unit.conversion import unit_from_refit
 from spikecam_env.gap.verdict.verdict import grounded
 from spikecam_env.streams import unpack_frames
 

@@ -14,7 +14,7 @@ from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.twins.case import case_of
 from spikecam_env.gap.twins.simulate import expose
-from spikecam_env.gap.unit.refit import unit_from_refit
+from spikecam_env.gap.unit.conversion import unit_from_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 NAMES = tuple(CATALOGUE)

@@ -7,7 +7,7 @@ from small import MODEL, effect, recorded
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
 from spikecam_env.gap.twins.fresh_units import width
-from spikecam_env.gap.unit.refit import exact_refit
+from spikecam_env.gap.unit.conversion import exact_refit
 
 SHAPE = (128, 128)
 

@@ -11,7 +11,7 @@ from small import MODEL, SHAPE, unit
 from spikecam_env.gap.observe.conditions import LABEL_ERROR, Condition
 from spikecam_env.gap.twins import simulate as twin
 from spikecam_env.gap.twins.simulate import FIRST, as_known, at_any_phase
-from spikecam_env.gap.unit.refit import unit_from_refit
+from spikecam_env.gap.unit.conversion import unit_from_refit
 from spikecam_env.sensor import Keyframes, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build

@@ -9,7 +9,8 @@ from small import MODEL, SHAPE, effect, recorded, unit
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.twins.fresh_units import drawn_banks
-from spikecam_env.gap.unit.refit import constrained_refit, unit_from_refit
+from spikecam_env.gap.unit.conversion import unit_from_refit
+from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.gap.unit.traps import drawn_traps, less_traps, trap_charge, trap_level
 from spikecam_env.sensor import SpikeSensor
 
