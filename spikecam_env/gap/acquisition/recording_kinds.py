@@ -76,7 +76,7 @@ class Dark(Planned):
     kind = "dark"
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
-        return _steady(np.zeros((1, 1)))
+        return _unchanging(np.zeros((1, 1)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +88,7 @@ class Flat(Planned):
     radiance: float
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
-        return _steady(np.full((1, 1), self.radiance))
+        return _unchanging(np.full((1, 1), self.radiance))
 
     def _default_name(self) -> str:
         return f"flat-{self.radiance:g}"
@@ -212,12 +212,12 @@ class MaskedRows(Planned):
         picture = np.full(shape, self.bright)
         masked = np.arange(shape[0]) // self.band % 2 == 1
         picture[masked, shape[1] // 2 :] = self.dark
-        return _steady(picture)
+        return _unchanging(picture)
 
 
 KINDS: dict[str, type[Planned]] = {kind.kind: kind for kind in (Dark, Flat, Step, Bars, Disk, MaskedRows)}
 """Kinds of recordings by name."""
 
 
-def _steady(picture: NDArray[np.float64]) -> Keyframes:
+def _unchanging(picture: NDArray[np.float64]) -> Keyframes:
     return Keyframes(np.zeros(1), picture[None].astype(np.float32))

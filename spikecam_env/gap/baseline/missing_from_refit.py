@@ -50,7 +50,7 @@ class Missing:
 
 def missing_effects(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missing]:
     """Effects that the refit shows and the model lacks, of the candidates in `names`; in the order of the pixel."""
-    found = [_built(one) for one in (*_response(case, model), *_dark(case, model)) if one.name in names]
+    found = [_built(one) for one in (*_response(case, model), *_dark_level(case, model)) if one.name in names]
     return found + [_built(one) for one in _noise(case, with_missing(model, found)) if one.name in names]
 
 
@@ -76,7 +76,7 @@ def _response(case: Case, model: SensorModel) -> Iterator[_Size]:
         yield _Size("conversion_gain_spread", spread, sd, ("bias_voltage_spread", "capacitor_spread"))
 
 
-def _dark(case: Case, model: SensorModel) -> Iterator[_Size]:
+def _dark_level(case: Case, model: SensorModel) -> Iterator[_Size]:
     """The dark level of all pixels, and its spread, where the model has none."""
     live = case.base.live
     gain, dark, sd = case.base.gain[live], case.base.dark[live], case.base.dark_sd[live]
