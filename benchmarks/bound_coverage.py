@@ -26,15 +26,15 @@ from tqdm import tqdm
 
 from spikecam_env.cli.table import table
 from spikecam_env.gap import Bars, Dark, Flat, Step
-from spikecam_env.gap.baseline.alarm import rings
+from spikecam_env.gap.baseline.alarm import is_discrepant
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.strength import bounded, may_be_negative, with_effect
 from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound
-from spikecam_env.gap.screen.templates import Templates, load
+from spikecam_env.gap.screen.templates import Templates, shipped_templates
 from spikecam_env.gap.search.forward import of_fit
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import at_any_phase
@@ -63,7 +63,7 @@ class Trial:
 
 def recorded(model: SensorModel, camera: int) -> Case:
     """A campaign of one camera, its waves at phases of their own."""
-    conditions = planned(DESIGN, SHAPE, FRAMES)
+    conditions = planned_conditions(DESIGN, SHAPE, FRAMES)
     seen = []
     for take, c in enumerate(conditions):
         sensor = SpikeSensor(at_any_phase(model, camera, take), SHAPE, seed=camera, take=take, threads=1)
@@ -84,7 +84,7 @@ def stated() -> list[Bound]:
     case = recorded(MODEL, CAMERA - 1)
     null, values = judged(case)
     names, _ = testable(chosen(MODEL, None, ()), case.conditions)
-    return bounds(case, MODEL, null, values, names, load())[0]
+    return bounds(case, MODEL, null, values, names, shipped_templates())[0]
 
 
 def trial(bound: Bound, number: int) -> Trial:
@@ -93,7 +93,7 @@ def trial(bound: Bound, number: int) -> Trial:
     hidden = bounded(bound.name, {**bound.at, bound.parameter: sign * bound.below})
     case = recorded(with_effect(MODEL, bound.name, hidden), CAMERA + number)
     null, values = judged(case)
-    alarm = rings(null, values) or rings(null, of_fit(case, null, values))
+    alarm = is_discrepant(null, values) or is_discrepant(null, of_fit(case, null, values))
     found, _ = bounds(case, MODEL, null, values, [bound.name], _of_shape(bound))
     return Trial(bound.name, number, found[0].below if found else None, alarm)
 
@@ -101,7 +101,7 @@ def trial(bound: Bound, number: int) -> Trial:
 def _of_shape(bound: Bound) -> Templates:
     """The templates, of the effect those of the bound's shape alone."""
 
-    shipped = load()
+    shipped = shipped_templates()
     alike = [
         e for e in shipped.weakest if e.name == bound.name and all(e.parameters[k] == v for k, v in bound.at.items())
     ]

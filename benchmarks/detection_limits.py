@@ -18,16 +18,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.campaign.design import standard_design
+from spikecam_env.gap.acquisition.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.fit.candidate import with_pattern
-from spikecam_env.gap.observe.conditions import planned
-from spikecam_env.gap.screen.templates import FRAMES, SHAPE, load, standard_case
+from spikecam_env.gap.observe.conditions import planned_conditions
+from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.unit.usual import USUAL_NOISE
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from tests.hidden_world.catalogue import CATALOGUE as HIDDEN
+from tools.standard_case import FRAMES, SHAPE, standard_case
 
 CLEAR = 6.0
 TABLE = Path(__file__).parents[1] / "tests/hidden_world/limits.toml"
@@ -36,7 +37,7 @@ TABLE = Path(__file__).parents[1] / "tests/hidden_world/limits.toml"
 def measured() -> dict[str, float]:
     """Strength by name; of an effect with several shapes the middle one."""
     by_name: dict[str, list[float]] = {}
-    templates = load()
+    templates = shipped_templates()
     told = heard(templates.keys)
     for entry in templates.weakest:
         power = 1.0 / candidate(entry.name).power
@@ -58,7 +59,7 @@ def of_a_reset() -> float:
 
 def heard(keys: Sequence[Key]) -> NDArray[np.bool_]:
     """(S,) which statistics are of recordings that the alarm hears and a fit may take."""
-    names = {c.name for c in planned(standard_design(), SHAPE, FRAMES) if c.use == "fit" or c.moves}
+    names = {c.name for c in planned_conditions(standard_design(), SHAPE, FRAMES) if c.use == "fit" or c.moves}
     return np.array([k.recording in names for k in keys])
 
 

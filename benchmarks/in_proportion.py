@@ -2,10 +2,10 @@
 
     python -m benchmarks.in_proportion [PRESET ...]      by default scsim and physical, whose noise is smaller
 
-Each effect as strong as its clearest statistic of recordings to fit is PEAK noises off, and FURTHEST times as strong,
-TWINS of the same draws each.  of the effect: correlation of what both do to all statistics.  worst: what the stronger,
-scaled down, has most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Those marked `mixed`
-are not scaled.
+Each effect as strong as its clearest statistic of recordings to fit is PEAK noises off, and MOST_EXTRAPOLATED times as
+strong, TWINS of the same draws each.  of the effect: correlation of what both do to all statistics.  worst: what the
+stronger, scaled down, has most wrong beyond TOLERANCE, in noises, with what it is and what it is taken for.  Those
+marked `mixed` are not scaled.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from spikecam_env.gap.candidates.strength import bounded, is_linear, with_effect
 from spikecam_env.gap.candidates.table import CANDIDATES, candidate, is_pattern
 from spikecam_env.gap.compare.prediction import TOLERANCE
 from spikecam_env.gap.fit.candidate import predict
-from spikecam_env.gap.screen.templates import load, standard_case
-from spikecam_env.gap.unit.indirect_inference import FURTHEST
-from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.screen.templates import shipped_templates
+from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
+from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
+from tools.standard_case import standard_case
 
 PEAK, TWINS = 15.0, 4
 
@@ -29,9 +30,9 @@ PEAK, TWINS = 15.0, 4
 def report(preset: str) -> None:
     """Print a line an effect."""
     case, model, null = standard_case(preset=preset)
-    templates = load()
+    templates = shipped_templates()
     told = [case.use(k.recording) == "fit" for k in templates.keys]
-    base = within(model, case.base)
+    base = constrained_refit(model, case.base)
     has = {e.name for e in model.effects}
     names = [n for n in CANDIDATES if candidate(n).power == 1.0 and not (candidate(n).wanders or is_pattern(n))]
     for name in sorted((n for n in names if n not in has), key=lambda n: not is_linear(n)):
@@ -42,9 +43,9 @@ def report(preset: str) -> None:
         key = CATALOGUE[name].strength
         one = entry.parameters[key] * PEAK / np.abs(entry.shift[told]).max()
         change = []
-        for strength in (one, FURTHEST * one):
+        for strength in (one, MOST_EXTRAPOLATED * one):
             there = with_effect(model, name, bounded(name, {**entry.parameters, key: strength}))
-            made = predict(case, there, within(there, base), null, TWINS)
+            made = predict(case, there, constrained_refit(there, base), null, TWINS)
             change.append((made.mean - null.mean) / null.noise * one / strength)
         weak, scaled = change
         wrong = np.maximum(np.abs(scaled - weak) - TOLERANCE * np.abs(weak), 0.0)

@@ -4,7 +4,7 @@
 
 Of many twins of the standard design twelve are drawn at a time, and one more to be measured.  By group, how far the
 logarithm of a standard deviation (with its floor) is off that of all; how often Holm's smallest p-value is below
-ALARM, which should be as often as ALARM says; and the share of statistics on which SHIFT noises would be seen.
+ALARM_LEVEL, which should be as often as that says; and the share of statistics on which SHIFT noises would be seen.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from tqdm import tqdm
 
-from spikecam_env.gap.baseline.alarm import ALARM
+from spikecam_env.gap.baseline.alarm import ALARM_LEVEL
 from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
 from spikecam_env.gap.compare.prediction import Null, null_of
-from spikecam_env.gap.screen.templates import standard_case
 from spikecam_env.gap.twins.case import twins
-from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.unit.refit import constrained_refit
+from tools.standard_case import standard_case
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def as_they_scatter(null: Null, values: Array) -> Null:
 
 if __name__ == "__main__":
     case, model = standard_case(count=2)[:2]
-    base = within(model, case.base)
+    base = constrained_refit(model, case.base)
     banks = [twins(case, model, base, [n])[0].bank for n in tqdm(range(TWINS), "twins", unit="twin")]
     whole = null_of(banks, list(case.bank))
     values = np.array([[bank[k] for k in whole.keys] for bank in banks])
@@ -49,7 +49,7 @@ if __name__ == "__main__":
         moderated = null_of([banks[i] for i in few], list(whole.keys))
         for how, null in (("scatter", as_they_scatter(moderated, values[few])), ("moderated", moderated)):
             off[how].append(np.log(null.noise / exact))
-            alarms[how] += adjusted(deviates(null, values[measured])).min() < ALARM
+            alarms[how] += adjusted(deviates(null, values[measured])).min() < ALARM_LEVEL
             p = 2.0 * ndtr(-np.abs(deviates(null, values[measured] + SHIFT * exact)))
             seen[how] += float(np.mean(p * p.size < GATE)) / DRAWS
     print(f"{'':>10s} {'scatter':>10s} {'moderated':>10s}")

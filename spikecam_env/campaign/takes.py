@@ -2,8 +2,9 @@
 
 Every take has its own starting phase and temporal noise; the unit, its fixed pattern, is the same in all.
 
-A folder holds `model.toml` and `simulation.json` from the start: what it is the recording of.  Recordings of the same
-settings that are there already are kept, so a run that was stopped goes on where it was; `campaign.json` comes last.
+A folder holds `model.toml` and `simulation.json` from the start: its model, and the plan of its recordings.
+Recordings of the same settings that are there already are kept, so a run that was stopped goes on where it was;
+`campaign.json` comes last.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ def record_takes(
     Same arguments, same bytes.  A folder that a stopped run left unfinished is completed; a finished campaign of the
     same settings is returned as it is.
     Errors: InputError for no takes, names that repeat or are no file names, an unknown use, light of another shape, a
-    v_d that leaves no threshold, and a folder that holds something else.
+    v_d that leaves no threshold, and a folder of other settings.
     """
     shape, seed = checked_shape(shape), checked_seed(seed)
     _check(takes, shape)
@@ -88,7 +89,7 @@ def record_takes(
             camera = cameras[take.v_d]
             save_light(target / f"{take.name}.npz", take.light)
             sensor = SpikeSensor(camera, shape, seed, engine, take=number)
-            save_spikes(stream, _stream(sensor, take, _same_light(model, camera), bar))
+            save_spikes(stream, _stream(sensor, take, _light_scale(model, camera), bar))
     entries = [_entry(take, model) for take in takes]
     return finish_campaign(target, shape, model.frame_rate_hz, entries)
 
@@ -113,7 +114,7 @@ def own_v_d(model: SensorModel) -> float:
     return model.circuit.reset_V - model.circuit.reference_V
 
 
-def shown(light: Keyframes, start: int, stop: int, shape: tuple[int, int], scale: float = 1.0) -> Keyframes:
+def light_during(light: Keyframes, start: int, stop: int, shape: tuple[int, int], scale: float = 1.0) -> Keyframes:
     """The keys that frames [start, stop) see, scaled and broadcast to (k, H, W); a cut changes no bit of a stream."""
     first = max(int(np.searchsorted(light.frame, start, side="right")) - 1, 0)
     last = max(int(np.searchsorted(light.frame, stop, side="left")), first)
@@ -125,7 +126,7 @@ def _stream(sensor: SpikeSensor, take: Take, scale: float, bar: tqdm) -> Iterato
     block = max(64, _BLOCK // (sensor.shape[0] * sensor.shape[1]) // 64 * 64)
     for start in range(0, take.frames, block):
         count = min(block, take.frames - start)
-        yield sensor.step(shown(take.light, start, start + count, sensor.shape, scale), count)
+        yield sensor.step(light_during(take.light, start, start + count, sensor.shape, scale), count)
         bar.update(count)
 
 
@@ -133,7 +134,7 @@ def _camera(model: SensorModel, v_d: float | None) -> SensorModel:
     return model if v_d is None or np.isclose(v_d, own_v_d(model), rtol=1e-9) else at_v_d(model, v_d)
 
 
-def _same_light(model: SensorModel, camera: SensorModel) -> float:
+def _light_scale(model: SensorModel, camera: SensorModel) -> float:
     """Radiance in the camera's unit of radiance 1 in the model's: a lower threshold is filled by less light."""
     return model.circuit.swing_V / camera.circuit.swing_V
 

@@ -62,12 +62,12 @@ def finish_campaign(
     data = {
         "format": FORMAT,
         "camera": {"height": shape[0], "width": shape[1], "frame_rate_hz": frame_rate_hz},
-        "recordings": [{key: value for key, value in entry.items() if _is_said(key, value)} for entry in entries],
+        "recordings": [{key: value for key, value in entry.items() if _is_stated(key, value)} for entry in entries],
     }
     write_text_whole(folder / "campaign.json", json.dumps(data, indent=1) + "\n")
     return read_campaign(folder)
 
 
-def _is_said(key: str, value: Any) -> bool:
-    """Whether an entry says something; radiance says so with null too: an unknown static scene."""
+def _is_stated(key: str, value: Any) -> bool:
+    """Whether an entry is written; a radiance of null is: an unknown static scene."""
     return key == "radiance" or (value is not None and value != "")

@@ -21,27 +21,28 @@ from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.errors import InputError
-from spikecam_env.gap.baseline.alarm import rings
+from spikecam_env.gap.baseline.alarm import is_discrepant
+from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
-from spikecam_env.gap.baseline.label_audit import Contradiction, audit, upheld
-from spikecam_env.gap.baseline.missing_from_refit import missing, with_all
+from spikecam_env.gap.baseline.label_audit import audit, upheld
+from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
 from spikecam_env.gap.baseline.null_model import model_null, unit_under
-from spikecam_env.gap.baseline.off_nominal import Off, off_nominal
+from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
 from spikecam_env.gap.candidates.table import chosen, is_pattern, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.maps import diagnose_maps
-from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
+from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
 from spikecam_env.gap.report.evidence import evidence_of
 from spikecam_env.gap.report.words import sentence, unfinished
 from spikecam_env.gap.result import Diagnosis
-from spikecam_env.gap.screen.own_templates import own_templates
-from spikecam_env.gap.screen.templates import Templates, load
+from spikecam_env.gap.screen.templates import Templates, shipped_templates
 from spikecam_env.gap.search.forward import Round, of_fit, search
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
-from spikecam_env.gap.unit.label_unit import counted_anew, nominal_per_label, said_of
-from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.unit.label_unit import in_nominal_units, label_unit_note, nominal_per_label
+from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.gap.verdict.verdict import concluded, grounded, harmless
 from spikecam_env.sensor import SensorModel
@@ -93,26 +94,28 @@ def diagnose(
         return replace(found, sentence=sentence(found))
     with timed("read"):
         case = read_case(measured, seed, jobs)
-        notes = said_of(case.nominal_per_label, case.base)
+        notes = label_unit_note(case.nominal_per_label, case.base)
     with timed("audit"):
         contradictions = upheld(case, assumed, audit(case))
         case = trimmed(case, contradictions)
         case = replace(case, effort=Effort(effort * len(case.conditions), settled=bool(contradictions)))
     names, untestable = testable(names, case.conditions)
-    lacking = missing(case, assumed, names)
-    start = with_all(assumed, lacking)
-    off = Off({}, case.base) if lacking else off_nominal(case, assumed, case.base)
+    lacking = missing_effects(case, assumed, names)
+    start = with_missing(assumed, lacking)
+    off = OffNominal({}, case.base) if lacking else off_nominal(case, assumed, case.base)
     with timed("twins"):
         null = model_null(case, start, twin_count)
         as_given = lacking or off.parameters
         before = model_null(replace(case, base=off.nominal), assumed, 2) if as_given else null
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
-    if rings(null, of_fit(case, null, values)) or rings(null, values):
+    if is_discrepant(null, of_fit(case, null, values)) or is_discrepant(null, values):
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
-            rounds = harmless(case, null, values, search(case, start, null, values, names, templates or load()))
+            rounds = harmless(
+                case, null, values, search(case, start, null, values, names, templates or shipped_templates())
+            )
     if rounds and not lacking:
         off = replace(
             off, parameters=off_nominal(case, patterned(assumed, rounds[-1].model), rounds[-1].base).parameters
@@ -122,15 +125,15 @@ def diagnose(
             case, start, null, in_order(before, null), values, lacking, off, rounds, contradictions, untestable
         )
     with timed("evidence"):
-        base = within(assumed, off.nominal)
+        base = constrained_refit(assumed, off.nominal)
         after = rounds[-1].model if rounds else start
-        unit = rounds[-1].base if rounds else within(start, case.base)
+        unit = rounds[-1].base if rounds else constrained_refit(start, case.base)
         changed = after is not assumed or off.parameters
         evidence = evidence_of(case, assumed, base, *((after, unit) if changed else ()))
     if found.verdict in ("none", "parameter"):
         with timed("bounds"):
             settled = replace(case, base=unit_under(case, start)) if case.scenes_only else case
-            below, open_ = bounds(settled, start, null, values, names, templates or load())
+            below, open_ = bounds(settled, start, null, values, names, templates or shipped_templates())
         found = replace(found, bounds=tuple(below), not_bounded=tuple(open_))
     found = replace(
         found,
@@ -146,7 +149,7 @@ def diagnose(
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
     """Observe and refit a campaign; recordings at another V_d than most, and rates only, are left to SNEE."""
-    conditions = [shown(r) for r in campaign.recordings]
+    conditions = [condition_of(r) for r in campaign.recordings]
     kept = [i for i, (r, c) in enumerate(zip(campaign.recordings, conditions, strict=True)) if r.spikes]
     voltages = [conditions[i].v_d for i in kept]
     common = max(set(voltages), key=voltages.count) if voltages else None
@@ -158,7 +161,7 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
             f"{campaign.folder} has fewer than two static recordings of known light to refit the unit by (two of use "
             "fit are needed, or unknown static scenes and nothing else)"
         )
-    seen = [o for o in observed(part, conditions) if o is not None]
+    seen = [o for o in observe_all(part, conditions) if o is not None]
     conditions = [
         replace(c, level=float(o.rate.mean())) if c.kind == "unknown" else c
         for c, o in zip(conditions, seen, strict=True)
@@ -167,14 +170,14 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
     factor = nominal_per_label(case.base)
     if factor == 1.0:
         return case
-    case = case.of([counted_anew(c, factor) for c in conditions], seen)
+    case = case.of([in_nominal_units(c, factor) for c in conditions], seen)
     return replace(case, nominal_per_label=factor)
 
 
-def refittable(conditions: Sequence[Shown]) -> bool:
+def refittable(conditions: Sequence[Condition]) -> bool:
     """Whether there are two recordings to refit the unit by, or nothing but scenes."""
     scenes = bool(conditions) and all(c.kind == "unknown" for c in conditions)
-    return scenes or sum(c.kind in KNOWN and c.use == "fit" for c in conditions) >= 2
+    return scenes or sum(c.kind in STEADY_KNOWN and c.use == "fit" for c in conditions) >= 2
 
 
 def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:

@@ -20,15 +20,15 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
-from spikecam_env.gap.baseline.alarm import rings
-from spikecam_env.gap.baseline.missing_from_refit import Missing, missing, with_all
+from spikecam_env.gap.baseline.alarm import is_discrepant
+from spikecam_env.gap.baseline.missing_from_refit import Missing, missing_effects, with_missing
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import in_order, read_case
 from spikecam_env.gap.report import plots
-from spikecam_env.gap.screen.templates import load
+from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.search.forward import of_fit, search
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.workers import sums_in_one_order
@@ -110,8 +110,8 @@ def ladder(
     first = model if isinstance(model, SensorModel) else SensorModel.load(model)
     case = read_case(measured, seed, jobs)
     names, _ = testable(chosen(first, None, ()), case.conditions)
-    lacking = missing(case, first, names)
-    full = with_all(first, lacking)
+    lacking = missing_effects(case, first, names)
+    full = with_missing(first, lacking)
     null = model_null(case, full, twin_count)
     values = values_of(case.bank, null.keys)
 
@@ -131,8 +131,8 @@ def ladder(
         rungs.append(tried[best])
         left.pop(best)
     bar.close()
-    if rings(null, of_fit(case, null, values)):
-        rounds = search(case, full, null, values, names, load())
+    if is_discrepant(null, of_fit(case, null, values)):
+        rounds = search(case, full, null, values, names, shipped_templates())
         for was, now in itertools.pairwise(rounds):
             if now.model is not was.model:
                 fit = was.fits[0]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.gap.unit.refit import BaseFit
@@ -125,7 +125,7 @@ class Evidence:
     to expect, where twins have the measured one.
     """
 
-    conditions: tuple[Shown, ...]
+    conditions: tuple[Condition, ...]
     measured: tuple[Observation, ...]
     before: tuple[Observation, ...]
     after: tuple[Observation, ...] | None

@@ -7,11 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.twins.fresh_units import drawn
-from spikecam_env.gap.unit.refit import measured_base
+from spikecam_env.gap.unit.refit import free_refit
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 
@@ -26,30 +26,31 @@ EFFECTS = {
 }
 
 
-def conditions() -> tuple[Shown, ...]:
+def conditions() -> tuple[Condition, ...]:
     """Dark, four flats, a step and moving bars to fit; a flat and bars of another speed held out."""
     uniform = [("dark", 0.0, "fit"), ("flat-050", 0.05, "fit"), ("flat-120", 0.12, "fit"), ("flat-300", 0.3, "fit"),
                ("flat-600", 0.6, "fit"), ("flat-200", 0.2, "holdout")]  # fmt: skip
     flats = [
-        Shown(name, "flat" if level else "dark", level, Keyframes(np.zeros(1), np.full((1, *SHAPE), level, np.float32)),
+        Condition(name, "flat" if level else "dark", level,
+                  Keyframes(np.zeros(1), np.full((1, *SHAPE), level, np.float32)),
               FRAMES, use)
         for name, level, use in uniform
     ]  # fmt: skip
     return (*flats, _step(), _bars("bars", 0.02, "fit"), _bars("bars-fast", 0.05, "holdout"))
 
 
-def _step() -> Shown:
+def _step() -> Condition:
     frame = np.array([0.0, 499.0, 500.0, 999.0, 1000.0])
     level = np.array([0.1, 0.1, 0.4, 0.4, 0.1], np.float32)
     light = Keyframes(frame, np.broadcast_to(level[:, None, None], (5, *SHAPE)))
-    return Shown("step", "step", float(level.mean()), light, FRAMES, "fit")
+    return Condition("step", "step", float(level.mean()), light, FRAMES, "fit")
 
 
-def _bars(name: str, speed: float, use: str) -> Shown:
+def _bars(name: str, speed: float, use: str) -> Condition:
     frame = np.arange(0.0, FRAMES, 20.0)
     where = np.arange(SHAPE[1])[None, None, :] - speed * frame[:, None, None]
     light = np.broadcast_to(0.2 + 0.15 * np.tanh(3 * np.sin(2 * np.pi * where / 12)), (frame.size, *SHAPE))
-    return Shown(name, "moving", float(light.mean()), Keyframes(frame, light.astype(np.float32)), FRAMES, use)
+    return Condition(name, "moving", float(light.mean()), Keyframes(frame, light.astype(np.float32)), FRAMES, use)
 
 
 @lru_cache
@@ -69,7 +70,7 @@ def evidence(effect: str | None, *, named: bool = True) -> Evidence:
     """Measured with the effect, model before without; model after with it, unless nothing was named."""
     shown = conditions()
     streams = [recorded(effect, 0), recorded(None, 1), recorded(effect, 2) if named and effect else None]
-    bases = [measured_base(list(s), list(shown)) if s else None for s in streams]
+    bases = [free_refit(list(s), list(shown)) if s else None for s in streams]
     fresh = drawn(MODEL, bases[0], SHAPE, seed=11)  # type: ignore[arg-type]
     return Evidence(
         shown, *streams, *bases, again=recorded(None, 3), drawn_before=fresh, drawn_after=fresh if streams[2] else None

@@ -14,12 +14,13 @@ from spikecam_env.gap import Bars, Dark, Flat, Step
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import deviates
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.observe.conditions import Shown, planned
+from spikecam_env.gap.observe.conditions import Condition, planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import expose
-from spikecam_env.gap.unit.refit import BaseFit, unit_as_base, unit_of
+from spikecam_env.gap.unit.conversion import exact_refit, unit_from_refit
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 from spikecam_env.streams import pack_frames, unpack_frames
 
@@ -42,15 +43,15 @@ def effect(name: str, **parameters: float) -> Effect:
 
 
 @lru_cache(maxsize=1)
-def conditions() -> list[Shown]:
+def conditions() -> list[Condition]:
     """What the small design shows."""
-    return planned(DESIGN, SHAPE, FRAMES)
+    return planned_conditions(DESIGN, SHAPE, FRAMES)
 
 
 @lru_cache(maxsize=64)
 def unit(model: SensorModel = MODEL, seed: int = UNIT) -> BaseFit:
     """A drawn unit, exactly."""
-    return unit_as_base(model.draw_unit(SHAPE, seed))
+    return exact_refit(model.draw_unit(SHAPE, seed))
 
 
 def with_effects(model: SensorModel, effects: Sequence[Effect]) -> SensorModel:
@@ -75,11 +76,11 @@ def spikes_of(*effects: Effect, seed: int = 1, model: SensorModel = MODEL) -> di
 def _packed(effects: tuple[Effect, ...], seed: int, model: SensorModel) -> dict[str, Spikes]:
     there = with_effects(model, effects)
     base = unit(there)
-    law = unit_of(there, base, SHAPE)
+    law = unit_from_refit(there, base, SHAPE)
     return {c.name: expose(there, law, c, SHAPE, seed, take) for take, c in enumerate(conditions())}
 
 
-def case_from(spikes: dict[str, Spikes], seed: int = 1, shown: Sequence[Shown] | None = None) -> Case:
+def case_from(spikes: dict[str, Spikes], seed: int = 1, shown: Sequence[Condition] | None = None) -> Case:
     """A case of spikes that a test may have changed; lengths are those of the spikes."""
     there = [replace(c, frames=len(spikes[c.name])) for c in shown or conditions() if c.name in spikes]
     seen_by = [observe(pack_frames(spikes[c.name]), SHAPE, film=c.moves) for c in there]

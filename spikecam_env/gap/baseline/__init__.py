@@ -1,1 +1,1 @@
-"""Before a search: what the model as given predicts, what recordings contradict, what the refit had to move."""
+"""Before a search: the null model, contradictions of the recordings, and effects that the refit shows to be missing."""

@@ -1,23 +1,24 @@
-"""What the data contradict about themselves, before any model is asked: labels, order, orientation, missing frames.
+"""Contradictions within the recordings, before any model is compared: labels, order, orientation, missing frames.
 
-Each check looks for one mistake that would explain a recording and leave the others in order; an effect bends all.
+Each check looks for one mistake that explains one recording and leaves the others consistent; an effect changes all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.baseline.contradiction import Contradiction
+from spikecam_env.gap.baseline.missing_frames import dropped
 from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.baseline.orientation import flipped
 from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.observe.conditions import Shown
-from spikecam_env.gap.observe.observation import BIN, Observation
-from spikecam_env.gap.statistics.film import light_film
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
@@ -25,48 +26,28 @@ from spikecam_env.sensor import SensorModel
 Array = NDArray[np.float64]
 
 LEAST_LABEL = 1e-3
-"""Relative error of a label that is worth a word."""
+"""Relative error of a label from which it is reported."""
 
 LEAST_DARK = 0.02
-"""Relative difference of a dark recording from what the flats extrapolate to that is worth a word: of few spikes a
-pixel, the rate between first and last is biased by their number squared."""
+"""The same of a dark recording, against the extrapolation of the flats: of few spikes a pixel, the rate between first
+and last is biased by their number squared."""
 
-UNEVEN = 0.5
-"""Spread over pixels of what a recording is off by, as a share of it, from which no label is to blame: a label is one
-number, and an effect that sets in there depends on the pixel."""
+PIXEL_SPREAD = 0.5
+"""Spread over pixels of a recording's residual, over its mean, from which the label is not at fault: a label is one
+number, and an effect that begins at that level differs from pixel to pixel."""
 
-ODD = 0.1
-"""Share of a recording's intervals that are much too short or too long, over what its rate is off by, from which spikes
-are missing or too many: light of another level makes none."""
+IRREGULAR = 0.1
+"""Share of irregular intervals in a recording, over its mean residual, from which the label is not at fault: spikes are
+missing or too many, and light of another level makes no irregular interval."""
 
 MENDED = 0.2
 """Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
 
-MOST_BINS = 25
-"""Largest shift of a moving recording against its light that is looked for [bins of the film]."""
+OUTSTANDING = 4.0
+"""Times the distance of all others from their line that one recording has to be off it."""
 
-RELABELLED = 6
-"""Twins by which a recording is judged under another label."""
-
-OFTEN, PASSES = 0.9, 0.4
-"""Share of a recording in which lateness, away from the largest, has to stay below what share of that, for a gap to be
-there: two gaps are few of its frames, a flicker is many."""
-
-SEGMENTS = 8
-"""Parts of a moving recording whose timing is compared."""
-
-
-@dataclass(frozen=True)
-class Contradiction:
-    """kind: label, swapped, flipped, dropped or silent.  recordings: concerned; text: what was found, in words.
-
-    factor: what a label has to be multiplied by.
-    """
-
-    kind: str
-    recordings: tuple[str, ...]
-    text: str
-    factor: float = 1.0
+RELABEL_TWINS = 6
+"""Twins that a recording is compared with under another label."""
 
 
 def audit(case: Case) -> list[Contradiction]:
@@ -91,51 +72,7 @@ def silent(case: Case, suspect: set[str]) -> list[Contradiction]:
     return found
 
 
-def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
-    """Recordings that fit their light and the unit's pattern upside down or mirrored."""
-    found = []
-    back, all_ = slice(None, None, -1), slice(None)
-    turns = {"rows reversed": (back, all_), "columns reversed": (all_, back), "turned by 180 degrees": (back, back)}
-    for i, (c, o) in enumerate(zip(case.conditions, case.observations, strict=True)):
-        if c.light is None or o.times.count.sum() < 1000:
-            continue
-        if o.film is not None:
-            seen = o.film.reshape(-1, *case.shape).astype(np.float64)
-            expected = _expected_film(case, c).reshape(-1, *case.shape)
-        else:
-            seen = o.rate.reshape(1, *case.shape)
-            others = [p.rate for j, p in enumerate(case.observations) if j != i and _lit(case.conditions[j], p)]
-            if c.kind == "dark" or not others:
-                continue
-            expected = np.mean([r / r.mean() for r in others], axis=0).reshape(1, *case.shape)
-        whole = (seen, expected), (seen.sum(axis=0)[None], expected.sum(axis=0)[None])  # in time, and its sum
-        for name, (rows, columns) in turns.items():
-            agree = [(_correlation(s[:, rows, columns], e), _correlation(s, e)) for s, e in whole]
-            turned, right = max(agree, key=lambda a: a[0] - a[1])
-            if turned > 0.2 and turned > right + 0.5 * (1.0 - max(right, 0.0)):
-                text = f"{c.name}: {name}; so it agrees with the rest (correlation {turned:.2f}, as it is {right:.2f})"
-                found.append(Contradiction("flipped", (c.name,), text))
-                break
-    return found
-
-
-def _lit(condition: Shown, o: Observation) -> bool:
-    return condition.kind == "flat" and o.times.count.sum() >= 1000
-
-
-def _expected_film(case: Case, condition: Shown) -> Array:
-    """(bins, P) spikes of the refitted unit in moving light, at most one a frame."""
-    assert condition.light is not None
-    light = light_film(condition.light, condition.frames).astype(np.float64)
-    return np.minimum(light * case.base.gain + BIN * case.base.dark, BIN)
-
-
-def _correlation(a: Array, b: Array) -> float:
-    a, b = a - a.mean(), b - b.mean()
-    return float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-30))
-
-
-def _levels(case: Case, suspect: set[str]) -> tuple[list[str], Array, Array]:
+def _steady_levels(case: Case, suspect: set[str]) -> tuple[list[str], Array, Array]:
     """Names, labels and mean rates of the uniform, steady recordings of known light below saturation."""
     rows = [
         (c.name, c.level, float(o.rate[case.base.live].mean()))
@@ -157,7 +94,7 @@ def _bend(light: Array, rate: Array) -> tuple[float, Array]:
 
 def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Two steady recordings whose labels, exchanged, make the rates a straight line."""
-    names, light, rate = _levels(case, suspect)
+    names, light, rate = _steady_levels(case, suspect)
     if len(names) < 5:
         return []
     before = _bend(light, rate)[0]
@@ -178,69 +115,86 @@ def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
 
 def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
     """One recording off the straight line that all others lie on."""
-    names, light, rate = _levels(case, suspect)
+    names, light, rate = _steady_levels(case, suspect)
     if len(names) < 5:
         return []
-    before = _bend(light, rate)[0]
     best: tuple[float, int] = (np.inf, 0)
     for i in range(len(names)):
         keep = np.arange(len(names)) != i
         best = min(best, (_bend(light[keep], rate[keep])[0], i))
     left, i = best
+    if left > MENDED * _bend(light, rate)[0]:
+        return []
     keep = np.arange(len(names)) != i
     slope, dark = np.polyfit(light[keep], rate[keep], 1, w=1.0 / np.maximum(rate[keep], 1e-6))
-    off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0) if light[i] > 0 else np.inf
-    if left > MENDED * before or abs(off) < max(LEAST_LABEL, 4 * left):
-        return []
-    if light[i] > 0 and (uneven(case, names[i], names) > UNEVEN * abs(off) or odd(case, names[i]) > ODD * abs(off)):
-        return []
     if light[i] == 0:
-        off = float(rate[i] / max(dark, 1e-9) - 1)
-        if off < LEAST_DARK or rate[i] - dark < 4 * left * rate[keep].min():  # none is darker than dark
-            return []
-        text = f"{names[i]}: labelled dark, but {100 * off:+.2g} % off what the flats extrapolate to"
-    else:
-        text = (
-            f"{names[i]}: its rate is that of {100 * off:+.2g} % more light than its label says; all others agree to "
-        )
-        text += f"{100 * left:.1g} %"
-    return [Contradiction("label", (names[i],), text, 1.0 + off if light[i] > 0 else 1.0)]
+        return _wrong_dark(names[i], rate[i], dark, left, rate[keep].min())
+    off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0)
+    return _wrong_flat(case, names[i], names, off, left)
+
+
+def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: float) -> list[Contradiction]:
+    """A flat whose rate is `off` the line of the others, relative; left: how far these are off it at most."""
+    if abs(off) < max(LEAST_LABEL, OUTSTANDING * left):
+        return []
+    differs = pixel_spread(case, name, names) > PIXEL_SPREAD * abs(off)
+    if differs or irregular_share(case, name) > IRREGULAR * abs(off):
+        return []
+    text = (
+        f"{name}: its rate is that of {100 * off:+.2g} % more light than its label says; all others agree to "
+        f"{100 * left:.1g} %"
+    )
+    return [Contradiction("label", (name,), text, 1.0 + off)]
+
+
+def _wrong_dark(name: str, rate: float, dark: float, left: float, lowest: float) -> list[Contradiction]:
+    """A recording labelled dark whose rate is above `dark`, the extrapolation of the others; none is darker than dark.
+
+    left: how far the others are off their line at most, relative; lowest: their lowest rate.
+    """
+    off = float(rate / max(dark, 1e-9) - 1)
+    if off < LEAST_DARK or rate - dark < OUTSTANDING * left * lowest:
+        return []
+    text = f"{name}: labelled dark, but {100 * off:+.2g} % off what the flats extrapolate to"
+    return [Contradiction("label", (name,), text)]
 
 
 def upheld(case: Case, model: SensorModel, found: Sequence[Contradiction]) -> list[Contradiction]:
-    """The contradictions that stand: the label of the brightest is to blame only where with another label nothing else
-    of its recording is off.  What takes spikes of bright light alone looks like a wrong label of the brightest."""
+    """The contradictions that hold: the label of the brightest flat is at fault only where, relabelled, all else of its
+    recording agrees.  An effect that removes spikes in bright light alone looks like a wrong label of the brightest."""
     levels = {c.name: c.level for c in case.conditions if c.kind == "flat"}
     brightest = max(levels, key=lambda name: levels[name], default="")
-    return [c for c in found if c.kind != "label" or c.recordings != (brightest,) or is_right_but_for(case, model, c)]
+    return [
+        c for c in found if c.kind != "label" or c.recordings != (brightest,) or agrees_when_relabelled(case, model, c)
+    ]
 
 
-def is_right_but_for(case: Case, model: SensorModel, label: Contradiction) -> bool:
-    """Whether a recording is as the model has it, but for its label."""
+def agrees_when_relabelled(case: Case, model: SensorModel, label: Contradiction) -> bool:
+    """Whether a recording agrees with the model under another label."""
     [name] = label.recordings
     conditions = [relabelled(c, label.factor) if c.name == name else c for c in case.conditions]
     again = case.of(conditions, case.observations)
-    null = model_null(again, model, RELABELLED)
+    null = model_null(again, model, RELABEL_TWINS)
     of = np.array([k.recording == name and k.group != "rates" for k in null.keys])
     return not adjusted(deviates(null, values_of(again.bank, null.keys))[of]).min() < GATE
 
 
-def relabelled(condition: Shown, factor: float) -> Shown:
+def relabelled(condition: Condition, factor: float) -> Condition:
     """The same with its light multiplied."""
     assert condition.light is not None
     light = replace(condition.light, radiance=condition.light.radiance * np.float32(factor))
     return replace(condition, level=condition.level * factor, light=light)
 
 
-def odd(case: Case, name: str) -> float:
+def irregular_share(case: Case, name: str) -> float:
     """Share of short and long intervals in recording `name`."""
     [o] = [o for c, o in zip(case.conditions, case.observations, strict=True) if c.name == name]
     return float((o.short + o.long).sum()) / max(float(o.times.count.sum()), 1.0)
 
 
-def uneven(case: Case, name: str, names: Sequence[str]) -> float:
-    """Half of the middle 68 % of pixels by how far their rates in recording `name` are off their own lines, beyond what
-    it is in the recording of nearest light."""
+def pixel_spread(case: Case, name: str, names: Sequence[str]) -> float:
+    """Spread over pixels (half of the middle 68 %) of their relative residuals in recording `name`, beyond that in the
+    recording of nearest light."""
     live, base = case.base.live, case.base
     spread: dict[str, float] = {}
     level = {c.name: c.level for c in case.conditions}
@@ -250,84 +204,3 @@ def uneven(case: Case, name: str, names: Sequence[str]) -> float:
             spread[c.name] = scatter(off)
     near = min((n for n in spread if n != name), key=lambda n: abs(np.log(level[n] / level[name])))
     return float(np.sqrt(max(spread[name] ** 2 - spread[near] ** 2, 0.0)))
-
-
-def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
-    """Frames missing (or doubled): from one frame on all pixels are ahead of (behind) their time."""
-    found = []
-    for c, o in zip(case.conditions, case.observations, strict=True):
-        if c.name in suspect or c.light is None:
-            continue
-        jump = _jump_moving(case, c, o) if c.moves and o.film is not None else _jump_steady(o) if not c.moves else None
-        if jump is not None:
-            at, frames = jump
-            what = "missing" if frames > 0 else "doubled"
-            text = f"{c.name}: about {abs(frames):.0f} frames {what} near frame {at}"
-            if not c.moves:  # spikes repeat: so many missing look like the rest of an interval too many
-                text = f"{c.name}: frames missing or doubled near frame {at}"
-            found.append(Contradiction("dropped", (c.name,), text))
-    return found
-
-
-def _jump_steady(o: Observation) -> tuple[int, float] | None:
-    """(frame, missing): intervals that span a gap are short by it; they end within an interval after it.
-
-    A gap of half an interval makes some of them odd, which are not timed, and lengthens the others.  Where more is off
-    than two intervals on either side, it is light, or the dark, that changes; nearer to an end, it may be.
-    """
-    interval = o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9)
-    window = int(np.clip(round(interval), 4, o.frames // 8))
-    total, timed = (np.convolve(a, np.ones(window), "valid") for a in (o.late, o.timed))
-    spread = 1.4826 * float(np.median(np.abs(total - np.median(total)))) + 1e-9
-    at = int(np.argmax(np.abs(total)))
-    mean = float(total[at] / max(timed[at], 1))
-    elsewhere = np.delete(np.abs(total), slice(max(at - 2 * window, 0), at + 2 * window))
-    passes = float(np.quantile(elsewhere, OFTEN)) < PASSES * abs(total[at])
-    inside = 2 * window <= at < total.size - 2 * window
-    if abs(total[at]) > 12 * spread and abs(mean) > 0.3 and passes and inside:
-        return at, -mean
-    return None
-
-
-def _jump_moving(case: Case, condition, o) -> tuple[int, float] | None:  # type: ignore[no-untyped-def]
-    """(frame, missing) from how late each segment of the film is against its light."""
-    expected = _expected_film(case, condition)
-    parts = np.array_split(np.arange(1, len(expected) - 1), SEGMENTS)  # the ends have a change on one side only
-    coarse = [_shift(o.film, expected, part) for part in parts]
-    if len(set(coarse)) > 1 and coarse[0] == 0:
-        k = next(i for i, s in enumerate(coarse) if s != 0)
-        return k * condition.frames // SEGMENTS, float(coarse[k] * BIN)
-    change = -np.gradient(expected, axis=0) / BIN
-    left = o.film - expected
-    late, weight = [], []
-    for part in parts:
-        power = float((change[part] ** 2).sum())
-        late.append(float((left[part] * change[part]).sum()) / max(power, 1e-9))
-        weight.append(power)
-    times = np.array(late)
-    if min(weight) <= 0:
-        return None
-    steps = [times[k:].mean() - times[:k].mean() for k in range(1, SEGMENTS)]
-    k = int(np.argmax(np.abs(steps))) + 1
-    rest = max(float(np.std(times[:k] - times[:k].mean())), float(np.std(times[k:] - times[k:].mean())))
-    if abs(steps[k - 1]) < max(0.7, 6 * rest):
-        return None
-    return k * condition.frames // SEGMENTS, -steps[k - 1]
-
-
-def _shift(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64]) -> int:
-    """Bins by which the light has to be moved on to agree best with a part of the film; 0 unless clearly better."""
-    seen = film[part].astype(np.float64)
-    scores = {}
-    for shift in range(-MOST_BINS, MOST_BINS + 1):
-        if part[0] + shift >= 0 and part[-1] + shift < len(expected):
-            scores[shift] = float(((seen - expected[part + shift]) ** 2).sum())
-    least = min(scores.values())
-    if least > 0.8 * scores[0]:
-        return 0
-    return min((s for s in scores if scores[s] < least + 0.1 * (scores[0] - least)), key=abs)
-
-
-def without(case: Case, names: Sequence[str]) -> list[int]:
-    """Recordings that are not in `names`, by index."""
-    return [i for i, c in enumerate(case.conditions) if c.name not in names]

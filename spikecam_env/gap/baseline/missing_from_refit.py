@@ -1,80 +1,114 @@
-"""Effects of the base pixel that a model lacks altogether: what the free refit had to move to meet the measurement.
+"""Effects of the base pixel that a model lacks altogether, by the free refit.
 
-The refit measures response, dark level and jitter of every pixel.  Where it finds what the model has no effect for, the
-effect is missing, and the refit's value is its parameter; nothing has to be searched.
+The refit measures response, dark level and jitter of every pixel.  Where the model has no effect for one that is not 0,
+the effect is missing, and the refit's value is its parameter; nothing has to be searched.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.gap.twins.case import Case, rests_on, twins
 from spikecam_env.gap.twins.fresh_units import width
-from spikecam_env.gap.unit.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common, within
+from spikecam_env.gap.unit.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common_level, constrained_refit
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
 
 LEAST_WIDTH = 5e-4
-"""Relative spread of pixels that is more than the refit's own error."""
+"""Relative spread of pixels' gain beyond the refit's own error."""
 
-KNOWN_ALIKE = 2.0
-"""Times the usual error of a dark level up to which it tells how pixels differ: of alike pixels with a spike or two in
-the dark some have a rate there, and others thirty times the error."""
+LEAST_DARK_ERRORS = 5.0
+"""Errors of the mean dark level of all pixels, over the root of 2, above which there is a dark current."""
+
+COMPARABLE_ERROR = 2.0
+"""Times the median error of a dark level up to which a pixel counts for their spread: of equal pixels with a spike or
+two in the dark some have a rate there, and others thirty times the error."""
 
 LEAST_JITTER = 1e-7
-"""s^2 that is more than none: a pixel of 10 million electrons."""
+"""s^2 above which a refit has noise at all: that of a pixel of 10 million electrons."""
 
-QUIET, CLEAR = 4, 5.0
-"""Twins without noise, whose refits say what s^2 alike pixels seem to have that beat with the read-out's clock; and by
-how many of their standard deviations a measured one has to be more."""
+NOISELESS_TWINS, NOISE_EXCESS = 4, 5.0
+"""Twins without noise, whose refits show the s^2 of equal pixels that beat with the read-out's clock; and the number of
+their standard deviations that a measured s^2 has to be above it."""
 
 
 @dataclass(frozen=True)
 class Missing:
-    """An effect that is not in the model, and its size.  also: names that one V_d cannot tell it from."""
+    """An effect that is not in the model, and its size.  also: names of those that are the same at one V_d."""
 
     effect: Effect
     sd: float
     also: tuple[str, ...] = ()
 
 
-def missing(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missing]:
-    """What the refit needs and the model has not, of the candidates in `names`; in the order of the pixel."""
-    has = {e.name for e in model.effects}
+def missing_effects(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missing]:
+    """Effects that the refit shows and the model lacks, of the candidates in `names`; in the order of the pixel."""
+    found = [_built(one) for one in (*_response(case, model), *_dark_level(case, model)) if one.name in names]
+    return found + [_built(one) for one in _noise(case, with_missing(model, found)) if one.name in names]
+
+
+class _Size(NamedTuple):
+    """A strength that the refit shows, its standard deviation, and names of effects that are the same at one V_d."""
+
+    name: str
+    value: float
+    sd: float
+    also: tuple[str, ...] = ()
+
+
+def _built(one: _Size) -> Missing:
+    return Missing(build(CATALOGUE, one.name, {CATALOGUE[one.name].strength: one.value}), one.sd, one.also)
+
+
+def _response(case: Case, model: SensorModel) -> Iterator[_Size]:
+    """The spread of pixels' gain, where the model has none."""
     live = case.base.live
-    gain, dark, white = case.base.gain[live], case.base.dark[live], case.base.white
-    known = case.base.dark_sd[live] <= KNOWN_ALIKE * np.median(case.base.dark_sd[live])
-    count = float(np.sqrt(2 * live.sum()))
+    spread = width(case.base.gain[live])
+    if not _has(model, RESPONSE) and spread > LEAST_WIDTH:
+        sd = spread / _root_of_twice(live)
+        yield _Size("conversion_gain_spread", spread, sd, ("bias_voltage_spread", "capacitor_spread"))
+
+
+def _dark_level(case: Case, model: SensorModel) -> Iterator[_Size]:
+    """The dark level of all pixels, and its spread, where the model has none."""
+    live = case.base.live
+    gain, dark, sd = case.base.gain[live], case.base.dark[live], case.base.dark_sd[live]
+    count = _root_of_twice(live)
     to_pA = model.circuit.capacitance_fF * model.circuit.swing_V * model.frame_rate_hz * 1e-3
-    found: list[Missing] = []
-
-    def add(name: str, value: float, sd: float, also: tuple[str, ...] = ()) -> None:
-        if name in names:
-            effect = build(CATALOGUE, name, {CATALOGUE[name].strength: value})
-            found.append(Missing(effect, sd, also))
-
-    spread = width(gain)
-    if not has & set(RESPONSE) and spread > LEAST_WIDTH:
-        add("conversion_gain_spread", spread, spread / count, ("bias_voltage_spread", "capacitor_spread"))
-    level = common(dark, case.base.dark_sd[live])
-    error = float(np.median(case.base.dark_sd[live]))
-    if not has & set(DARK) and level > 5 * error / count and fires_in_the_dark(case, level):
-        add("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
-    if not has & set(DARK_PATTERN) and level > 0:
+    level, error = common_level(dark, sd), float(np.median(sd))
+    if not _has(model, DARK) and level > LEAST_DARK_ERRORS * error / count and fires_in_the_dark(case, level):
+        yield _Size("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
+    if not _has(model, DARK_PATTERN) and level > 0:
+        known = sd <= COMPARABLE_ERROR * np.median(sd)
         own = float(np.sqrt(max(scatter(dark[known]) ** 2 - (level * width(gain)) ** 2 - error**2, 0.0)))
         if own > error:
-            add("dark_current_spread", own * to_pA, own * to_pA / count)
-    if not has & set(NOISE) and white > LEAST_JITTER and is_noise(case, with_all(model, found)):
-        add("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
-    return found
+            yield _Size("dark_current_spread", own * to_pA, own * to_pA / count)
 
 
-def with_all(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
+def _noise(case: Case, model: SensorModel) -> Iterator[_Size]:
+    """The noise of a spike, where the model has none."""
+    white = case.base.white
+    if not _has(model, NOISE) and white > LEAST_JITTER and is_noise(case, model):
+        yield _Size("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
+
+
+def _has(model: SensorModel, names: Sequence[str]) -> bool:
+    return any(e.name in names for e in model.effects)
+
+
+def _root_of_twice(live: NDArray[np.bool_]) -> float:
+    """By which the standard deviation of a spread over pixels is smaller than the spread."""
+    return float(np.sqrt(2 * live.sum()))
+
+
+def with_missing(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
     """The model with all that was found."""
     for m in found:
         model = model.with_effect(m.effect)
@@ -82,11 +116,10 @@ def with_all(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
 
 
 def is_noise(case: Case, model: SensorModel) -> bool:
-    """Whether the refit's s^2 is more than refits of twins of a model without noise find: of alike pixels 3e-7, at some
-    lights."""
-    made = twins(case, model, within(model, case.base), range(QUIET), sorted(rests_on(case)))
-    shown = np.array([t.base.white for t in made if t.base is not None])
-    return bool(case.base.white > shown.mean() + CLEAR * shown.std(ddof=1))
+    """Whether the refit's s^2 is above that of twins of a model without noise: of equal pixels 3e-7, at some lights."""
+    made = twins(case, model, constrained_refit(model, case.base), range(NOISELESS_TWINS), sorted(rests_on(case)))
+    white = np.array([t.base.white for t in made if t.base is not None])
+    return bool(case.base.white > white.mean() + NOISE_EXCESS * white.std(ddof=1))
 
 
 def fires_in_the_dark(case: Case, level: float) -> bool:

@@ -1,4 +1,4 @@
-"""What a model predicts for a case: twins of its unit, and drawn units for the pattern."""
+"""The null model: what a model predicts for a case, by twins of its unit, and by drawn units for the pattern."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.prediction import Null, null_of, values_of
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, twins
 from spikecam_env.gap.twins.fresh_units import UNITS, drawn_banks
-from spikecam_env.gap.unit.indirect_inference import settled
-from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.indirect_inference import inferred_unit
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
 
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
-    """The prediction of `count` twins, and of recordings in motion as many again: of their statistics there is one of
-    a kind, and no other recording tells how much it varies (`pooled_variance`)."""
+    """The prediction of `count` twins, and of twice as many for recordings in motion: each of their statistics is of
+    one recording alone, so that no other one pools its variance (`pooled_variance`)."""
     base = unit_under(case, model)
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
     made = twins(case, model, base, range(count))
@@ -31,7 +31,7 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
     null = null_of(banks, list(case.bank), [t.base for t in made if t.base])
     moving = [i for i, c in enumerate(case.conditions) if c.moves and c.use == "fit"]
     if moving:
-        null = surer(null, [t.bank for t in twins(case, model, base, range(count, 2 * count), moving)])
+        null = with_more_twins(null, [t.bank for t in twins(case, model, base, range(count, 2 * count), moving)])
     values = np.array([[d.get(k, np.nan) for k in null.keys] for d in drawn])
     of_pattern = np.array([k.group == "pattern" for k in null.keys])
     return replace(
@@ -40,20 +40,23 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         sd=np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
         freedom=np.where(of_pattern, UNITS - 1, null.freedom),
         twins=np.where(of_pattern, UNITS, null.twins),
-        weight=np.where(of_pattern, 1.0 / told(null.keys, case.conditions), 1.0),
+        weight=np.where(of_pattern, 1.0 / recordings_per_statistic(null.keys, case.conditions), 1.0),
     )
 
 
 def unit_under(case: Case, model: SensorModel) -> BaseFit:
-    """The unit of a case within a model; of scenes alone, which are too short for the closed law of jitter, settled."""
-    base = within(model, case.base)
+    """The unit of a case under a model: the constrained refit; of scenes alone, which are too short for the closed law
+    of jitter, by indirect inference."""
+    base = constrained_refit(model, case.base)
     if case.scenes_only:
-        base = settled(model, base, case.base, [t.base for t in twins(case, model, base, range(50, 54)) if t.base])
+        base = inferred_unit(
+            model, base, case.base, [t.base for t in twins(case, model, base, range(50, 54)) if t.base]
+        )
     return base
 
 
-def surer(null: Null, more: Sequence[Mapping[Key, float]]) -> Null:
-    """The null with campaigns of some recordings more, where they have a statistic."""
+def with_more_twins(null: Null, more: Sequence[Mapping[Key, float]]) -> Null:
+    """The null with further twins of some recordings, for the statistics of these."""
     values = np.array([*(d.values for d in null.draws), *(values_of(bank, null.keys) for bank in more)])
     known = np.isfinite(values).all(axis=0)
     return replace(
@@ -65,8 +68,8 @@ def surer(null: Null, more: Sequence[Mapping[Key, float]]) -> Null:
     )
 
 
-def told(keys: Sequence[Key], conditions: Sequence[Shown]) -> Array:
-    """(S,) how many recordings of use fit tell the same statistic of the pattern: those in the dark, or in light."""
+def recordings_per_statistic(keys: Sequence[Key], conditions: Sequence[Condition]) -> Array:
+    """(S,) recordings of use fit with the same statistic of the one fixed pattern, dark or lit, counted; 1 at least."""
     lit = {c.name: c.kind != "dark" for c in conditions}
     fit = {c.name for c in conditions if c.use == "fit"}
     kind = [(k.name, lit[k.recording]) for k in keys]

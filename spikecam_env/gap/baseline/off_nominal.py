@@ -1,4 +1,4 @@
-"""Whether what the model has is there in the amount it says: noise, dark level and spreads against nominal."""
+"""Parameters off nominal: noise, dark level and spreads of the measured unit against those of the model."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Off:
-    """What is off.  parameters: {effect: {measured, nominal, ratio}}, each effect's strength in its own unit.
+class OffNominal:
+    """Parameters off nominal: {effect: {measured, nominal, ratio}}, each effect's strength in its own unit.
 
-    nominal: the measured unit as it would be, were those as the model has them.
+    nominal: the measured unit with those parameters as the model has them.
     """
 
     parameters: dict[str, dict[str, float]]
     nominal: BaseFit
 
 
-def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> Off:
-    """Strengths of effects in the model that the unit `base` has in another amount than units differ by.
+def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
+    """Strengths of the model's effects that are beyond the spread of units (`unit.usual`) in the unit `base`.
 
     Not of scenes alone: in recordings so short the refit of jitter is a fifth too small (`null_model.model_null`).
     """
     if case.scenes_only:
-        return Off({}, base)
+        return OffNominal({}, base)
     shape = (128, 128)
     unit = model.draw_unit(shape, 0)
     has = {e.name: e.parameters()[CATALOGUE[e.name].strength] for e in model.effects}
@@ -58,15 +58,15 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> Off:
         if spreads and unusual(width(values[live]) / max(width(getattr(unit, what)), 1e-12)):
             factor = spread_factor(model, what, width(values[live]), shape, 0)
             ratios |= {name: factor * usual for name in has if name in spreads}
-            base = replace(base, **{what: nearer(values, live, factor)})  # type: ignore[arg-type]
+            base = replace(base, **{what: narrowed(values, live, factor)})  # type: ignore[arg-type]
     if "dark_current" in ratios:
         base = replace(base, dark=base.dark / level)
     rows = {n: {"measured": has[n] * r, "nominal": has[n], "ratio": r} for n, r in ratios.items() if n in has}
-    return Off(rows, base)
+    return OffNominal(rows, base)
 
 
-def nearer(values: Array, live: NDArray[np.bool_], factor: float) -> Array:
-    """Values with their distance from the median of those alive divided."""
+def narrowed(values: Array, live: NDArray[np.bool_], factor: float) -> Array:
+    """(P,) values with their distance from the median of the live ones divided by a factor."""
     middle = float(np.median(values[live]))
     return np.maximum(middle + (values - middle) / max(factor, 1e-3), 0.0)
 

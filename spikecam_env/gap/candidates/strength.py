@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate, is_pattern
-from spikecam_env.gap.unit.indirect_inference import FURTHEST
+from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import build
 
 AS_LOUD = 60.0
-"""Noises that a weak effect is simulated to show at best, FURTHEST times as strong at most.  Scaled down, what twins
-scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
+"""Noises that a weak effect is simulated to show at best, MOST_EXTRAPOLATED times as strong at most.  Scaled down, what
+twins scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
 
 
 def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
@@ -50,6 +50,6 @@ def as_loud(name: str, parameters: Mapping[str, float], size: float) -> tuple[di
     """(parameters, times as much) of an effect that shows by `size` noises: a weak one is made to show by AS_LOUD."""
     strength = candidate(name).fitted[0]
     linear = is_linear(name) and parameters[strength] != 0
-    times = float(np.clip(AS_LOUD / max(size, 1e-9), 1.0, FURTHEST)) if linear else 1.0
+    times = float(np.clip(AS_LOUD / max(size, 1e-9), 1.0, MOST_EXTRAPOLATED)) if linear else 1.0
     louder = bounded(name, {**parameters, strength: parameters[strength] * times})
     return louder, louder[strength] / parameters[strength] if times > 1.0 else 1.0

@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from spikecam_env.errors import unknown_name
-from spikecam_env.gap.observe.conditions import KNOWN, Shown
+from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 
-Needs = Callable[[Sequence[Shown]], "str | None"]
+Needs = Callable[[Sequence[Condition]], "str | None"]
 
 
 @dataclass(frozen=True)
@@ -51,38 +51,40 @@ class Candidate:
         return 2.0 if self.square else 0.5 if self.events else 1.0
 
 
-def _moving(shown: Sequence[Shown]) -> str | None:
+def _moving(shown: Sequence[Condition]) -> str | None:
     return None if any(s.moves for s in shown) else "a recording with moving or flickering light"
 
 
-def _edges(shown: Sequence[Shown]) -> str | None:
+def _edges(shown: Sequence[Condition]) -> str | None:
     pictures = any(s.kind in ("moving", "picture") for s in shown)
     return None if pictures else "a recording with contrast in it: bars, a disk, a chart"
 
 
-def _bright(shown: Sequence[Shown]) -> str | None:
+def _bright(shown: Sequence[Condition]) -> str | None:
     lit = [s for s in shown if s.light is not None and s.kind in ("moving", "picture")]
     above = any(float(s.light.radiance.max()) > 1.0 for s in lit if s.light is not None)
     return None if above else "a recording with lights brighter than one spike a frame (radiance above 1) beside dark"
 
 
-def _levels(shown: Sequence[Shown]) -> str | None:
+def _levels(shown: Sequence[Condition]) -> str | None:
     levels = {round(s.level, 6) for s in shown if s.kind == "flat" and s.use == "fit"}
     return None if len(levels) >= 3 else "flats at three levels or more, up to 0.6 spikes a frame"
 
 
-def _dark(shown: Sequence[Shown]) -> str | None:
+def _dark(shown: Sequence[Condition]) -> str | None:
     return None if any(s.kind == "dark" for s in shown) else "a dark recording"
 
 
-def _steady(shown: Sequence[Shown]) -> str | None:
+def _steady(shown: Sequence[Condition]) -> str | None:
     return (
         None if any(s.kind in ("dark", "flat", "picture", "unknown") for s in shown) else "a recording in steady light"
     )
 
 
-def _even(shown: Sequence[Shown]) -> str | None:
-    return None if any(s.kind in KNOWN for s in shown) else "flats: a pattern cannot be told from an unknown scene"
+def _even(shown: Sequence[Condition]) -> str | None:
+    return (
+        None if any(s.kind in STEADY_KNOWN for s in shown) else "flats: a pattern cannot be told from an unknown scene"
+    )
 
 
 _FIELD = "flats at several levels beside a picture with bright and dark rows"
@@ -168,7 +170,7 @@ def candidate(name: str) -> Candidate:
 
 
 def expected_events(
-    name: str, parameters: Mapping[str, float], shown: Sequence[Shown], seen: Sequence[Observation]
+    name: str, parameters: Mapping[str, float], shown: Sequence[Condition], seen: Sequence[Observation]
 ) -> float:
     """Pixels, spikes or frames of pixels that an effect is expected to change in the steady recordings to fit of a
     campaign; infinite where it is no share of such."""
@@ -202,7 +204,7 @@ def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str
     return [n for n in CATALOGUE if n not in has and n not in exclude and (only is None or n in only)]
 
 
-def testable(names: Sequence[str], shown: Sequence[Shown]) -> tuple[list[str], list[tuple[str, str]]]:
+def testable(names: Sequence[str], shown: Sequence[Condition]) -> tuple[list[str], list[tuple[str, str]]]:
     """Candidates that these recordings can reveal, and the others with what each would need."""
     lacks = [(n, candidate(n).needs(shown)) for n in names]
     return [n for n, why in lacks if why is None], [(n, why) for n, why in lacks if why is not None]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.optimize import brentq
 
-from spikecam_env.gap.statistics import Key, alike
+from spikecam_env.gap.statistics import Key, floor_family
 
 Array = NDArray[np.float64]
 
@@ -30,15 +30,15 @@ def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Ar
     """((S,) variances, (S,) degrees of freedom) from (S,) sample variances with `freedom` each.
 
     A statistic's kind is the same one of all recordings; how alike a kind's variances are is told by all kinds that
-    share a floor (`alike`), or, where that says more, how alike they are but for what a recording has in common: some
-    have more spikes to count than others.  What never varied, or is of one recording alone, stays as it is.
+    share a floor (`floor_family`), or, where that says more, how alike they are but for what a recording has in common:
+    some have more spikes to count than others.  What never varied, or is of one recording alone, stays as it is.
     """
     out, degrees = variances.copy(), np.full(len(keys), float(freedom))
     several = Counter((k.group, k.name) for k, v in zip(keys, variances, strict=True) if v > 0)
     families: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(keys):
         if variances[i] > 0 and several[key.group, key.name] > 1:
-            families.setdefault(alike(key), []).append(i)
+            families.setdefault(floor_family(key), []).append(i)
     logs = np.log(np.where(variances > 0, variances, 1.0)) - bias(freedom)
     chance = float(special.polygamma(1, freedom / 2))
     for of in families.values():

@@ -21,8 +21,8 @@ from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
 from spikecam_env.gap.twins.case import Case, rests_on, twins
 from spikecam_env.gap.twins.fresh_units import UNITS, drawn_banks
 from spikecam_env.gap.unit.false_spikes import false_spikes_of
-from spikecam_env.gap.unit.indirect_inference import FURTHEST, is_still, settled, shifted
-from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED, extrapolated_unit, has_converged, inferred_unit
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.gap.unit.traps import traps_of
 from spikecam_env.sensor import SensorModel
 
@@ -92,7 +92,7 @@ def as_seen(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction
     """The unit moved so that with the effect it is refitted as the null's is without."""
     [without] = [d.refit for d in null.draws if d.number == predicted.draws[-1].number]
     there = predicted.draws[-1].refit
-    return settled(model, base, without, [there]) if without and there else base
+    return inferred_unit(model, base, without, [there]) if without and there else base
 
 
 def with_pattern(case: Case, model: SensorModel, null: Null, predicted: Prediction, count: int = UNITS) -> Prediction:
@@ -146,7 +146,7 @@ def _fit_twins(
     everywhere = np.full(len(null.keys), np.inf)
     expected = everywhere if expected is None else expected
     parameters, louder = as_loud(name, bounded(name, parameters), size_of(null, measured, expected))
-    bare = within(with_effect(model, name, parameters), within(model, case.base))
+    bare = constrained_refit(with_effect(model, name, parameters), constrained_refit(model, case.base))
     base = replace(bare, white=white**louder * bare.white)
     hopeless = judged(null, measured, null.prediction)[1] - HOPE
     only = concerned(case, [name], null, measured, expected * louder)
@@ -160,11 +160,11 @@ def _fit_twins(
         seen = size_of(null, measured, predicted.mean - null.mean)
         stronger = parameters if at_last else until_seen(name, parameters, seen)
         if stronger != parameters:
-            base = shifted(bare, base, abs(stronger[strength] / parameters[strength]) ** power)
+            base = extrapolated_unit(bare, base, abs(stronger[strength] / parameters[strength]) ** power)
             parameters, only = stronger, concerned(case, [name], null, measured, everywhere)
             continue
         assumed, base = base, as_seen(tried, base, null, predicted)
-        if not still and not at_last and not is_still(assumed, base):
+        if not still and not at_last and not has_converged(assumed, base):
             still = True
             continue
         scale, sd = scale_to(null, measured, predicted)
@@ -174,14 +174,16 @@ def _fit_twins(
         now = parameters[strength], predicted
         slope = slope_between(null, measured, last, now) if power == 2.0 else None
         factor, last = factor_to(name, null, measured, predicted, scale, slope), now
-        weak = abs(scale) * seen < VISIBLE or (is_linear(name) and 1 / FURTHEST < scale < 1 and scale * seen < AS_LOUD)
+        weak = abs(scale) * seen < VISIBLE or (
+            is_linear(name) and 1 / MOST_EXTRAPOLATED < scale < 1 and scale * seen < AS_LOUD
+        )
         near = weak or 0.7 < factor < 1.4
         if at_last or (near and turn):
             break
         if weak:
             continue
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
-        base = shifted(bare, base, factor**power)
+        base = extrapolated_unit(bare, base, factor**power)
         only = concerned(case, [name], null, measured, (predicted.mean - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
@@ -192,7 +194,7 @@ def _fit_twins(
     rho, left = judged(null, measured, predicted)
     sds = {strength: abs(final[strength]) * (sd / max(abs(scale), 1e-9) / power)}
     there = with_effect(model, name, final)
-    return Fit(name, final, sds, predicted, shifted(bare, base, moved), rho, left, there)
+    return Fit(name, final, sds, predicted, extrapolated_unit(bare, base, moved), rho, left, there)
 
 
 def until_seen(name: str, parameters: dict[str, float], seen: float) -> dict[str, float]:
@@ -242,7 +244,7 @@ def _fit_wander(
     only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
     for _ in range(2):
         there = with_effect(model, name, bounded(name, parameters))
-        base = within(there, case.base)
+        base = constrained_refit(there, case.base)
         predicted = predict(case, there, base, null, WANDER, only)
         factor, sd = likeliest(null, measured, predicted)
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
@@ -295,7 +297,7 @@ def _fit_pattern(
                 there = with_effect(model, name, tried)
                 predicted = with_pattern(case, there, null, null.prediction)
                 rho, left = judged(null, measured, predicted)
-                now = Fit(name, tried, {}, predicted, within(there, case.base), rho, left, there)
+                now = Fit(name, tried, {}, predicted, constrained_refit(there, case.base), rho, left, there)
                 best = now if best is None or now.misfit < best.misfit else best
     assert best is not None
     return best

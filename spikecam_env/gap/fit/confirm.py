@@ -25,8 +25,9 @@ from spikecam_env.gap.fit.candidate import (
 )
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import drawn
-from spikecam_env.gap.unit.indirect_inference import HIDDEN, shifted
-from spikecam_env.gap.unit.refit import LINES, BaseFit, within
+from spikecam_env.gap.unit.conversion import LINES
+from spikecam_env.gap.unit.indirect_inference import IDENTIFIABLE, extrapolated_unit
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -50,13 +51,13 @@ def confirmed(case: Case, model: SensorModel, null: Null, measured: Array, found
         count = max(count, *(WANDER if candidate(name).wanders else twins_of(name) for name in added), 1)
         there = with_held_out(case, only)
         loud, times = found, 1.0
-        severe = found.base.white < HIDDEN * case.base.white
+        severe = found.base.white < IDENTIFIABLE * case.base.white
         if len(added) == 1 and not severe and not is_pattern(added[0]):
             loud, times = made_loud(case, model, null, measured, found, added[0])
-        predicted = predict(case, loud.model, within(loud.model, loud.base), null, count, there)
+        predicted = predict(case, loud.model, constrained_refit(loud.model, loud.base), null, count, there)
         predicted = quietened(null, predicted, times) if times > 1.0 else predicted
         if severe:
-            bare = predict(case, model, within(model, found.base), null, 1, there)
+            bare = predict(case, model, constrained_refit(model, found.base), null, 1, there)
             predicted = replace(predicted, own=predicted.mean - bare.mean)
     if any(is_pattern(name) for name in added):
         predicted = with_pattern(case, found.model, null, predicted)
@@ -97,7 +98,7 @@ def made_loud(case: Case, model: SensorModel, null: Null, measured: Array, found
     [effect] = [e for e in found.model.effects if e.name == name]
     size = size_of(null, measured, found.prediction.mean - null.mean)
     parameters, times = as_loud(name, effect.parameters(), size)
-    base = shifted(within(model, case.base), found.base, times)
+    base = extrapolated_unit(constrained_refit(model, case.base), found.base, times)
     return replace(found, model=with_effect(found.model, name, parameters), base=base), times
 
 
@@ -108,7 +109,7 @@ def quietened(null: Null, loud: Prediction, times: float) -> Prediction:
         replace(
             d,
             values=w.values + (d.values - w.values) / times,
-            refit=shifted(w.refit, d.refit, 1 / times) if w.refit and d.refit else d.refit,
+            refit=extrapolated_unit(w.refit, d.refit, 1 / times) if w.refit and d.refit else d.refit,
         )
         for d, w in ((d, without[d.number]) for d in loud.draws)
     )
@@ -121,7 +122,7 @@ def of_any_dark(case: Case, model: SensorModel, base: BaseFit, null: Null, predi
     Slow pixels lock to a severe noise, or drown in it: a refit then does not show how they differ.
     """
     _, dark = drawn(model, base, case.shape, case.seed)
-    other = predict(case, model, within(model, replace(base, dark=dark)), null, 1)
+    other = predict(case, model, constrained_refit(model, replace(base, dark=dark)), null, 1)
     here = next(d for d in predicted.draws if d.number == other.draws[-1].number)
     change = np.nan_to_num(other.draws[-1].values - here.values)
     return replace(predicted, error=np.hypot(predicted.error, change))
@@ -129,7 +130,7 @@ def of_any_dark(case: Case, model: SensorModel, base: BaseFit, null: Null, predi
 
 def resettled(case: Case, null: Null, found: Fit, model: SensorModel) -> Fit:
     """The fit with another model, and its unit settled under it."""
-    base = within(model, found.base)
+    base = constrained_refit(model, found.base)
     return replace(found, model=model, base=as_seen(model, base, null, predict(case, model, base, null, 1)))
 
 

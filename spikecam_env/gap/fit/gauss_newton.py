@@ -19,8 +19,8 @@ from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import Null, Prediction, own_variance
 from spikecam_env.gap.compare.step import change_of, step_of
 from spikecam_env.gap.fit.candidate import as_seen
-from spikecam_env.gap.unit.indirect_inference import is_still
-from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.indirect_inference import has_converged
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -164,12 +164,12 @@ def settled_there(
     """(what a model gives under a unit that has settled, that unit): probed once more where the unit was not still."""
     made = probe(model, base)
     there = as_told(model, base, null, made, free)
-    return (made, base) if is_still(base, there) else (probe(model, there), there)
+    return (made, base) if has_converged(base, there) else (probe(model, there), there)
 
 
 def as_told(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:
     """`candidate.as_seen`, but for an s^2 that is fitted."""
-    there = as_seen(model, within(model, base), null, made)
+    there = as_seen(model, constrained_refit(model, base), null, made)
     return replace(there, white=base.white) if WHITE in free else there
 
 

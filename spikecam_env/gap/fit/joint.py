@@ -16,7 +16,7 @@ from spikecam_env.gap.fit.candidate import Fit, concerned, predict, twins_of, wi
 from spikecam_env.gap.fit.confirm import FINAL, confirmed
 from spikecam_env.gap.fit.gauss_newton import WHITE, WORSE, Free, Probe, descend, longest_of, moved, spans
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -149,7 +149,7 @@ def _probe(case: Case, null: Null, measured: Array, found: Fit, names: Sequence[
     def statistics(model: SensorModel, base: BaseFit) -> Prediction:
         made = null.prediction
         if only:
-            made = predict(case, model, within(model, base), null, count, only)
+            made = predict(case, model, constrained_refit(model, base), null, count, only)
         return with_pattern(case, model, null, made) if any(is_pattern(name) for name in names) else made
 
     return statistics

@@ -17,7 +17,7 @@ from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit, concerned, predict, twins_of
 from spikecam_env.gap.fit.gauss_newton import descend
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ def shaped(case: Case, model: SensorModel, null: Null, measured: Array, found: F
     only = concerned(case, [found.name], null, measured, found.prediction.mean - null.mean)
 
     def probe(there: SensorModel, base: BaseFit) -> Prediction:
-        return predict(case, there, within(there, base), null, twins_of(found.name), only)
+        return predict(case, there, constrained_refit(there, base), null, twins_of(found.name), only)
 
     names = candidate(found.name).fitted
     free = [(found.name, key) for key in names]

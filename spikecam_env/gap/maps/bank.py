@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.campaign.reading import Campaign
 from spikecam_env.errors import InputError
-from spikecam_env.gap.observe.conditions import KNOWN, Shown, shown
+from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of
 from spikecam_env.gap.statistics import Key, pattern, texture
 from spikecam_env.sensor import SensorModel
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class RateMap:
     """One recording of rates.  rate: (H, W) [spikes/frame], spread within a count."""
 
-    shown: Shown
+    shown: Condition
     rate: Array
 
 
@@ -45,8 +45,8 @@ def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Maps:
     """The rates of a campaign in known, steady light."""
     maps = []
     for r in campaign.recordings:
-        condition = shown(r)
-        if r.rates is not None and condition.kind in KNOWN:
+        condition = condition_of(r)
+        if r.rates is not None and condition.kind in STEADY_KNOWN:
             maps.append(RateMap(condition, spread_evenly(r.rate(), r.frames)))
     if not maps:
         raise InputError(

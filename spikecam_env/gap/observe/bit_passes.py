@@ -9,10 +9,10 @@ from spikecam_env.compiled import njit
 from spikecam_env.streams.bits import by_pixel, ones, times_of
 
 SPARSE = 0.05
-"""Spikes a frame below which a pixel's are gone through one by one."""
+"""Spikes a frame below which a pixel's are visited one by one: faster there, and the same sums."""
 
-ALIKE = 8
-"""Lengths of intervals that are counted one after the other, where a pixel's are no more."""
+FEW_LENGTHS = 8
+"""Different lengths of a pixel's intervals below which each is counted in its own pass: faster, the same counts."""
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
@@ -100,7 +100,7 @@ def _count(d, least, most, lengths):  # type: ignore[no-untyped-def]
 
     lengths: (4, n), for intervals in turn: a count that is added to at once again waits for itself.
     """
-    if most - least < ALIKE:
+    if most - least < FEW_LENGTHS:
         for length in range(least, most + 1):
             count = 0
             for i in range(d.size):

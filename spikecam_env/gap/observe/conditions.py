@@ -14,21 +14,23 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, CampaignRecording
-from spikecam_env.gap.campaign.recording_kinds import Planned
+from spikecam_env.gap.acquisition.recording_kinds import Planned
 from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.sensor import Keyframes
 
-KNOWN = ("dark", "flat", "picture")
-"""Steady light that was measured: what a unit can be refitted by."""
+STEADY_KNOWN = ("dark", "flat", "picture")
+"""Kinds of steady light that was measured: a unit is refitted by these."""
 
-STATIC = (*KNOWN, "unknown")
+STEADY = (*STEADY_KNOWN, "unknown")
+"""Kinds of steady light."""
 
-LABELS = 2e-5
-"""Relative error that labels of light, and first-order laws of it, are known to: a standard deviation."""
+LABEL_ERROR = 2e-5
+"""Standard deviation, relative, to which labels of light are exact, and first-order laws of it: an assumption
+(docs/gap.md, "What is not claimed")."""
 
 
 @dataclass(frozen=True)
-class Shown:
+class Condition:
     """One recording's conditions.  level: mean radiance; light: None where unknown; use: "fit" or "holdout"."""
 
     name: str
@@ -51,25 +53,25 @@ class Shown:
         return self.light.radiance[0].reshape(-1).astype(np.float64)
 
 
-def shown(recording: CampaignRecording) -> Shown:
-    """What kind of light a recording was taken in."""
+def condition_of(recording: CampaignRecording) -> Condition:
+    """The conditions of a recording, and which kind of light they are."""
     light = recording.light()
     if light is None:
-        return Shown(recording.name, "unknown", np.nan, None, recording.frames, recording.use, recording.v_d)
-    return _classed(recording.name, light, recording.frames, recording.use, recording.v_d)
+        return Condition(recording.name, "unknown", np.nan, None, recording.frames, recording.use, recording.v_d)
+    return _condition(recording.name, light, recording.frames, recording.use, recording.v_d)
 
 
-def planned(design: Sequence[Planned], shape: tuple[int, int], frames: int) -> list[Shown]:
+def planned_conditions(design: Sequence[Planned], shape: tuple[int, int], frames: int) -> list[Condition]:
     """Conditions of recordings that are planned, not made."""
     found = []
     for p in design:
         light = p.light(shape, frames)
         whole = Keyframes(light.frame, np.broadcast_to(light.radiance, (len(light.frame), *shape)))
-        found.append(_classed(p.file_name, whole, frames, p.use, p.v_d))
+        found.append(_condition(p.file_name, whole, frames, p.use, p.v_d))
     return found
 
 
-def _classed(name: str, light: Keyframes, frames: int, use: str, v_d: float | None) -> Shown:
+def _condition(name: str, light: Keyframes, frames: int, use: str, v_d: float | None) -> Condition:
     uniform = bool(np.all(light.radiance == light.radiance[:, :1, :1]))
     steady = bool(np.all(light.radiance == light.radiance[:1]))
     level = float(light.radiance.mean())
@@ -78,10 +80,10 @@ def _classed(name: str, light: Keyframes, frames: int, use: str, v_d: float | No
         light = Keyframes(light.frame[:1], light.radiance[:1])
     else:
         kind = "step" if uniform else "moving"
-    return Shown(name, kind, level, light, frames, use, v_d)
+    return Condition(name, kind, level, light, frames, use, v_d)
 
 
-def observed(campaign: Campaign, conditions: list[Shown], *, progress: bool = False) -> list[Observation | None]:
+def observe_all(campaign: Campaign, conditions: list[Condition], *, progress: bool = False) -> list[Observation | None]:
     """Every recording of spikes in numbers; None for those that are rates only."""
     bar = tqdm(zip(campaign.recordings, conditions, strict=True), "read", len(conditions), disable=not progress)
     return [observe(r.packed(), campaign.shape, film=c.moves) if r.spikes else None for r, c in bar]

@@ -18,23 +18,23 @@ from spikecam_env.streams.packing import unpack_frames
 
 Array = NDArray[np.float64]
 
-STEPS = (1, 4, 16, 64)
-"""k of A_k."""
+DIFFERENCES = (1, 4, 16, 64)
+"""k of the second differences A_k [intervals]: noise of single spikes at 1, slow noise at 64."""
 
-BLOCKS = 16
+TIME_BLOCKS = 16
 """Equal parts of a recording whose counts are kept pixel by pixel."""
 
 BIN = 16
 """Frames of a bin of the film that is kept of a recording with moving light."""
 
 LENGTHS = 64
-"""Intervals are counted by length up to this many frames."""
+"""Longest interval that is counted by its length [frames]."""
 
-FEW = 0.3
-"""Share of pixels below which those with odd intervals are left out where noise of all pixels is asked for."""
+MOST_IRREGULAR = 0.3
+"""Share of pixels below which those with an irregular interval count as few, and are left out of the noise of all."""
 
-LAGS = 3
-"""Lags 0 .. LAGS - 1 [frames] of neighbours' coincidences."""
+FRAME_LAGS = 3
+"""Lags 0 .. FRAME_LAGS - 1 [frames] of neighbours' coincidences."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class Observation:
     times: ends, counts and A_k of each pixel.  variance, covariance: (P,) of intervals, and of successive ones, about
     the pixel's own mean [frames^2]; NaN below 3 intervals.  short, long: (P,) intervals T below 0.6 T - 1 or
     above 1.5 T + 1 of the mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.
-    blocks: (BLOCKS, P) counts.
-    frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (LAGS, 2) spikes of one pixel with its neighbour's,
-    lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
+    blocks: (TIME_BLOCKS, P) counts.
+    frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (FRAME_LAGS, 2) spikes of one pixel with its
+    neighbour's, lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
     late: (F,) sum over the `timed` (F,) intervals that end in a frame of what they are longer than the pixel's mean
     [frames], of pixels without short or long ones; scatter: (F,) of the variances of those pixels' intervals.
     odd: (F,) short and long intervals that end in a frame.
@@ -80,32 +80,34 @@ class Observation:
         return np.where(self.times.count > 1, self.times.rate, self.times.count / self.frames)
 
     @property
-    def struck(self) -> NDArray[np.bool_]:
-        """(P,) pixels with a short or long interval, where they are FEW; none where odd intervals are the rule."""
-        odd: NDArray[np.bool_] = self.short + self.long > 0
-        return odd & (odd.mean() < FEW)
+    def irregular(self) -> NDArray[np.bool_]:
+        """(P,) pixels with a short or a long interval; none where more than MOST_IRREGULAR of all have one."""
+        some: NDArray[np.bool_] = self.short + self.long > 0
+        return some & (some.mean() < MOST_IRREGULAR)
 
 
 def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = False) -> Observation:
     """Reduce (F, ceil(H W / 8)) uint8 bits; film: keep counts in bins of time."""
     pixels = shape[0] * shape[1]
     ends = np.full((pixels, 3), -1, np.int64)
-    square, terms = np.zeros((pixels, len(STEPS))), np.zeros((pixels, len(STEPS)), np.int64)
+    square, terms = np.zeros((pixels, len(DIFFERENCES))), np.zeros((pixels, len(DIFFERENCES)), np.int64)
     moments = np.full((pixels, 4), np.nan)
-    blocks = np.zeros((BLOCKS, pixels), np.int32)
+    blocks = np.zeros((TIME_BLOCKS, pixels), np.int32)
     lengths = np.zeros(LENGTHS + 1, np.int64)
     late, scatter = np.zeros((2, len(packed)))
     timed, odd = np.zeros((2, len(packed)), np.int32)
     words = as_words(packed)
-    through_pixels(words, np.array(STEPS), ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd)
+    through_pixels(
+        words, np.array(DIFFERENCES), ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd
+    )
     by_row = _rows_in_words(packed, shape)
     row = np.zeros((len(packed), shape[0]), np.int32)
-    coincidences = np.zeros((LAGS, 2))
+    coincidences = np.zeros((FRAME_LAGS, 2))
     through_frames(by_row, shape[0], row, coincidences)
     count, first, last = ends.T
     return Observation(
         shape,
-        SpikeTimes(len(packed), count, first, last, np.array(STEPS), square, terms),
+        SpikeTimes(len(packed), count, first, last, np.array(DIFFERENCES), square, terms),
         moments[:, 0],
         moments[:, 1],
         np.nan_to_num(moments[:, 2]).astype(np.int64),

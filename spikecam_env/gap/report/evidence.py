@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import drawn
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
-from spikecam_env.gap.unit.refit import BaseFit, measured_base
+from spikecam_env.gap.unit.refit import BaseFit, free_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.floating[Any]]
@@ -73,7 +73,7 @@ class Maps:
 class Take(NamedTuple):
     """One recording: its conditions, and what was observed."""
 
-    shown: Shown
+    shown: Condition
     measured: Observation
     before: Observation
     after: Observation | None
@@ -103,8 +103,8 @@ def evidence_of(
         before=first,
         after=last,
         measured_base=case.base,
-        before_base=measured_base(list(first), list(case.conditions)),
-        after_base=measured_base(list(last), list(case.conditions)) if last else None,
+        before_base=free_refit(list(first), list(case.conditions)),
+        after_base=free_refit(list(last), list(case.conditions)) if last else None,
         again=again,
         drawn_before=None if case.scenes_only else drawn(before, case.base, case.shape, case.seed),
         drawn_after=drawn(after, case.base, case.shape, case.seed) if after and not case.scenes_only else None,

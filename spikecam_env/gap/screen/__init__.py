@@ -1,1 +1,1 @@
-"""Which candidates are worth a fit, by templates of what each does."""
+"""Screening: which candidates are fitted, and from which parameters, by templates made beforehand."""

@@ -1,6 +1,6 @@
-"""Which candidates are worth a fit: templates scaled to the measurement, and what they would leave of it.
+"""Screening: templates scaled to the measurement, and the misfit that each candidate would leave.
 
-The fit that follows simulates the campaign at hand and rests on no template.
+The fit that follows simulates the campaign at hand and uses no template.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from spikecam_env.gap.candidates.table import candidate, of_motion
 from spikecam_env.gap.compare.distance import misfit
 from spikecam_env.gap.compare.prediction import TOLERANCE, Null, of_a_pair, pooled
 from spikecam_env.gap.compare.step import scale_of
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.screen.templates import Template, Templates
 from spikecam_env.gap.statistics import Key
 from spikecam_env.sensor import CATALOGUE
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """A candidate as its template sees it.  start: parameters to fit from.  misfit: what it would leave.
+    """A candidate by its template.  start: parameters to fit from.  misfit: that it would leave.
 
     expected: (S,) change of the statistics there.  white: s^2 of the unit there, over the refit's.
     """
@@ -41,13 +41,13 @@ class Screened:
 
 def screen(
     templates: Templates,
-    conditions: Sequence[Shown],
+    conditions: Sequence[Condition],
     null: Null,
     measured: Array,
     names: Sequence[str],
     line_hz: float | None = None,
 ) -> list[Screened]:
-    """Candidates by what their best template of each shape, scaled, would leave unexplained; least first.
+    """Candidates by the misfit that their best template of each shape, scaled, would leave; least first.
 
     line_hz: frequency of the strongest line of the measured spectra, to start periodic candidates from.
     """
@@ -89,21 +89,21 @@ def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Scree
 
 
 def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
-    """A template of what wanders: its size alone, over all recordings, is by how much statistics scatter."""
+    """A template of an effect that makes statistics scatter: its size, over all recordings, is the scatter's."""
     strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
     size2 = pooled(null.keys, shift**2)
     tried = []
     for factor in np.geomspace(1e-3, 1e3, 100):
         wider = 1.0 + factor * size2
-        price = float(np.sum(null.weight * np.log(wider) * (d != 0)))
-        tried.append((misfit(d / np.sqrt(wider), null.weight) + price, factor))
+        penalty = float(np.sum(null.weight * np.log(wider) * (d != 0)))
+        tried.append((misfit(d / np.sqrt(wider), null.weight) + penalty, factor))
     left, factor = min(tried)
     start = bounded(entry.name, {**entry.parameters, strength: entry.parameters[strength] * factor ** (1 / power)})
     return Screened(entry.name, start, left, np.sqrt(factor * size2) * null.noise)
 
 
-def _places(templates: Templates, conditions: Sequence[Shown], keys: Sequence[Key]) -> NDArray[np.int64]:
-    """Where in the templates each statistic stands: on the recording of its kind whose level is nearest; -1 nowhere."""
+def _places(templates: Templates, conditions: Sequence[Condition], keys: Sequence[Key]) -> NDArray[np.int64]:
+    """(S,) index of each statistic in the templates, by the recording of its kind whose level is nearest; -1: none."""
     nearest: dict[str, str] = {}
     for c in conditions:
         kind = "flat" if c.kind in ("picture", "unknown") else c.kind

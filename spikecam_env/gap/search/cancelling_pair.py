@@ -20,8 +20,8 @@ from spikecam_env.gap.compare.prediction import Null, scaled
 from spikecam_env.gap.compare.step import scale_to
 from spikecam_env.gap.fit.candidate import Fit, as_seen, concerned, predict
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.unit.indirect_inference import shifted
-from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
+from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ def opposed(case: Case, model: SensorModel, null: Null, seen: Array, names: Coll
         return None
     only = concerned(case, PAIR, null, seen, np.full(len(null.keys), np.inf))
     tau_us = START_US
-    bare = base = within(both(case, model, tau_us), within(model, case.base))
+    bare = base = constrained_refit(both(case, model, tau_us), constrained_refit(model, case.base))
     for _ in range(TURNS):
         there = both(case, model, tau_us)
         predicted = predict(case, there, base, null, 1, only)
@@ -51,7 +51,7 @@ def opposed(case: Case, model: SensorModel, null: Null, seen: Array, names: Coll
         if square <= 0:
             return None
         factor = float(np.clip(np.sqrt(square), 1 / FURTHEST, FURTHEST))
-        base, tau_us = shifted(bare, base, factor**2), tau_us * factor
+        base, tau_us = extrapolated_unit(bare, base, factor**2), tau_us * factor
         if 0.8 < factor < 1.25:
             break
     predicted = scaled(null, predicted, factor**2)

@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.alarm import lent, rings
+from spikecam_env.gap.baseline.alarm import is_discrepant, with_held_out_motion
 from spikecam_env.gap.candidates.table import candidate, is_pattern, of_motion
 from spikecam_env.gap.compare.distance import alarmed, freedom_of, judged, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction, law, own_variance
@@ -32,7 +32,7 @@ from spikecam_env.gap.search.cancelling_pair import PAIR, opposed
 from spikecam_env.gap.search.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -120,17 +120,17 @@ def search(
     """
     rounds: list[Round] = []
     given, seen = case, of_fit(case, null, values)
-    now, base, prediction = model, within(model, case.base), null.prediction
+    now, base, prediction = model, constrained_refit(model, case.base), null.prediction
     while len(rounds) < MOST:
         rho = residual(null, seen, prediction)
-        by_fit = alarmed(null, rho, prediction) if rounds else rings(null, seen)
+        by_fit = alarmed(null, rho, prediction) if rounds else is_discrepant(null, seen)
         if rounds and not (by_fit or alarmed(null, residual(null, values, prediction), prediction)):
             break
         price = BESIDE * len(case.conditions)
         if rounds and not case.effort.allows(ANOTHER[len(rounds)], price, needed=len(rounds) == 1):
             break
         if not by_fit:
-            case = lent(case)
+            case = with_held_out_motion(case)
             seen = of_fit(case, null, values)
             rho = residual(null, seen, prediction)
         chance = float(np.sum(null.weight * np.isfinite(seen)))

@@ -1,4 +1,4 @@
-"""The statistics bank: physics statistics in named groups, one file a group; each says which effects it reveals."""
+"""The statistics bank: statistics in named groups, one file a group; each names the effects that it reveals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.conditions import LABELS
+from spikecam_env.gap.observe.conditions import LABEL_ERROR
 from spikecam_env.gap.statistics import (
     clock,
     drift,
@@ -32,7 +32,7 @@ GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
 
 
 FLOORS: dict[tuple[str, str], float] = {
-    ("rates", ""): LABELS,
+    ("rates", ""): LABEL_ERROR,
     ("rates", "scatter"): 0.05,
     ("noise", "variance"): 1e-3,
     ("noise", "lag-1"): 2e-3,
@@ -40,7 +40,7 @@ FLOORS: dict[tuple[str, str], float] = {
     ("noise", "tail"): 0.02,
     ("drift", ""): 2e-5,
     ("drift", "wander"): 0.2,
-    ("drift", "late"): drift.EVEN,
+    ("drift", "late"): drift.CONSTANCY,
     ("drift", "pixel"): 0.02,
     ("spectrum", ""): 0.1,
     ("rows", ""): 0.02,
@@ -58,17 +58,19 @@ FLOORS: dict[tuple[str, str], float] = {
     ("clock", ""): 0.02,
     ("clock", "whole"): 1.0,
 }
-"""How exactly labels and laws can be known at all, whatever the number of spikes, by group and start of the name:
-light labels to 2e-5, the first-order laws of noise to 1 %; counts, on the scale of their root, to 1."""
+"""Floors of the statistics' noise, whatever the number of spikes, by group and start of the name.
+
+Labels and first-order laws are exact to no more: light labels to 2e-5, laws of noise to 1 %; counts, on the scale of
+their root, to 1.  Source: docs/gap.md, "What is not claimed"."""
 
 
 def floor_of(key: Key) -> float:
     """The least noise of a statistic, in its own unit."""
-    return FLOORS.get(alike(key), 0.0)
+    return FLOORS.get(floor_family(key), 0.0)
 
 
-def alike(key: Key) -> tuple[str, str]:
-    """(group, start of the name) that a statistic has its floor in common by: the longest in FLOORS."""
+def floor_family(key: Key) -> tuple[str, str]:
+    """(group, start of the name) of the statistics that share a floor with this one: the longest in FLOORS."""
     return key.group, max((n for g, n in FLOORS if g == key.group and key.name.startswith(n)), key=len, default="")
 
 
@@ -80,8 +82,8 @@ class Key(NamedTuple):
     name: str
 
 
-def bank(reading: Reading) -> dict[Key, float]:
-    """Every statistic of a campaign."""
+def statistics_bank(reading: Reading) -> dict[Key, float]:
+    """Every statistic of a campaign, but for those of the pattern."""
     found = {}
     for i, condition in enumerate(reading.conditions):
         for group, statistics in GROUPS.items():

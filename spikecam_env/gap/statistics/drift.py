@@ -7,30 +7,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.observe.observation import BLOCKS, Observation
-from spikecam_env.gap.statistics.reading import STILL, Reading, log, slope
+from spikecam_env.gap.observe.conditions import STEADY
+from spikecam_env.gap.observe.observation import TIME_BLOCKS, Observation
+from spikecam_env.gap.statistics.reading import Reading, log, slope
 
 PARTS, PIECES = 8, 8
-"""Equal parts of a dark recording whose intervals are compared, and pieces of each that tell how much it scatters."""
+"""Equal parts of a dark recording whose intervals are compared, and pieces of each by which its scatter is measured."""
 
-FEWEST = 100
-"""Intervals of a part that say how long they are there."""
+LEAST_INTERVALS = 100
+"""Intervals, at least, in a part whose mean is taken."""
 
-EVEN = 1e-4
-"""Relative length of intervals by which nothing, but for the dark current, is known to be the same throughout."""
+CONSTANCY = 1e-4
+"""Relative change of intervals' mean length during a recording, up to which all but the dark current is known to be
+constant: the floor of `late`."""
 
-UNEVEN = 2e-4
-"""Scatter of the usual part's mean from which on all are taken in units of that."""
+SCATTER = 2e-4
+"""Relative standard error of the median part's mean, from which lateness is stated in units of that error."""
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """trend: relative change of the array from start to end.  bend: half against half, curvature.  wander: log
     variance of what is left.  pixels: log variance of blocks within a pixel, about what all do.  pixel tail: of
     the one pixel in 50 that varies most, by mean.  late 0 .. 7, in the dark: `lateness`."""
-    if reading.conditions[i].kind not in STILL:
+    if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
-    blocks = o.blocks[:-1] if o.frames % BLOCKS else o.blocks
+    blocks = o.blocks[:-1] if o.frames % TIME_BLOCKS else o.blocks
     total = blocks[:, reading.base.live].sum(axis=1).astype(np.float64)
     if total.sum() < 500:
         return {}
@@ -40,7 +42,7 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     left = relative - found["trend"] * t - found["bend"] * (t**2 - np.mean(t**2))
     found["wander"] = log(float(np.mean(left**2)), 1e-14)
     own = blocks[:, reading.base.live].astype(np.float64)
-    common = own.mean(axis=0) * (1.0 + relative[:, None])  # or a lamp that drifts would be seen once more, squared
+    common = own.mean(axis=0) * (1.0 + relative[:, None])  # without it, a lamp that drifts would count twice
     variance = np.mean((own - common) ** 2, axis=0)
     found["pixels"] = log(float(variance.mean()), 1e-6)
     most = np.sort(variance)[-max(variance.size // 50, 1) :].mean()  # counts are whole: a quantile of them would jump
@@ -51,15 +53,15 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
 def lateness(o: Observation) -> dict[str, float]:
     """How much longer intervals are that end in each part of a recording, against each pixel's own mean; relative.
 
-    In the dark pixels fire seldom but evenly: how long intervals are tells a slow change far better than how many.
-    Noise of whole frames and ripple make the pieces of a part scatter: then it is that much less.
+    In the dark pixels fire seldom but evenly: a slow change shows far better in the length of intervals than in their
+    number.  Where noise of whole frames or ripple makes the pieces of a part scatter, lateness is divided by that.
     """
     usual = o.frames * o.shape[0] * o.shape[1] / max(int(o.frame.sum()), 1)
     begins = np.arange(PARTS * PIECES) * o.frames // (PARTS * PIECES)
     late, timed = (np.add.reduceat(a, begins).reshape(PARTS, PIECES) for a in (o.late / usual, o.timed))
     count = timed.sum(axis=1)
-    known = np.flatnonzero(count >= FEWEST)
+    known = np.flatnonzero(count >= LEAST_INTERVALS)
     mean = late.sum(axis=1) / np.maximum(count, 1)
     own2 = np.sum((late - mean[:, None] * timed) ** 2, axis=1)[known] / count[known] ** 2
-    unit = np.sqrt(1.0 + np.median(own2) / UNEVEN**2) if known.size else 1.0
+    unit = np.sqrt(1.0 + np.median(own2) / SCATTER**2) if known.size else 1.0
     return {f"late {i}": float(mean[i] / unit) for i in known}

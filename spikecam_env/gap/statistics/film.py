@@ -1,6 +1,6 @@
-"""The film that moving light should leave, and what each kind of effect would do to it.
+"""The film that moving light leaves, and its features: the change of it that each kind of effect makes.
 
-Features are made orthogonal in this order, so that each says what those before it cannot: level, square, delay, skew,
+Features are made orthogonal in this order, so that each holds what those before it do not: level, square, delay, skew,
 lag 16 / 64 / 256 / 2000 frames, blur, row, column, bloom.
 """
 
@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import BIN
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes
 
 Pictures = NDArray[np.float32]
@@ -25,9 +26,9 @@ FEATURES = ("level", "square", "delay", "skew", "lag 16", "lag 64", "lag 256", "
 
 @dataclass(frozen=True)
 class Film:
-    """light: (bins, P) collected in each bin at gain 1.  basis: (n, bins P) orthonormal features of it.
+    """light: (bins, P) collected in each bin at gain 1.  basis: (n, bins P) its orthonormal features.
 
-    size: (n,) of each feature before it was scaled, 0 where those before it say the same.
+    size: (n,) of each feature before it was scaled, 0 where those before it span it.
     """
 
     light: Pictures
@@ -35,13 +36,13 @@ class Film:
     size: NDArray[np.float64]
 
 
-def films(conditions: Sequence[Shown], shape: tuple[int, int]) -> dict[str, Film]:
-    """What `statistics` needs of every recording with moving light, worked out once."""
+def films(conditions: Sequence[Condition], shape: tuple[int, int]) -> dict[str, Film]:
+    """The film of every recording with moving light, computed once."""
     found = {}
     for c in conditions:
         if c.kind == "moving" and c.light is not None:
             light = light_film(c.light, c.frames)
-            found[c.name] = Film(light, *features(light, shape))
+            found[c.name] = Film(light, *film_features(light, shape))
     return found
 
 
@@ -66,7 +67,14 @@ def light_film(light: Keyframes, frames: int) -> Pictures:
     return out
 
 
-def features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray[np.float64]]:
+def refitted_film(condition: Condition, base: BaseFit) -> NDArray[np.float64]:
+    """(F // BIN, P) spikes that a refitted unit gives in moving light, at most one a frame."""
+    assert condition.light is not None
+    light = light_film(condition.light, condition.frames).astype(np.float64)
+    return np.minimum(light * base.gain + BIN * base.dark, BIN)
+
+
+def film_features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray[np.float64]]:
     """Orthonormal features (n, bins P) of the nominal camera's film, and how large each was before that."""
     bright = light / BIN
     x = np.minimum(bright, np.float32(1.0))

@@ -1,4 +1,4 @@
-"""Intervals that should not be there: much shorter or longer than the pixel's mean, or of one fixed length.
+"""Irregular intervals: much shorter or longer than the pixel's mean, or of one fixed length.
 
 Reveals missed_spikes (doubled intervals), spurious_spikes (cut ones), afterpulsing (one short length).
 """
@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.statistics.reading import STILL, Reading, root
+from spikecam_env.gap.observe.conditions import STEADY
+from spikecam_env.gap.statistics.reading import Reading, root
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """short, long: intervals below 0.6 T - 1 and above 1.5 T + 1, counted.  length n: intervals of n frames, counted,
     where that is below half the interval of nearly all pixels."""
-    if reading.conditions[i].kind not in STILL:
+    if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
     found = {"short": root(o.short[reading.base.live].sum()), "long": root(o.long[reading.base.live].sum())}

@@ -1,4 +1,4 @@
-"""Moving light: what the refit leaves of the film, projected on what each kind of effect would do to it.
+"""Moving light: the film less that of the refitted unit, projected on the features of `film`.
 
 The expected film x is the integral of gain L(t) + dark, at most a spike a frame; its features are in `film`.
 """

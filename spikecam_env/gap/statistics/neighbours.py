@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from spikecam_env.gap.observe.observation import LAGS
-from spikecam_env.gap.statistics.reading import STILL, Reading
+from spikecam_env.gap.observe.conditions import STEADY
+from spikecam_env.gap.observe.observation import FRAME_LAGS
+from spikecam_env.gap.statistics.reading import Reading
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """across n, down n: coincidences at a lag of n frames over those of independent phases, less one."""
-    if reading.conditions[i].kind not in STILL:
+    if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
     rate = (o.times.count / o.frames).reshape(o.shape)
     found = {}
     for axis, name in enumerate(("across", "down")):
         chance = float((rate[:, 1:] * rate[:, :-1]).sum() if axis == 0 else (rate[1:] * rate[:-1]).sum())
-        for lag in range(LAGS):
+        for lag in range(FRAME_LAGS):
             expected = 2.0 * chance * (o.frames - lag)
             if expected > 200:
                 found[f"{name} {lag}"] = float(o.coincidences[lag, axis] / expected - 1.0)

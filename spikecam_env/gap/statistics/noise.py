@@ -9,22 +9,23 @@ from __future__ import annotations
 import numpy as np
 
 from spikecam_env.calibration.jitter import second_difference
-from spikecam_env.gap.observe.observation import STEPS
-from spikecam_env.gap.statistics.reading import STILL, Reading, log
+from spikecam_env.gap.observe.conditions import STEADY
+from spikecam_env.gap.observe.observation import DIFFERENCES
+from spikecam_env.gap.statistics.reading import Reading, log
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """variance: mean over pixels of interval variance less f(1-f), over T.  lag-1: pooled serial correlation.
 
     A_k: measured over expected from the refitted jitter, less one.  tail: pixels with much larger A_16 than most.
-    Of pixels whose intervals are in order: single events are counted as such (`intervals`), and are no noise.
+    Of pixels without irregular intervals: single events are counted as such (`intervals`), and are no noise.
     """
-    if reading.conditions[i].kind not in STILL:
+    if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
     rate = o.times.rate
     interval = 1.0 / np.where(rate > 0, rate, np.nan)
-    good = (o.times.count > 8) & reading.base.live & np.isfinite(o.variance) & (rate < 0.95) & ~o.struck
+    good = (o.times.count > 8) & reading.base.live & np.isfinite(o.variance) & (rate < 0.95) & ~o.irregular
     if good.sum() < 100:
         return {}
     fraction = interval % 1.0
@@ -36,7 +37,7 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
         "lag-1": float(o.covariance[good].sum() / max(o.variance[good].sum(), 1e-12)),
     }
     white = reading.base.white
-    for j, k in enumerate(STEPS):
+    for j, k in enumerate(DIFFERENCES):
         terms = np.where(good, o.times.terms[:, j], 0)
         if terms.sum() < 2000:
             continue

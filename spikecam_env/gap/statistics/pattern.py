@@ -15,13 +15,13 @@ from spikecam_env.robust import LOWER, UPPER
 Array = NDArray[np.float64]
 
 NARROW = 5e-4
-"""Relative spread below which there is no pattern, but the noise of rates read between whole frames."""
+"""Relative spread below which a map has no pattern: the error of rates read between whole frames."""
 
-FAR = (5, 10, 20, 40)
-"""Spreads above the median beyond which pixels are counted: no Gaussian reaches there."""
+OUTLYING = (5, 10, 20, 40)
+"""Spreads above the median beyond which pixels are counted; of a Gaussian one in 3 million lies beyond 5."""
 
-BLOCKS = 8
-"""Blocks along each side of the array."""
+PATCHES_A_SIDE = 8
+"""Patches along each side of the array."""
 
 
 def statistics(rate: Array) -> dict[str, float]:
@@ -31,7 +31,7 @@ def statistics(rate: Array) -> dict[str, float]:
     than those of a Gaussian, in spreads; top: the largest.  over 5, 10, 20, 40: pixels so many spreads above the
     median, counted; silent: those below a tenth of it.
     rows, columns: log variance of their means over a pixel's.  bowl, across, down: radial slope and gradients.
-    near: correlation of neighbours.  patch: the mean of a block of pixels that is furthest off, in its standard errors.
+    near: correlation of neighbours.  patch: the mean of a patch of pixels that is furthest off, in its standard errors.
     Of a map that is NARROW: its width, as if it were that, and silent.
     """
     flat = rate.reshape(-1)
@@ -58,7 +58,7 @@ def statistics(rate: Array) -> dict[str, float]:
         "low tail": float(-low / width),
         "high tail": log(max(high / width, 0.1)),
         "top": log(max(float(relative.max()) / width, 0.1)),
-        **{f"over {n}": root(float((relative > n * width).sum())) for n in FAR},
+        **{f"over {n}": root(float((relative > n * width).sum())) for n in OUTLYING},
         "silent": silent,
         "rows": log(float(inside.mean(axis=1).var()) / variance * columns),
         "columns": log(float(inside.mean(axis=0).var()) / variance * rows),
@@ -66,13 +66,13 @@ def statistics(rate: Array) -> dict[str, float]:
         "across": slope(inside.reshape(-1), x.reshape(-1)) * columns / width,
         "down": slope(inside.reshape(-1), y.reshape(-1)) * rows / width,
         "near": float((across + down) / 2),
-        "patch": log(max(_furthest_block(inside) / width, 0.1)),
+        "patch": log(max(_furthest_patch(inside) / width, 0.1)),
     }
 
 
-def _furthest_block(values: Array) -> float:
-    """The block mean that is furthest from the median of block means, times the root of a block's pixels."""
-    high, wide = (max(n // BLOCKS, 1) for n in values.shape)
+def _furthest_patch(values: Array) -> float:
+    """The patch mean that is furthest from the median of patch means, times the root of a patch's pixels."""
+    high, wide = (max(n // PATCHES_A_SIDE, 1) for n in values.shape)
     rows, columns = values.shape[0] // high, values.shape[1] // wide
     means = values[: rows * high, : columns * wide].reshape(rows, high, columns, wide).mean(axis=(1, 3))
     return float(np.abs(means - np.median(means)).max() * np.sqrt(high * wide))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.observe.conditions import KNOWN
+from spikecam_env.gap.observe.conditions import STEADY_KNOWN
 from spikecam_env.gap.statistics.reading import Reading, log, slope
 
 
@@ -18,9 +18,9 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     corners: mean residual of each quarter of the array less the array's.
     """
     condition = reading.conditions[i]
-    if condition.kind not in KNOWN:
+    if condition.kind not in STEADY_KNOWN:
         return {}
-    order = [j for j, c in enumerate(reading.conditions) if c.kind in KNOWN].index(i)
+    order = [j for j, c in enumerate(reading.conditions) if c.kind in STEADY_KNOWN].index(i)
     residual = reading.base.residual[order]
     known = np.isfinite(residual) & reading.base.live
     if known.sum() < 100:

@@ -1,4 +1,4 @@
-"""What a statistic may look at: a campaign's observations, its conditions, and its own base refit."""
+"""The input of every statistic: a campaign's observations, its conditions, and its own base refit."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.statistics.film import Film
 from spikecam_env.gap.unit.refit import BaseFit
 
 Array = NDArray[np.float64]
-
-STILL = ("dark", "flat", "picture", "unknown")
-"""Kinds of recording with steady light."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +24,7 @@ class Reading:
     """
 
     observations: Sequence[Observation]
-    conditions: Sequence[Shown]
+    conditions: Sequence[Condition]
     base: BaseFit
     films: Mapping[str, Film]
 
@@ -45,7 +42,7 @@ def root(count: float) -> float:
 
 
 def log(value: float, floor: float = 1e-12) -> float:
-    """Natural logarithm of a positive quantity; nothing counts as `floor`."""
+    """Natural logarithm of a quantity, at least `floor`."""
     return float(np.log(max(value, floor)))
 
 

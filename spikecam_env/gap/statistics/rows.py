@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.statistics.reading import STILL, Reading, log
+from spikecam_env.gap.observe.conditions import STEADY
+from spikecam_env.gap.statistics.reading import Reading, log
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """row n, column n: log variance in time of a row's (column's) spikes in n frames less the array's share."""
-    if reading.conditions[i].kind not in STILL:
+    if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
     if o.frame.sum() < 500:
@@ -18,11 +19,11 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     found = {}
     for name, lines in (("row", o.row), ("column", o.column)):
         for n in (1, 16):
-            found[f"{name} {n}"] = log(_common(lines, n), 1e-9)
+            found[f"{name} {n}"] = log(_common_variance(lines, n), 1e-9)
     return found
 
 
-def _common(lines: NDArray[np.int32], frames: int) -> float:
+def _common_variance(lines: NDArray[np.int32], frames: int) -> float:
     whole = len(lines) // frames * frames
     binned = lines[:whole].reshape(-1, frames, lines.shape[1]).sum(axis=1).astype(np.float64)
     binned -= binned.mean(axis=0)

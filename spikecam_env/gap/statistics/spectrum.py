@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.statistics.reading import STILL, Reading, log
+from spikecam_env.gap.observe.conditions import STEADY
+from spikecam_env.gap.statistics.reading import Reading, log
 
 BANDS = 8
 
 _SIDE = 25
-"""Bins to either side that a line has to stand above."""
+"""Bins to either side whose median a line is compared with."""
 
 
 def spectrum(frame: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -39,7 +40,7 @@ def bands(frames: int) -> NDArray[np.int64]:
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """band n: log power.  line: log of the strongest bin over what is around it, below a quarter of the rate."""
-    if reading.conditions[i].kind not in STILL:
+    if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
     if o.frame.sum() < 500:
@@ -54,7 +55,7 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
 def strongest_line(power: NDArray[np.float64]) -> tuple[int, float]:
     """(bin, power over the median of its neighbourhood) of the strongest bin above the slowest two.
 
-    The neighbourhood is the louder of the two sides: where dim pixels' own rates begin, power rises a thousandfold in
+    The neighbourhood is the side of more power: where dim pixels' own rates begin, power rises a thousandfold in
     ten bins, and the first of them would stand out as a line.
     """
     low = power[3 : max(len(power) // 2, 8)]

@@ -16,10 +16,16 @@ from spikecam_env.robust import LOWER, UPPER, scatter
 Array = NDArray[np.float64]
 
 QUANTILES = (0.001, 0.01, 0.1, 0.25, 0.75, 0.9, 0.99, 0.999)
-LAGS = (2, 8, 32)
-FIELDS = 3
+"""Of the rates, over their median."""
+
+DISTANCES = (2, 8, 32)
+"""Of two pixels whose correlation is taken [pixels]."""
+
+FIELDS_A_SIDE = 3
+"""Fields along each side of the array."""
+
 _WINDOW = 5
-"""Side of a pixel's neighbourhood."""
+"""Side of a pixel's neighbourhood [pixels]."""
 
 
 def statistics(rate: Array) -> dict[str, float]:
@@ -43,11 +49,11 @@ def statistics(rate: Array) -> dict[str, float]:
         found[f"grain {q:g}"] = log(abs(float(np.quantile(grain, q))) / width)
     inside = np.clip(relative, -6 * width, 6 * width)
     inside = inside - inside.mean()
-    for r, rows in enumerate(np.array_split(inside, FIELDS)):
-        for c, part in enumerate(np.array_split(rows, FIELDS, axis=1)):
+    for r, rows in enumerate(np.array_split(inside, FIELDS_A_SIDE)):
+        for c, part in enumerate(np.array_split(rows, FIELDS_A_SIDE, axis=1)):
             found[f"field {r} {c}"] = float(part.mean())
     variance = max(float(np.mean(inside**2)), 1e-18)
-    for n in LAGS:
+    for n in DISTANCES:
         if min(rate.shape) > 2 * n:
             found[f"across {n}"] = float((inside[:, n:] * inside[:, :-n]).mean()) / variance
             found[f"down {n}"] = float((inside[n:] * inside[:-n]).mean()) / variance

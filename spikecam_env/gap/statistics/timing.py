@@ -1,6 +1,7 @@
 """How late the array's spikes come, frame by frame, against each pixel's own mean interval.
 
-Many spikes tell the time of a frame better than their number: pixels count regularly, whatever their phases.
+The mean lateness of many spikes measures a frame's time better than their number: pixels fire regularly, whatever
+their phases.
 Reveals common_threshold_noise and clock_jitter, which move all spikes of a frame together.
 """
 
@@ -8,22 +9,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.statistics.reading import STILL, Reading, log
+from spikecam_env.gap.observe.conditions import STEADY
+from spikecam_env.gap.statistics.reading import Reading, log
 
-LONGEST = 1.5
-"""Intervals of the slowest pixels that count, over the usual one."""
+SLOWEST_INTERVAL = 1.5
+"""Interval of the slowest pixels that count, over the mean interval; the statistic begins after so long."""
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
     """late: log variance over frames of the mean lateness of their spikes, over that of spikes on their own.
 
-    next: correlation of one frame's lateness with the next one's.  Of pixels without odd intervals, where most are, and
-    once an interval of any of them may have ended: in the first frames only short ones have.
+    next: correlation of one frame's lateness with the next one's.  Of pixels without irregular intervals,
+    where these are most, and after SLOWEST_INTERVAL: in the first frames only short intervals have ended.
     """
-    if reading.conditions[i].kind not in STILL:
+    if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
-    begins = min(int(np.ceil(LONGEST * o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9))), o.frames // 4)
+    begins = min(
+        int(np.ceil(SLOWEST_INTERVAL * o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9))), o.frames // 4
+    )
     enough = (o.timed >= 10) & (np.arange(o.frames) >= begins)
     if enough.sum() < 500 or o.timed.sum() < 0.5 * o.frame.sum():
         return {}

@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.conditions import KNOWN, Shown
+from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.statistics import Key, bank, pattern_bank
+from spikecam_env.gap.statistics import Key, pattern_bank, statistics_bank
 from spikecam_env.gap.statistics.film import Film, films
 from spikecam_env.gap.statistics.reading import Reading
 from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.gap.twins.simulate import FIRST
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
-from spikecam_env.gap.unit.refit import BaseFit, measured_base
+from spikecam_env.gap.unit.refit import BaseFit, free_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Case:
     """
 
     shape: tuple[int, int]
-    conditions: tuple[Shown, ...]
+    conditions: tuple[Condition, ...]
     observations: tuple[Observation, ...]
     films: Mapping[str, Film]
     base: BaseFit
@@ -46,7 +46,7 @@ class Case:
     @property
     def scenes_only(self) -> bool:
         """Whether no light is known: response and dark level cannot be told from the scene."""
-        return not any(c.kind in KNOWN for c in self.conditions)
+        return not any(c.kind in STEADY_KNOWN for c in self.conditions)
 
     def use(self, recording: str) -> str:
         """fit or holdout."""
@@ -61,7 +61,7 @@ class Case:
         held = np.array([self.use(k.recording) == "holdout" for k in keys], bool)
         return held if held.any() else np.ones(len(keys), bool)
 
-    def of(self, conditions: Sequence[Shown], observations: Sequence[Observation]) -> Case:
+    def of(self, conditions: Sequence[Condition], observations: Sequence[Observation]) -> Case:
         """Other recordings of the same camera, refitted anew."""
         return case_of(self.shape, conditions, observations, self.seed, self.jobs, self.frame_rate_hz)
 
@@ -76,7 +76,7 @@ class Twin:
 
 def case_of(
     shape: tuple[int, int],
-    conditions: Sequence[Shown],
+    conditions: Sequence[Condition],
     observations: Sequence[Observation],
     seed: int = 0,
     jobs: int = 1,
@@ -84,9 +84,9 @@ def case_of(
 ) -> Case:
     """Refit and statistics of a measurement."""
     moving = films(conditions, shape)
-    base = measured_base(list(observations), list(conditions))
+    base = free_refit(list(observations), list(conditions))
     reading = Reading(observations, conditions, base, moving)
-    statistics = {**bank(reading), **pattern_bank(reading)}
+    statistics = {**statistics_bank(reading), **pattern_bank(reading)}
     return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs, frame_rate_hz)
 
 
@@ -118,11 +118,11 @@ def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequen
     conditions = [case.conditions[i] for i in which]
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)
-    own = measured_base(observations, conditions) if rests_on(case) <= set(which) else None
-    return Twin(bank(Reading(observations, conditions, own or refit, case.films)), own)
+    own = free_refit(observations, conditions) if rests_on(case) <= set(which) else None
+    return Twin(statistics_bank(Reading(observations, conditions, own or refit, case.films)), own)
 
 
 def rests_on(case: Case) -> set[int]:
     """Recordings that the base refit rests on: of use fit and of known light, or where none is, of unknown scenes."""
-    known = {i for i, c in enumerate(case.conditions) if c.kind in KNOWN and c.use == "fit"}
+    known = {i for i, c in enumerate(case.conditions) if c.kind in STEADY_KNOWN and c.use == "fit"}
     return known or {i for i, c in enumerate(case.conditions) if c.kind == "unknown"}

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.statistics import Key, pattern
 from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
 from spikecam_env.gap.unit.refit import BaseFit, responds
-from spikecam_env.gap.unit.traps import drawn_traps, level_of
+from spikecam_env.gap.unit.traps import drawn_traps, trap_level
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
 
@@ -32,7 +32,7 @@ WITHIN = (0.6, 1.67)
 
 
 def drawn_banks(
-    model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], count: int, seed: int
+    model: SensorModel, base: BaseFit, shown: Sequence[Condition], shape: tuple[int, int], count: int, seed: int
 ) -> list[dict[Key, float]]:
     """Pattern statistics of `count` units of the model, at the measured unit's mean response, dark level and noise.
 
@@ -87,7 +87,7 @@ def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) 
 
 
 def _bank(
-    model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], seed: int
+    model: SensorModel, base: BaseFit, shown: Sequence[Condition], shape: tuple[int, int], seed: int
 ) -> dict[Key, float]:
     gain, dark = drawn(model, base, shape, seed)
     charge = drawn_traps(model, shape, seed)
@@ -96,7 +96,7 @@ def _bank(
     for c in shown:
         if c.kind not in ("dark", "flat") or c.light is None:
             continue
-        rate = gain * c.picture + dark + level_of(model, charge, c.frames, rng)
+        rate = gain * c.picture + dark + trap_level(model, charge, c.frames, rng)
         spikes = np.maximum(rate * c.frames, 1.0)
         noise = np.sqrt(base.white / spikes + 1.0 / (6.0 * c.frames**2))  # first and last spike, each read to a frame
         phase = phases.random(rate.size)

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.conditions import LABELS, Shown
+from spikecam_env.gap.observe.conditions import LABEL_ERROR, Condition
 from spikecam_env.gap.observe.observation import Observation, observe
-from spikecam_env.gap.unit.refit import BaseFit, unit_of
+from spikecam_env.gap.unit.conversion import unit_from_refit
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.streams import pack_frames
@@ -24,7 +25,7 @@ FIRST = 17
 def simulate(
     model: SensorModel,
     base: BaseFit,
-    conditions: Sequence[Shown],
+    conditions: Sequence[Condition],
     shape: tuple[int, int],
     seed: int,
     takes: Sequence[int] | None = None,
@@ -33,7 +34,7 @@ def simulate(
 
     takes: number of each recording, by default in order; the same number and seed give the same draws.
     """
-    unit = unit_of(model, base, shape)
+    unit = unit_from_refit(model, base, shape)
     return [
         observe(expose(model, as_known(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
         for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
@@ -41,7 +42,7 @@ def simulate(
 
 
 def expose(
-    model: SensorModel, unit: Unit, condition: Shown, shape: tuple[int, int], seed: int, take: int
+    model: SensorModel, unit: Unit, condition: Condition, shape: tuple[int, int], seed: int, take: int
 ) -> NDArray[np.uint8]:
     """(F, P/8) bits of one recording in known light."""
     sensor = SpikeSensor(at_any_phase(model, seed, take), shape, seed, engine="auto", take=take, unit=unit, threads=1)
@@ -68,7 +69,7 @@ def as_known(unit: Unit, seed: int, take: int) -> Unit:
         return unit
     rng = np.random.default_rng([seed, take, 4])
     grains = rng.uniform(-0.5, 0.5) if unit.dark.min() >= 1.0 / GRAINS else 0.0
-    return replace(unit, gain=unit.gain * (1.0 + LABELS * rng.standard_normal()), dark=unit.dark + grains / GRAINS)
+    return replace(unit, gain=unit.gain * (1.0 + LABEL_ERROR * rng.standard_normal()), dark=unit.dark + grains / GRAINS)
 
 
 def at_any_phase(model: SensorModel, seed: int, take: int) -> SensorModel:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import plausible_rates
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.twins.simulate import simulate
 from spikecam_env.gap.twins.workers import at_once
@@ -38,7 +38,7 @@ _TURNS = 6
 def simulate_seen(
     model: SensorModel,
     base: BaseFit,
-    conditions: Sequence[Shown],
+    conditions: Sequence[Condition],
     seen: Sequence[Observation],
     shape: tuple[int, int],
     seed: int,
@@ -61,7 +61,7 @@ def simulate_seen(
 
 
 def simulate_scene(
-    model: SensorModel, base: BaseFit, scene: Shown, seen: Observation, shape: tuple[int, int], seed: int, take: int
+    model: SensorModel, base: BaseFit, scene: Condition, seen: Observation, shape: tuple[int, int], seed: int, take: int
 ) -> Observation:
     """One recording of an unknown scene, lit so that its pixels fire as in `seen`."""
     wanted = likely_rates(seen, base.white, np.random.default_rng([seed, take]))

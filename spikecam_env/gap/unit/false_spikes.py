@@ -1,7 +1,7 @@
-"""False spikes in a drawn unit: what they do to the rates of its slowest pixels.
+"""False spikes in a drawn unit: they change the rates that are read of its slowest pixels.
 
-A rate is read between a pixel's first spike and its last.  Where one of two is false, it is of nothing but how far they
-lie apart: few units have such a pixel, and it is far out in the pattern of all.
+A rate is read between a pixel's first spike and its last.  Where one of only two spikes is false, the rate is that of
+their distance: few units have such a pixel, and it lies far out in the pattern.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ Array = NDArray[np.float64]
 
 
 def false_spikes_of(model: SensorModel) -> SpuriousSpikes | None:
-    """The model's spurious spikes."""
+    """The model's spurious spikes, or None."""
     return next((e for e in model.effects if isinstance(e, SpuriousSpikes)), None)
 
 
 def read_with_false_spikes(
     model: SensorModel, read: Array, rate: Array, phase: Array, frames: int, rng: np.random.Generator
 ) -> Array:
-    """(P,) rates as read from a recording, `read`, where a model reports spikes that were none as well.
+    """(P,) rates as read from a recording, `read`, with the spurious spikes that a model adds.
 
     rate: (P,) spikes a frame.  phase: (P,) share of an interval that had passed when the recording began.
     """
     spurious = false_spikes_of(model)
     if spurious is None:
         return read
-    struck = rng.poisson(spurious.probability * frames, rate.size)
-    at = np.flatnonzero(struck)
-    more, rate, phase = struck[at], np.maximum(rate[at], 1e-12), phase[at]
+    false = rng.poisson(spurious.probability * frames, rate.size)
+    at = np.flatnonzero(false)
+    more, rate, phase = false[at], np.maximum(rate[at], 1e-12), phase[at]
     lowest = frames * (1.0 - rng.random(at.size) ** (1.0 / more))
     others = (frames - lowest) * rng.random(at.size) ** (1.0 / np.maximum(more - 1, 1))
     highest = lowest + np.where(more > 1, others, 0.0)

@@ -1,6 +1,7 @@
-"""The unit under an effect: moved so that with it the camera is refitted as it was measured.
+"""The unit under an effect, by indirect inference: its twins are refitted as the measurement was.
 
-Indirect inference: what an effect does to a refit, the unit of its twins has to undo, or it would borrow from the unit.
+An effect biases the refit.  The unit of its twins is moved by as much the other way; else an effect would be fitted
+with a unit that has taken up a part of it.  Source: Gourieroux, Monfort and Renault, "Indirect inference", 1993.
 """
 
 from __future__ import annotations
@@ -11,28 +12,30 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-HIDDEN = 0.5
-"""Share of a refit's s^2 that is the unit's own, below which it stays: beside so much noise of an effect, the refit of
-twins does not tell it (`fit.joint` does, by all statistics)."""
+IDENTIFIABLE = 0.5
+"""Share of a refit's s^2 that is the unit's own, below which the unit's stays: beside so much noise of an effect the
+refits of twins do not identify it (`fit.joint` does, by all statistics)."""
 
-STILL = 3e-4
-"""Relative move of a unit's gain up to which its twins say what an effect does: where pixels saturate, statistics are
-not those of a unit so much brighter, less what that adds."""
+CONVERGED = 3e-4
+"""Relative change of a unit's median gain up to which it need not be simulated again.  Beyond, a unit so much brighter
+has other statistics where pixels saturate.  A thirtieth of what four kicks of 0.0025 of crosstalk add to a rate
+(`tests/gap/fit/test_candidate.py`)."""
 
-FURTHEST = 4.0
-"""Times as far that a unit is shifted at once for a stronger effect: a straight line leads nowhere."""
+MOST_EXTRAPOLATED = 4.0
+"""Times as far as it was inferred that a unit is extrapolated at once for a stronger effect: statistics are
+in proportion so far (`python -m benchmarks.in_proportion`)."""
 
 
-def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
-    """Indirect inference: shift the unit `used` so that its twins, refitted as `simulated`, are refitted as `wanted`.
+def inferred_unit(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
+    """A step of indirect inference: the unit `used`, shifted by `wanted` less its twins' refits, `simulated`.
 
-    The shift of a pixel is a smooth function of its own response and dark level: pixel by pixel it would be tuned to
-    the noise of these very twins.  Where an effect is so strong that most pixels of the twins fall silent, it stays.
+    The shift of a pixel is a smooth function of its own response and dark level: pixel by pixel it would be fitted to
+    the noise of these very twins.  Where most pixels of the twins are silent under a strong effect, the unit stays.
     """
     live = wanted.live & (wanted.gain > 0) & np.all([s.gain > 0 for s in simulated], axis=0)
     if live.mean() < 0.5:
@@ -41,19 +44,19 @@ def settled(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Seque
     gain = used.gain * np.exp(_surface(used, live, ratio))
     dark = used.dark + _surface(used, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))
     white = used.white + wanted.white - float(np.mean([s.white for s in simulated]))
-    white = used.white if used.white < HIDDEN * wanted.white else max(white, 0.1 * used.white)
-    return within(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
+    white = used.white if used.white < IDENTIFIABLE * wanted.white else max(white, 0.1 * used.white)
+    return constrained_refit(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
 
 
-def is_still(one: BaseFit, other: BaseFit) -> bool:
-    """Whether a unit has moved so little, from one to the other, that twins of it say what an effect does."""
-    return moved_by(one, other) <= STILL
+def has_converged(one: BaseFit, other: BaseFit) -> bool:
+    """Whether a unit has changed so little, from one to the other, that twins of the one stand for the other's."""
+    return gain_change(one, other) <= CONVERGED
 
 
-def moved_by(one: BaseFit, other: BaseFit) -> float:
-    """By how much pixels respond more in one of two units than in the other, relative; the median."""
-    there = (one.gain > 0) & (other.gain > 0)
-    return abs(float(np.median(np.log(other.gain[there] / one.gain[there])))) if there.any() else 0.0
+def gain_change(one: BaseFit, other: BaseFit) -> float:
+    """Relative change of the gain between two units, at least 0: the median over pixels that respond in both."""
+    both = (one.gain > 0) & (other.gain > 0)
+    return abs(float(np.median(np.log(other.gain[both] / one.gain[both])))) if both.any() else 0.0
 
 
 def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Array) -> Array:
@@ -65,12 +68,12 @@ def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Array) -> Array:
     return np.asarray(over @ np.linalg.lstsq(over[known], y)[0], np.float64)
 
 
-def shifted(bare: BaseFit, settled: BaseFit, factor: float) -> BaseFit:
-    """The unit for an effect `factor` times as strong as the one under which `bare` became `settled`; no further than
-    FURTHEST times as far, for it will settle anew.  A pixel whose light tells nothing keeps its gain."""
-    factor = min(factor, FURTHEST)
+def extrapolated_unit(bare: BaseFit, inferred: BaseFit, factor: float) -> BaseFit:
+    """The unit for an effect `factor` times as strong as the one under which `bare` became `inferred`; at most
+    MOST_EXTRAPOLATED times as far, for it is inferred anew.  A pixel without gain in one of them keeps its own."""
+    factor = min(factor, MOST_EXTRAPOLATED)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where((bare.gain > 0) & (settled.gain > 0), settled.gain / bare.gain, 1.0)
-    dark = np.maximum(bare.dark + factor * (settled.dark - bare.dark), 0.0)
-    white = bare.white * (settled.white / bare.white) ** factor if bare.white > 0 else settled.white
-    return replace(settled, gain=bare.gain * ratio**factor, dark=dark, white=white)
+        ratio = np.where((bare.gain > 0) & (inferred.gain > 0), inferred.gain / bare.gain, 1.0)
+    dark = np.maximum(bare.dark + factor * (inferred.dark - bare.dark), 0.0)
+    white = bare.white * (inferred.white / bare.white) ** factor if bare.white > 0 else inferred.white
+    return replace(inferred, gain=bare.gain * ratio**factor, dark=dark, white=white)

@@ -1,6 +1,7 @@
-"""Labels of light in a unit of their own, counted anew: radiance 1 makes the usual pixel fire about once a frame.
+"""The unit of labels: light in another one than nominal is rescaled, so that radiance 1 makes the usual pixel fire
+about once a frame.
 
-What a diagnosis says of anything but light must not depend on the unit that light was labelled in.
+Nothing but light itself may depend on the unit that light was labelled in.
 """
 
 from __future__ import annotations
@@ -9,13 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.gap.unit.usual import unusual
 
 
 def nominal_per_label(base: BaseFit) -> float:
-    """Nominal radiance of 1 of the labels, by the refit: 1 where the median gain is what units differ by, or where no
+    """Nominal radiance of 1 of the labels, by the refit: 1 where the median gain is within the spread of units, or no
     pixel gets brighter in more light.
 
     A power of ten where that is enough: light in thousandths is then as if it had been labelled right, to the bit.
@@ -27,7 +28,7 @@ def nominal_per_label(base: BaseFit) -> float:
     return gain if unusual(gain / decades) else decades
 
 
-def counted_anew(condition: Shown, factor: float) -> Shown:
+def in_nominal_units(condition: Condition, factor: float) -> Condition:
     """A recording's conditions with light in nominal radiance; light that nobody measured stays."""
     if condition.light is None or factor == 1.0:
         return condition
@@ -35,7 +36,7 @@ def counted_anew(condition: Shown, factor: float) -> Shown:
     return replace(condition, level=float(radiance.mean()), light=replace(condition.light, radiance=radiance))
 
 
-def said_of(factor: float, base: BaseFit) -> list[str]:
+def label_unit_note(factor: float, base: BaseFit) -> list[str]:
     """A note on labels whose unit is another than nominal.  base: the refit by the light that was counted anew."""
     if factor == 1.0:
         return []

@@ -1,7 +1,8 @@
-"""The base refit: this unit's own response, dark level and jitter, within the effects that its model has.
+"""The base refit: this unit's own response, dark level and jitter.
 
-A unit's parameters differ from nominal and its fixed pattern is a new draw; neither is a gap.  What the model has no
-effect for stays nominal, so that it shows.  The same refit is made of measured and of simulated recordings.
+A unit's parameters differ from nominal and its fixed pattern is a new draw; neither is a gap.  The free refit gives
+every pixel its own; the constrained one keeps nominal what the model has no effect for, so that it shows.  The same
+refit is made of measured and of simulated recordings.
 """
 
 from __future__ import annotations
@@ -13,31 +14,36 @@ from numpy.typing import NDArray
 
 from spikecam_env.calibration.jitter import fit_jitter
 from spikecam_env.calibration.response import fit_lines, rates_from_times, together
-from spikecam_env.gap.observe.conditions import KNOWN, Shown
-from spikecam_env.gap.observe.observation import STEPS, Observation
-from spikecam_env.gap.unit.traps import less_traps
+from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
+from spikecam_env.gap.observe.observation import DIFFERENCES, Observation
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.unit import PixelArray, Unit, firing_law
 
 Array = NDArray[np.float64]
 
 RESPONSE = ("conversion_gain_spread", "bias_voltage_spread", "capacitor_spread", "vignetting", "row_fixed_pattern",
             "column_fixed_pattern", "dead_pixels")  # fmt: skip
+"""Effects that make pixels' gain differ."""
+
 DARK = ("dark_current", "dark_current_spread", "dark_current_tail", "hot_pixels")
+"""Effects that have a dark level."""
+
 DARK_PATTERN = (*DARK[1:], *RESPONSE)
+"""Effects that make pixels' dark level differ."""
+
 NOISE = ("shot_noise", "reset_noise", "excess_threshold_noise")
-LINES = {"row_fixed_pattern": 1, "column_fixed_pattern": 0}
-"""Offsets of the swing by row and column, and the axis along which they are the same: they change how noisy pixels are,
-too, and not the pattern alone."""
+"""Effects of white noise, s^2 a spike."""
 
-RESTLESS = 3.0
-"""Times the median A_16 from which a pixel is left out of the jitter."""
+UNSEEN_JITTER = 3e-5
+"""s^2 of a unit whose recordings do not show it: that of 33 000 electrons a spike."""
 
-ALIKE = 5.0
-"""Errors within which pixels do not differ."""
+NOISY = 3.0
+"""Times the median relative A_16 from which a pixel is left out of the jitter."""
+
+EQUAL_WITHIN = 5.0
+"""Standard errors from the median up to which a pixel does not differ from most."""
 
 RARE = 0.1
-"""Share of pixels too silent or too bright in a recording, below which they are judged by no line: theirs rests on the
+"""Share of pixels too dark or too bright in a recording, below which these have no residuals: their line rests on the
 other recordings alone, and where the response bends it is another line."""
 
 
@@ -60,24 +66,24 @@ class BaseFit:
     live: NDArray[np.bool_]
 
 
-def measured_base(observations: list[Observation], conditions: list[Shown]) -> BaseFit:
-    """Free refit: every pixel its own line, from static recordings of known light marked "fit".
+def free_refit(observations: list[Observation], conditions: list[Condition]) -> BaseFit:
+    """The free refit: every pixel its own line, from steady recordings of known light of use fit.
 
     Where no light is known, jitter alone: each pixel's line is rate = L.
     """
-    static = [(o, c) for o, c in zip(observations, conditions, strict=True) if c.kind in KNOWN]
+    static = [(o, c) for o, c in zip(observations, conditions, strict=True) if c.kind in STEADY_KNOWN]
     if not static:
         return _of_scenes([o for o, c in zip(observations, conditions, strict=True) if c.use == "fit"] or observations)
     rates = together([rates_from_times([o.times]) for o, _ in static])
     light = np.stack([np.broadcast_to(c.picture, o.times.count.shape) for o, c in static])
     use = np.array([c.use == "fit" for _, c in static])
-    white = jitter_of([o for o, c in static if c.use == "fit"] or [o for o, _ in static])
+    white = pooled_jitter([o for o, c in static if c.use == "fit"] or [o for o, _ in static])
     lines = fit_lines(light, rates, white, use)
     gain, dark = np.nan_to_num(lines.gain), np.nan_to_num(lines.dark)
     expected = gain * light + dark
     unused = rates.saturated | np.isfinite(rates.limit)
-    alike = ~unused[use & (unused.mean(axis=1) < RARE)].any(axis=0)
-    known = ~unused & alike & (expected > 0) & (expected < 0.95)
+    of_all = ~unused[use & (unused.mean(axis=1) < RARE)].any(axis=0)
+    known = ~unused & of_all & (expected > 0) & (expected < 0.95)
     residual = np.where(known, rates.rate / np.where(known, expected, 1.0) - 1.0, np.nan)
     return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, responds(gain))
 
@@ -92,33 +98,34 @@ def _of_scenes(observations: list[Observation]) -> BaseFit:
     one = np.ones(observations[0].times.count.size)
     live = np.all([o.times.count > 1 for o in observations], axis=0)
     nothing = np.zeros((0, one.size))
-    return BaseFit(one, 0.0 * one, 0.0 * one, 0.0 * one, jitter_of(observations), nothing, live)
+    return BaseFit(one, 0.0 * one, 0.0 * one, 0.0 * one, pooled_jitter(observations), nothing, live)
 
 
-def jitter_of(observations: list[Observation]) -> float:
-    """s^2 pooled over static recordings; 3e-5 where nothing can be seen."""
+def pooled_jitter(observations: list[Observation]) -> float:
+    """s^2 pooled over steady recordings; UNSEEN_JITTER where they have too few second differences."""
     rate = np.stack(
-        [np.where((o.times.count / o.frames > 0.9) | restless(o), np.nan, o.times.rate) for o in observations]
+        [np.where((o.times.count / o.frames > 0.9) | noisy_pixels(o), np.nan, o.times.rate) for o in observations]
     )
     square = np.stack([o.times.square for o in observations])
     terms = np.stack([o.times.terms for o in observations]).astype(np.float64)
-    jitter = fit_jitter(np.array(STEPS), square, terms, rate)
-    return jitter.white if jitter else 3e-5
+    jitter = fit_jitter(np.array(DIFFERENCES), square, terms, rate)
+    return jitter.white if jitter else UNSEEN_JITTER
 
 
-def restless(o: Observation) -> NDArray[np.bool_]:
-    """(P,) pixels whose A_16 is far above the others', or with odd intervals: what troubles a few says nothing of the
-    noise of all, and one false spike in a pixel of three hundred is half as much as all noise."""
-    terms = o.times.terms[:, STEPS.index(16)]
+def noisy_pixels(o: Observation) -> NDArray[np.bool_]:
+    """(P,) pixels whose A_16 is far above the others', or with irregular intervals.
+
+    The noise of all is not that of a few: one false spike in a pixel of three hundred is half as much as all noise."""
+    terms = o.times.terms[:, DIFFERENCES.index(16)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = o.times.square[:, STEPS.index(16)] / terms * o.times.rate**2
+        relative = o.times.square[:, DIFFERENCES.index(16)] / terms * o.times.rate**2
     usual = np.nanmedian(np.where(terms > 20, relative, np.nan)) if np.any(terms > 20) else np.inf
-    out: NDArray[np.bool_] = np.where(terms > 20, relative > RESTLESS * usual, False) | o.struck
+    out: NDArray[np.bool_] = np.where(terms > 20, relative > NOISY * usual, False) | o.irregular
     return out
 
 
-def within(model: SensorModel, base: BaseFit) -> BaseFit:
-    """What of a free refit the model has effects for; the rest is nominal, or the same for all pixels."""
+def constrained_refit(model: SensorModel, base: BaseFit) -> BaseFit:
+    """A free refit, constrained to what the model has effects for; the rest is nominal, or the same for all pixels."""
     names = {e.name for e in model.effects}
     gain, dark, white = base.gain, base.dark, base.white
     if not names & set(RESPONSE):
@@ -126,79 +133,17 @@ def within(model: SensorModel, base: BaseFit) -> BaseFit:
     if not names & set(DARK):
         dark = np.zeros_like(dark)
     elif not names & set(DARK_PATTERN):
-        dark = np.full_like(dark, common(dark, base.dark_sd))
+        dark = np.full_like(dark, common_level(dark, base.dark_sd))
     if not names & set(NOISE):
         white = 0.0
     return replace(base, gain=np.maximum(gain, 0.0), dark=np.maximum(dark, 0.0), white=white)
 
 
-def common(values: Array, errors: Array) -> float:
-    """What all pixels have, where most differ by their errors alone: the mean of those; else the median.
+def common_level(values: Array, errors: Array) -> float:
+    """The level of all pixels: the mean of those that differ by their errors alone where most do, else the median.
 
-    Rates are read between whole frames, and alike pixels' lie on a lattice, of which a median is one step.
+    Rates are read between whole frames, and those of equal pixels lie on a lattice, of which a median is one step.
     """
     middle = np.median(values)
-    alike = np.abs(values - middle) <= ALIKE * errors
-    return float(values[alike].mean()) if alike.mean() > 0.5 else float(middle)
-
-
-def unit_of(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
-    """The unit to simulate: N as the model says and the rest of s^2 as reset noise; less is all shot noise.
-
-    Both follow a pixel's swing, as its response lets expect it: N = N0 swing, kappa = sigma / swing.
-    """
-    nominal = PixelArray.nominal(model.circuit, model.frame_rate_hz, shape)
-    names = {e.name: e for e in model.effects}
-    for name in NOISE:
-        if name in names:
-            nominal = names[name].imprint(nominal, np.random.default_rng(0))
-    law = firing_law(nominal)
-    shot = law.shot and base.white > 0
-    inverse = 1.0 / law.electrons[0] if shot else 0.0
-    if "reset_noise" not in names and "excess_threshold_noise" not in names:
-        inverse = base.white if shot else 0.0
-    inverse = min(inverse, base.white)
-    swing = _swings(model, base.gain, shape)
-    reset = max(base.white - inverse, 0.0)
-    more = np.mean(inverse / swing + reset / swing**2) / base.white if base.white > 0 else 1.0
-    electrons = swing * more / inverse if inverse > 0 else law.electrons
-    kappa = np.sqrt(reset / more) / swing
-    dark = less_traps(model, law, base.dark)
-    return replace(law, gain=base.gain, dark=dark, electrons=electrons, kappa=kappa,
-                   swing_V=law.swing_V * swing, shot=inverse > 0).limited()  # fmt: skip
-
-
-def unit_as_base(unit: Unit) -> BaseFit:
-    """A drawn unit in the refit's terms: what a refit without error would find."""
-    white = float(np.mean((1 / unit.electrons if unit.shot else 0.0) + unit.kappa**2))
-    zero = np.zeros_like(unit.gain)
-    return BaseFit(unit.gain, unit.dark, zero, zero, white, np.zeros((0, unit.gain.size)), unit.gain > 0)
-
-
-def _swings(model: SensorModel, gain: Array, shape: tuple[int, int]) -> Array:
-    """(P,) swing of each pixel over nominal, as its response lets expect: of what makes pixels differ by the model, a
-    share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less.
-
-    What all pixels of a row or column share is its offset, where the model has such, and a matter of swing alone.
-    """
-    usual = float(np.median(gain))
-    if usual <= 0:
-        return np.ones_like(gain)
-    names = {e.name for e in model.effects}
-    own, lines = (gain / usual).reshape(shape), np.ones(shape)
-    for name, along in LINES.items():
-        if name in names:
-            line = np.median(own, axis=along, keepdims=True)
-            own, lines = own / np.maximum(line, 1e-9), lines * line
-    return np.asarray(np.clip(lines, 0.5, 2.0) ** -1 * np.clip(own, 0.5, 2.0) ** -_share_of_bias(model)).reshape(-1)
-
-
-def _share_of_bias(model: SensorModel) -> float:
-    """Share of bias in the variance of pixels' response, rows and columns apart."""
-    circuit, spreads = model.circuit, {e.name: e.parameters() for e in model.effects}
-    bias = spreads.get("bias_voltage_spread", {}).get("sigma_V", 0.0) / circuit.swing_V
-    others = np.hypot(
-        spreads.get("conversion_gain_spread", {}).get("sigma", 0.0),
-        spreads.get("capacitor_spread", {}).get("sigma_fF", 0.0) / circuit.capacitance_fF,
-    )
-    return float(bias**2 / (bias**2 + others**2)) if bias > 0 else 0.0
+    equal = np.abs(values - middle) <= EQUAL_WITHIN * errors
+    return float(values[equal].mean()) if equal.mean() > 0.5 else float(middle)

@@ -1,6 +1,6 @@
-"""Traps of random telegraph noise: what they add to the mean level of their pixels, which is part of the pattern.
+"""Traps of random telegraph noise: a trap raises the mean dark level of its pixel, which is part of the fixed pattern.
 
-A refit finds it in the pixels where the camera has its traps.  Twins have theirs elsewhere.
+A refit finds that level in the pixels where the camera has its traps.  Twins have their traps in other pixels.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ Array = NDArray[np.float64]
 
 
 def traps_of(model: SensorModel) -> RandomTelegraphNoise | None:
-    """The model's telegraph noise."""
+    """The model's telegraph noise, or None."""
     return next((e for e in model.effects if isinstance(e, RandomTelegraphNoise)), None)
 
 
-def charge_of(traps: RandomTelegraphNoise, unit: Unit, frame_rate_hz: float) -> Array:
+def trap_charge(traps: RandomTelegraphNoise, unit: Unit, frame_rate_hz: float) -> Array:
     """(P,) charge that a trap brings in its upper state [thresholds/frame]."""
     return np.asarray(traps.amplitude_pA * 1e3 / frame_rate_hz / unit.threshold_fC, np.float64)
 
 
 def less_traps(model: SensorModel, unit: Unit, dark: Array) -> Array:
-    """(P,) dark levels of a refit without what traps added to it; left there, twice as many pixels would have it.
+    """(P,) dark levels of a refit less the traps' mean charge; left there, twice as many pixels would have it.
 
     The pixels of the highest levels are taken for those with a trap; none of them falls below the median.
     """
@@ -34,24 +34,24 @@ def less_traps(model: SensorModel, unit: Unit, dark: Array) -> Array:
     if traps is None:
         return dark
     highest = np.argsort(dark)[dark.size - round(traps.fraction * dark.size) :]
-    less = dark[highest] - charge_of(traps, unit, model.frame_rate_hz)[highest] / 2
+    less = dark[highest] - trap_charge(traps, unit, model.frame_rate_hz)[highest] / 2
     out = dark.copy()
     out[highest] = np.maximum(less, np.median(dark))
     return out
 
 
 def drawn_traps(model: SensorModel, shape: tuple[int, int], seed: int) -> Array:
-    """(P,) `charge_of` the traps of a fresh unit of the model; 0 for pixels without one."""
+    """(P,) `trap_charge` of a fresh unit of the model; 0 for pixels without a trap."""
     traps = traps_of(model)
     if traps is None:
         return np.zeros(shape[0] * shape[1])
     has = np.random.default_rng([seed, 2]).random(shape[0] * shape[1]) < traps.fraction
-    return np.where(has, charge_of(traps, model.draw_unit(shape, seed), model.frame_rate_hz), 0.0)
+    return np.where(has, trap_charge(traps, model.draw_unit(shape, seed), model.frame_rate_hz), 0.0)
 
 
-def level_of(model: SensorModel, charge: Array, frames: int, rng: np.random.Generator) -> Array:
-    """(P,) what traps of so much charge add to the mean level of one recording [thresholds/frame]: the upper state's
-    share of the time is of a beta distribution, with mean 1/2 and the variance of the effect's law."""
+def trap_level(model: SensorModel, charge: Array, frames: int, rng: np.random.Generator) -> Array:
+    """(P,) mean level that traps of such charge add to one recording [thresholds/frame]: the upper state's share of the
+    time is drawn from a beta distribution, with mean 1/2 and the variance of the effect's law."""
     traps = traps_of(model)
     if traps is None:
         return charge

@@ -29,8 +29,8 @@ from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import UNITS
-from spikecam_env.gap.unit.indirect_inference import shifted
-from spikecam_env.gap.unit.refit import BaseFit, within
+from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
@@ -275,7 +275,7 @@ class _OfTwins(_Probe):
         """The score by the statistics that the effect clearly changes at some strength; None where it changes none."""
         count = min(WANDER if self.wanders else count, len(self.null.draws) // 2)
         there = with_effect(self.model, self.name, parameters)
-        bare = within(there, within(self.model, self.case.base))
+        bare = constrained_refit(there, constrained_refit(self.model, self.case.base))
 
         def probe(model: SensorModel, unit: BaseFit) -> Prediction:
             return predict(self.case, model, unit, self.null, count, self.only)
@@ -319,7 +319,7 @@ class _OfTwins(_Probe):
         times = abs(parameters[key] / score.parameters[key]) ** _power(self.name)
         count = min(WANDER if self.wanders else TESTED, len(score.without))
         null = replace(self.null, draws=self.null.draws[:count])
-        unit = shifted(score.bare, score.unit, min(times, 1.0))
+        unit = extrapolated_unit(score.bare, score.unit, min(times, 1.0))
         made = predict(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
         scores, without = (np.array([score.of(d.values) for d in draws]) for draws in (made.draws, null.draws))
         if self.wanders:

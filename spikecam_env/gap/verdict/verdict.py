@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.label_audit import Contradiction
+from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.missing_from_refit import Missing
-from spikecam_env.gap.baseline.off_nominal import Off, with_strengths
+from spikecam_env.gap.baseline.off_nominal import OffNominal, with_strengths
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
@@ -65,7 +65,7 @@ def concluded(
     given: Array,
     values: Array,
     lacking: Sequence[Missing],
-    off: Off,
+    off: OffNominal,
     rounds: Sequence[Round],
     contradictions: Sequence[Contradiction],
     untestable: Sequence[tuple[str, str]],

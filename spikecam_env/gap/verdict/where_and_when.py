@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.observation import BLOCKS
+from spikecam_env.gap.observe.observation import TIME_BLOCKS
 from spikecam_env.gap.statistics.spectrum import spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
 
@@ -98,7 +98,7 @@ def when(case: Case) -> str:
         louder, quieter = max(first_line, second_line), min(first_line, second_line)
         if o.frames >= LEAST_FRAMES and louder > 60 and louder > 6 * quieter:
             votes.append(second_line > first_line)
-        blocks = o.blocks[:-1] if o.frames % BLOCKS else o.blocks
+        blocks = o.blocks[:-1] if o.frames % TIME_BLOCKS else o.blocks
         votes += _jump(blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))
     if len(votes) < 2:
         votes = _more(odd, TOGETHER)  # few events a recording, but of all together
@@ -116,7 +116,7 @@ def _more(halves: Array, sigmas: float = SIGMAS) -> list[bool]:
 
 def _jump(blocks: Array, spikes: float) -> list[bool]:
     """A step of the array's rate in the middle that explains nearly all of its change."""
-    whole = blocks[: BLOCKS // 2 * 2] / blocks.mean()
+    whole = blocks[: TIME_BLOCKS // 2 * 2] / blocks.mean()
     first, second = whole[: len(whole) // 2], whole[len(whole) // 2 :]
     step = float(second.mean() - first.mean())
     left = float(np.sqrt(np.mean(np.concatenate([first - first.mean(), second - second.mean()]) ** 2)))

@@ -13,7 +13,7 @@ from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.result import Gap
 from spikecam_env.gap.twins.simulate import expose
-from spikecam_env.gap.unit.refit import unit_of
+from spikecam_env.gap.unit.conversion import unit_from_refit
 from spikecam_env.gap.verdict.verdict import grounded
 from spikecam_env.streams import unpack_frames
 
@@ -22,7 +22,7 @@ def test_where_nothing_is_wrong_the_gap_is_its_floor_pattern_and_all():
     """Three units of the model against it: gap and floor on the flat held out, of which a fifth is of the pattern."""
     gaps, floors = [], []
     for seed in (20, 21, 22):
-        law = unit_of(MODEL, unit(MODEL, seed), SHAPE)
+        law = unit_from_refit(MODEL, unit(MODEL, seed), SHAPE)
         packed = {c.name: expose(MODEL, law, c, SHAPE, seed, take) for take, c in enumerate(conditions())}
         case = case_from({name: unpack_frames(bits, SHAPE) for name, bits in packed.items()}, seed)
         null = model_null(case, MODEL, TWINS)

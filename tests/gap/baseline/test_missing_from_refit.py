@@ -9,12 +9,12 @@ import pytest
 from small import SHAPE, effect, recorded, unit
 
 from spikecam_env.gap import Dark, Flat
-from spikecam_env.gap.baseline.missing_from_refit import LEAST_JITTER, missing
-from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.baseline.missing_from_refit import LEAST_JITTER, missing_effects
+from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.twins.case import case_of
 from spikecam_env.gap.twins.simulate import expose
-from spikecam_env.gap.unit.refit import unit_of
+from spikecam_env.gap.unit.conversion import unit_from_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 NAMES = tuple(CATALOGUE)
@@ -23,7 +23,7 @@ PIXELS = SHAPE[0] * SHAPE[1]
 
 
 def lacking(model: SensorModel, assumed: SensorModel = IDEAL, names=NAMES):
-    found = {m.effect.name: m for m in missing(recorded(model=model), assumed, names)}
+    found = {m.effect.name: m for m in missing_effects(recorded(model=model), assumed, names)}
     for m in found.values():
         print(f"{m.effect} +- {m.sd:.2g}; also {m.also}")
     return found
@@ -95,16 +95,16 @@ def test_dark_levels_that_differ_by_their_errors_alone_are_no_spread():
     for middle in (1e-12, 1e-9, 1e-7):
         dark = np.where(errors > 0, 1.1, 1.0) * errors + middle
         base = replace(case.base, dark=dark, dark_sd=np.full(PIXELS, 5e-7))
-        found = [m.effect.name for m in missing(replace(case, base=base), IDEAL, NAMES)]
+        found = [m.effect.name for m in missing_effects(replace(case, base=base), IDEAL, NAMES)]
         assert found == ["conversion_gain_spread"]
 
 
 def test_dark_levels_that_are_not_known_alike_are_no_spread():
-    """Of alike pixels that fire once or twice in the dark, two fifths have no rate there: thirty times the error."""
+    """Of equal pixels that fire once or twice in the dark, two fifths have no rate there: thirty times the error."""
     case, rng = recorded(model=IDEAL.with_effect(effect("dark_current", mean_pA=0.1))), np.random.default_rng(0)
     sd = np.where(np.arange(PIXELS) % 5 < 2, 6e-7, 2e-8)
     base = replace(case.base, dark=2e-4 + sd * rng.standard_normal(PIXELS), dark_sd=sd)
-    found = [m.effect.name for m in missing(replace(case, base=base), IDEAL, NAMES)]
+    found = [m.effect.name for m in missing_effects(replace(case, base=base), IDEAL, NAMES)]
     assert found == ["dark_current"]
 
 
@@ -121,13 +121,13 @@ def test_what_one_voltage_cannot_tell_apart_is_said():
 
 @pytest.mark.parametrize("quanta", [np.inf, 2e6])
 def test_noise_that_twins_without_it_seem_to_have_is_not_missing(quanta):
-    """Alike pixels at rates where they beat with the read-out's clock as if they had 3.5 million electrons' noise."""
+    """Equal pixels at rates where they beat with the read-out's clock as if they had 3.5 million electrons' noise."""
     camera = IDEAL if np.isinf(quanta) else IDEAL.with_effect(effect("shot_noise", quanta=quanta))
     flats = (0.008892, 0.026286, 0.07269, 0.16783, 0.34862, 0.54416)
-    shown = planned((Dark(), *(Flat(radiance=radiance) for radiance in flats)), SHAPE, 8000)
-    law = unit_of(camera, unit(camera), SHAPE)
+    shown = planned_conditions((Dark(), *(Flat(radiance=radiance) for radiance in flats)), SHAPE, 8000)
+    law = unit_from_refit(camera, unit(camera), SHAPE)
     seen_by = [observe(expose(camera, law, c, SHAPE, 1, take), SHAPE, film=False) for take, c in enumerate(shown)]
     case = case_of(SHAPE, shown, seen_by, 1)
     print(f"s^2 of the refit {case.base.white:.3g}, of the camera {1 / quanta:.3g}")
     assert case.base.white > LEAST_JITTER
-    assert [m.effect.name for m in missing(case, IDEAL, NAMES)] == ([] if np.isinf(quanta) else ["shot_noise"])
+    assert [m.effect.name for m in missing_effects(case, IDEAL, NAMES)] == ([] if np.isinf(quanta) else ["shot_noise"])

@@ -1,11 +1,11 @@
-"""What a model predicts: how many campaigns tell each statistic, and what noise of one recording alone is worth."""
+"""The null model: how many twins each statistic is learnt from, and the freedom of its noise."""
 
 from __future__ import annotations
 
 import numpy as np
 from small import TWINS, null
 
-from spikecam_env.gap.baseline.null_model import surer
+from spikecam_env.gap.baseline.null_model import with_more_twins
 from spikecam_env.gap.compare.prediction import Draw, Null
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.fresh_units import UNITS
@@ -27,7 +27,7 @@ def test_more_campaigns_tell_mean_and_noise_of_what_they_have():
     values = np.random.default_rng(0).standard_normal((36, 2))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values[:12]))
     few = Null((both, one), values[:12].mean(axis=0), values[:12].std(axis=0, ddof=1), np.zeros(2), 12, 11, draws=draws)
-    more = surer(few, [{both: v[0]} for v in values[12:]])
+    more = with_more_twins(few, [{both: v[0]} for v in values[12:]])
     assert np.allclose(more.mean, [values[:, 0].mean(), few.mean[1]])
     assert np.allclose(more.sd, [values[:, 0].std(ddof=1), few.sd[1]])
     assert list(more.twins) == [36, 12] and list(more.freedom) == [35, 11]

@@ -7,7 +7,7 @@ from small import MODEL, effect, recorded
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
 from spikecam_env.gap.twins.fresh_units import width
-from spikecam_env.gap.unit.refit import unit_as_base
+from spikecam_env.gap.unit.conversion import exact_refit
 
 SHAPE = (128, 128)
 
@@ -17,7 +17,7 @@ def base_of(*effects):
     model = MODEL
     for e in effects:
         model = model.with_effect(e)
-    return unit_as_base(model.draw_unit(SHAPE, 5))
+    return exact_refit(model.draw_unit(SHAPE, 5))
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def base_of(*effects):
     ids=lambda e: e.name,
 )
 def test_a_strength_that_is_off_is_measured_in_its_own_unit(other):
-    """Noise that is more than shot noise is told as reset noise: one V_d cannot tell."""
+    """Noise beyond shot noise is stated as reset noise: at one V_d the two are the same."""
     off = off_nominal(recorded(), MODEL, base_of(other)).parameters
     print(off)
     name = "reset_noise" if other.name == "shot_noise" else other.name

@@ -19,8 +19,8 @@ from spikecam_env.gap.fit import candidate as fit_module
 from spikecam_env.gap.fit.candidate import concerned, fit, predict, slope_between, with_held_out
 from spikecam_env.gap.search.forward import standing_on
 from spikecam_env.gap.twins.fresh_units import spread_factor
-from spikecam_env.gap.unit.indirect_inference import moved_by
-from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.unit.indirect_inference import gain_change
+from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
 
 ONE, NONE = np.ones(200), np.zeros(200)
@@ -181,7 +181,7 @@ def test_beside_a_bend_what_shows_by_motion_is_read_by_a_refit_with_that_bend():
     response the refit does not see, the step was 67 noises off, and no skew was found there."""
     bent = with_effect(MODEL, "photo_response_nonlinearity", {"beta": 0.05})
     case = recorded(effect("photo_response_nonlinearity", beta=0.05))
-    base = within(bent, case.base)
+    base = constrained_refit(bent, case.base)
     here = standing_on(null(), predict(case, bent, base, null(), 2))
     skewed = with_effect(bent, "readout_skew", {"span": 0.5})
     moving = [i for i, c in enumerate(case.conditions) if c.moves]
@@ -215,6 +215,6 @@ def test_a_weak_effect_on_rates_is_fitted_beside_light_that_saturates(seed):
 
 def test_a_unit_has_moved_by_what_its_pixels_respond_more():
     base = recorded().base
-    assert moved_by(base, base) == 0.0
-    assert moved_by(base, replace(base, gain=base.gain * 0.99)) == pytest.approx(-np.log(0.99))
-    assert moved_by(base, replace(base, gain=base.gain * 0.0)) == 0.0, "which do not respond at all tell nothing"
+    assert gain_change(base, base) == 0.0
+    assert gain_change(base, replace(base, gain=base.gain * 0.99)) == pytest.approx(-np.log(0.99))
+    assert gain_change(base, replace(base, gain=base.gain * 0.0)) == 0.0, "which do not respond at all tell nothing"

@@ -13,8 +13,8 @@ from spikecam_env.gap.compare.distance import alarmed, judged, residual, size_of
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import MANY, Fit, fit, predict, with_pattern
 from spikecam_env.gap.fit.confirm import as_wide, confirmed, is_missed, made_loud, made_sure, of_any_dark, quietened
-from spikecam_env.gap.unit.indirect_inference import FURTHEST
-from spikecam_env.gap.unit.refit import within
+from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
+from spikecam_env.gap.unit.refit import constrained_refit
 
 
 def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
@@ -25,7 +25,7 @@ def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.02})
     size = size_of(there, measured, found.prediction.mean - there.mean)
     loud, times = made_loud(case, MODEL, there, measured, found, "dead_time")
-    assert 1 < times <= FURTHEST and loud.parameters == found.parameters
+    assert 1 < times <= MOST_EXTRAPOLATED and loud.parameters == found.parameters
     which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
     many = predict(case, found.model, found.base, there, TWINS, which)
     few = predict(case, found.model, found.base, there, 2, which)
@@ -42,7 +42,7 @@ def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_kno
     does not depend on them."""
     case, there = recorded(), null()
     loud = with_effect(MODEL, "common_threshold_noise", {"sigma_mV": 20.0})
-    alike = within(loud, replace(case.base, dark=np.full_like(case.base.dark, np.median(case.base.dark))))
+    alike = constrained_refit(loud, replace(case.base, dark=np.full_like(case.base.dark, np.median(case.base.dark))))
     made = predict(case, loud, alike, there, 2)
     wider = of_any_dark(case, loud, alike, there, made)
     more = dict(zip(there.keys, np.sqrt(wider.error**2 - made.error**2) / there.noise, strict=True))
@@ -102,7 +102,9 @@ def test_a_column_that_few_units_have_is_no_surprise_to_many():
     240 some have.  What is left in no unit's reach is left."""
     case, there = recorded(effect("column_fixed_pattern", sigma_mV=100.0)), null()
     model = with_effect(MODEL, "column_fixed_pattern", {"sigma_mV": 100.0})
-    found = Fit("column_fixed_pattern", {}, {}, there.prediction, within(model, case.base), there.mean, 0.0, model)
+    found = Fit(
+        "column_fixed_pattern", {}, {}, there.prediction, constrained_refit(model, case.base), there.mean, 0.0, model
+    )
     found = confirmed(case, MODEL, there, values_of(case.bank, there.keys), found)
     few, many = found.prediction, with_pattern(case, model, there, there.prediction, MANY)
     at = next(i for i, k in enumerate(there.keys) if k.name == "over 5" and k.recording == "flat-0.2")

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.observation import BIN, BLOCKS, LAGS, LENGTHS, STEPS, observe
+from spikecam_env.gap.observe.observation import (
+    BIN,
+    DIFFERENCES,
+    FRAME_LAGS,
+    LENGTHS,
+    TIME_BLOCKS,
+    Observation,
+    observe,
+)
 from spikecam_env.streams import pack_frames
 
 SHAPES = [(5, 7), (24, 40), (3, 64), (2, 130), (1, 1), (1, 9)]
@@ -69,7 +78,7 @@ def test_ends_and_counts_are_those_of_the_spikes(stream):
 def test_second_differences_are_summed_over_all_starts(stream):
     o = seen(stream)
     for p, t in enumerate(times_of_pixels(stream)):
-        for j, k in enumerate(STEPS):
+        for j, k in enumerate(DIFFERENCES):
             e = t[2 * k :] - 2 * t[k : t.size - k] + t[: max(t.size - 2 * k, 0)] if t.size > 2 * k else np.zeros(0)
             assert o.times.terms[p, j] == e.size
             assert o.times.square[p, j] == np.sum(e.astype(float) ** 2)
@@ -123,8 +132,8 @@ def test_intervals_are_counted_by_length_one_frame_first(stream):
 def test_blocks_hold_every_spike_once(frames):
     spikes = random_spikes((5, 7), frames)
     o = seen(spikes)
-    each = -(-frames // BLOCKS)
-    for b in range(BLOCKS):
+    each = -(-frames // TIME_BLOCKS)
+    for b in range(TIME_BLOCKS):
         assert np.array_equal(o.blocks[b], spikes[b * each : (b + 1) * each].reshape(-1, 35).sum(axis=0, dtype=int))
     assert o.blocks.sum() == spikes.sum()
 
@@ -144,7 +153,7 @@ def test_columns_are_right_for_more_rows_than_a_byte_counts():
 def test_coincidences_are_of_both_orders_of_neighbours(stream):
     s = stream.astype(int)
     o = seen(stream)
-    for lag in range(LAGS):
+    for lag in range(FRAME_LAGS):
         now, then = s[lag:], s[: len(s) - lag]
         across = (now[:, :, :-1] * then[:, :, 1:]).sum() + (now[:, :, 1:] * then[:, :, :-1]).sum()
         down = (now[:, :-1] * then[:, 1:]).sum() + (now[:, 1:] * then[:, :-1]).sum()
@@ -189,3 +198,10 @@ def test_an_empty_and_a_full_stream():
     assert empty.frame.sum() == 0 and np.all(empty.times.first == -1) and np.isnan(empty.variance).all()
     assert full.times.count.min() == 70 and full.lengths[0] == 69 * 20 and full.lengths[1:].sum() == 0
     assert np.all(full.variance == 0) and np.all(full.late == 0) and full.odd.sum() == 0
+
+
+@pytest.mark.parametrize("share, few", [(0.2, True), (0.45, False)])
+def test_pixels_with_irregular_intervals_count_as_few_up_to_three_tenths(share, few):
+    short = (np.arange(1000) < 1000 * share).astype(np.int64)
+    found = Observation.irregular.fget(SimpleNamespace(short=short, long=np.zeros(1000, np.int64)))
+    assert found.sum() == (1000 * share if few else 0)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from small import CLEAR, check_reveals, effect, recorded, seen
 
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.statistics.drift import EVEN, PARTS, lateness
+from spikecam_env.gap.statistics.drift import CONSTANCY, PARTS, lateness
 from spikecam_env.streams import pack_frames
 
 SHAPE, FRAMES = (16, 16), 8000
@@ -48,9 +50,9 @@ def test_in_the_dark_a_wave_hardly_passes_for_a_drift():
     times = np.arange(0, FRAMES, 40.0)
     slow = lateness(at(times + 8 * (times / FRAMES) ** 2))
     wave = lateness(at(times + 2 * np.sin(2 * np.pi * times / 1700)))
-    assert lateness(at(times))["late 0"] == pytest.approx(0.0, abs=0.2 * EVEN)
+    assert lateness(at(times))["late 0"] == pytest.approx(0.0, abs=0.2 * CONSTANCY)
     assert max(map(abs, wave.values())) < 0.2 * 2 * 2 * np.pi / 1700
-    assert slow["late 0"] < -2 * EVEN < 2 * EVEN < slow["late 7"]
+    assert slow["late 0"] < -2 * CONSTANCY < 2 * CONSTANCY < slow["late 7"]
 
 
 def test_few_intervals_tell_nothing():
@@ -64,3 +66,31 @@ def test_what_all_pixels_do_is_no_variance_within_a_pixel():
         print(f"{flat}: trend {trend:.0f}, pixels {pixels:.1f}")
         assert abs(trend) > 2 * CLEAR
         assert abs(pixels) < CLEAR
+
+
+def dark(late: np.ndarray, timed: int) -> SimpleNamespace:
+    """A dark recording of 6400 frames, mean interval 1, with `timed` intervals in each of its 64 pieces, in each of
+    which they are longer by `late` (64,) on average."""
+    frames = np.zeros(6400)
+    frames[::100] = 1.0
+    return SimpleNamespace(
+        frames=6400,
+        shape=(1, 1),
+        frame=np.ones(6400, np.int32),
+        late=np.repeat(late * timed, 100) * frames,
+        timed=(timed * frames).astype(np.int32),
+    )
+
+
+@pytest.mark.parametrize("timed, stated", [(8, False), (19, True)])
+def test_a_part_of_a_hundred_intervals_has_a_mean(timed, stated):
+    """Eight pieces make a part."""
+    assert len(lateness(dark(np.zeros(64), timed))) == (PARTS if stated else 0)
+
+
+@pytest.mark.parametrize("error", [0.5e-4, 2e-4, 8e-4])
+def test_lateness_is_in_units_of_its_standard_error_where_that_is_above_two_in_ten_thousand(error):
+    """Pieces scatter by +- s about their part, whose mean then has the standard error s / sqrt(8)."""
+    pieces = 1e-3 + error * np.sqrt(8) * np.tile([1.0, -1.0], 32)
+    found = lateness(dark(pieces, 20))["late 3"]
+    assert found == pytest.approx(1e-3 / np.sqrt(1.0 + (error / 2e-4) ** 2), rel=1e-6)

@@ -1,4 +1,4 @@
-"""Intervals that should not be there."""
+"""Irregular intervals."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import pytest
 from small import FRAMES, SHAPE, check_reveals, conditions, effect
 
 from spikecam_env.gap.observe.observation import BIN
-from spikecam_env.gap.statistics.film import FEATURES, features, light_film
+from spikecam_env.gap.statistics.film import FEATURES, film_features, light_film
 
 CASES = [
     (effect("photodiode_lag", fraction=0.06, tau_us=1000.0), "bars", ["lag 16"], ["rates", "noise"]),
@@ -25,7 +25,7 @@ def test_moving_reveal(shown_by, where, names, silent):
 def test_features_are_orthonormal_and_span_the_film():
     shown = next(c for c in conditions() if c.kind == "moving")
     light = light_film(shown.light, FRAMES)
-    basis, size = features(light, SHAPE)
+    basis, size = film_features(light, SHAPE)
     used = basis[size > 0].astype(np.float64)
     error = np.abs(used @ used.T - np.eye(len(used))).max()
     x = np.minimum(light / BIN, 1).reshape(-1)

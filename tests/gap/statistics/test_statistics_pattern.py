@@ -88,3 +88,10 @@ def test_pixels_that_fire_once_or_twice_in_the_dark_differ_though_they_are_all_a
     banks = drawn_banks(model, base, dark, SHAPE, 4, 0)
     widths = [np.exp(b[Key("pattern", "dark", "width")]) for b in banks]
     assert widths == pytest.approx(4 * [0.3 / 1.6], rel=0.1)
+
+
+@pytest.mark.parametrize("width, narrow", [(3.5e-4, True), (8e-4, False)])
+def test_a_map_narrower_than_five_in_ten_thousand_has_no_pattern(width, narrow):
+    grid = stats.norm.ppf((np.arange(4096) + 0.5) / 4096)
+    rate = 0.2 * (1.0 + width * np.random.default_rng(0).permutation(grid)).reshape(64, 64)
+    assert (set(pattern.statistics(rate)) == {"width", "silent"}) == narrow

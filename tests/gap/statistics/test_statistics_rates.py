@@ -40,7 +40,7 @@ def dimmed(shown, factor):
 
 
 def test_what_bends_a_quarter_of_the_array_shows_in_its_corner():
-    """Corners are told from the array's mean: one is bent by e, they are off by 3/4 e and three times -1/4 e."""
+    """Corners are stated against the array's mean: one is bent by e, they are off by 3/4 e and three times -1/4 e."""
     plain, bent = spikes_of(), spikes_of(effect("dead_time", tau_us=0.5))
     rows, columns = SHAPE[0] // 2, SHAPE[1] // 2
     for name, spikes in plain.items():

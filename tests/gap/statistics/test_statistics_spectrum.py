@@ -36,8 +36,8 @@ def test_where_power_rises_steeply_there_is_no_line():
     of them is far above the median of both sides together, and no more than chance above what comes after it.  A line
     within the rise, above all that follows, is one."""
     cycles = np.arange(4001)
-    loud = (cycles >= 625) | ((cycles >= 600) & (cycles % 5 < 3))
-    power = np.where(loud, 1e3, 1.0) * np.random.default_rng(1).exponential(size=4001)
+    strong = (cycles >= 625) | ((cycles >= 600) & (cycles % 5 < 3))
+    power = np.where(strong, 1e3, 1.0) * np.random.default_rng(1).exponential(size=4001)
     power[600] = 1e3
     assert power[600] / np.median(power[575:626]) > 500
     at, ratio = strongest_line(power)

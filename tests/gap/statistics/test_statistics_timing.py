@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import SHAPE, check_reveals, effect, null
 
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics.timing import statistics
 from spikecam_env.streams import pack_frames
@@ -33,7 +33,7 @@ def test_a_few_slow_pixels_of_uneven_intervals_are_no_later_together_than_alone(
         ends = rng.integers(0, mean) + np.cumsum(rng.integers(mean - by, mean + by + 1, 6000 // mean))
         spikes.reshape(6000, -1)[ends[ends < 6000], p] = 1
     seen_by = observe(pack_frames(spikes), SHAPE)
-    shown = Shown("flat", "flat", 0.03, None, 6000, "fit")
+    shown = Condition("flat", "flat", 0.03, None, 6000, "fit")
     late = statistics(SimpleNamespace(conditions=[shown], observations=[seen_by]), 0)["late"]
     slow = np.sort(seen_by.variance)[-21:].sum() / seen_by.variance.sum()
     print(f"{late:.3f}; slow pixels have {slow:.2f} of all variance")
@@ -45,3 +45,14 @@ def test_pixels_on_their_own_are_no_later_together_than_alone():
     late = {k.recording: m for k, m in zip(null().keys, null().mean, strict=True) if k.name == "late"}
     print({k: round(float(m), 3) for k, m in late.items()})
     assert len(late) >= 6 and np.abs(list(late.values())).max() < 0.05
+
+
+@pytest.mark.parametrize("frame, counts", [(120, False), (190, True)])
+def test_lateness_counts_after_one_and_a_half_mean_intervals(frame, counts):
+    """Of 1000 pixels, ten of which fire in each frame, all late in one of them."""
+    late = np.zeros(2000)
+    late[frame] = 100.0
+    o = SimpleNamespace(shape=(10, 100), frames=2000, frame=np.full(2000, 10), timed=np.full(2000, 10), late=late,
+                        scatter=np.full(2000, 10.0))  # fmt: skip
+    found = statistics(SimpleNamespace(conditions=[SimpleNamespace(kind="flat")], observations=[o]), 0)
+    assert (found["late"] > -20.0) == counts

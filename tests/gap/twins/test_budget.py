@@ -12,7 +12,7 @@ import small
 from small import effect, recorded
 
 from spikecam_env.cli.diagnose import Diagnose
-from spikecam_env.gap.baseline.off_nominal import Off
+from spikecam_env.gap.baseline.off_nominal import OffNominal
 from spikecam_env.gap.compare.distance import judged, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.fit import joint as polish
@@ -189,7 +189,7 @@ def test_nothing_is_named_where_a_second_effect_was_not_looked_for(left_out: lis
     fit = Fit("dead_time", {"tau_us": 0.5}, {"tau_us": 0.01}, close, case.base, np.zeros(len(values)), 1.0, model)
     first = Round(small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0, (fit,))
     rounds = [first, Round(model, case.base, close, fit.rho, 1.0)]
-    off = Off({}, case.base)
+    off = OffNominal({}, case.base)
     said = concluded(case, small.MODEL, null, null.mean, values, (), off, rounds, (), ())
     assert said.verdict == verdict and said.patched == model
     if verdict == "unknown":

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, unit
 
-from spikecam_env.gap.observe.conditions import LABELS, Shown
+from spikecam_env.gap.observe.conditions import LABEL_ERROR, Condition
 from spikecam_env.gap.twins import simulate as twin
 from spikecam_env.gap.twins.simulate import FIRST, as_known, at_any_phase
-from spikecam_env.gap.unit.refit import unit_of
+from spikecam_env.gap.unit.conversion import unit_from_refit
 from spikecam_env.sensor import Keyframes, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
@@ -46,25 +46,25 @@ def test_alike_pixels_are_known_no_better_than_labels_say_and_the_sensor_counts(
     """Light, and up to half a grain of dark charge, another in every recording, the same in all pixels; spread pixels
     as given."""
     every = np.ones(SHAPE[0] * SHAPE[1])
-    alike = replace(unit_of(MODEL, unit(), SHAPE), gain=0.8 * every, dark=3e-4 * every)
+    alike = replace(unit_from_refit(MODEL, unit(), SHAPE), gain=0.8 * every, dark=3e-4 * every)
     drawn = [as_known(alike, 17, take) for take in range(200)]
     moved = np.array([(d.dark - alike.dark) * GRAINS for d in drawn])
     assert np.ptp(moved, axis=1).max() < 1e-6 and np.abs(moved).max() <= 0.5 and len(np.unique(moved[:, 0])) == 200
     brighter = np.array([d.gain / alike.gain - 1.0 for d in drawn])
-    assert np.ptp(brighter, axis=1).max() < 1e-12 and brighter[:, 0].std() == pytest.approx(LABELS, rel=0.2)
+    assert np.ptp(brighter, axis=1).max() < 1e-12 and brighter[:, 0].std() == pytest.approx(LABEL_ERROR, rel=0.2)
     assert np.array_equal(as_known(alike, 17, 3).gain, drawn[3].gain)
     spread = replace(alike, gain=np.linspace(0.7, 0.9, alike.gain.size))
     assert as_known(spread, 17, 0) is spread
     assert not as_known(replace(alike, dark=np.zeros(alike.gain.size)), 17, 0).dark.any()
 
 
-@pytest.mark.parametrize("known", [0.0, LABELS])
+@pytest.mark.parametrize("known", [0.0, LABEL_ERROR])
 def test_the_beat_of_alike_pixels_is_no_surer_than_labels(known: float, monkeypatch):
     """64 intervals of 30.1222 frames: a light brighter by what labels leave open moves the mean square of their second
     differences by hundreds of what twins in one light scatter; drawn, it is within their scatter."""
-    monkeypatch.setattr(twin, "LABELS", known)
+    monkeypatch.setattr(twin, "LABEL_ERROR", known)
     light = Keyframes(np.zeros(1), np.full((1, *SHAPE), 0.029, np.float32))
-    flat, model = Shown("flat", "flat", 0.029, light, 8000, "fit"), SensorModel.preset("ideal")
+    flat, model = Condition("flat", "flat", 0.029, light, 8000, "fit"), SensorModel.preset("ideal")
     every = np.ones(SHAPE[0] * SHAPE[1])
     dark = 3.4e-4 * every
 
@@ -74,7 +74,7 @@ def test_the_beat_of_alike_pixels_is_no_surer_than_labels(known: float, monkeypa
         seen = [twin.simulate(model, alike, [flat], SHAPE, FIRST + n, [2])[0].times for n in range(8)]
         return np.array([t.square[:, 3].sum() / t.terms[:, 3].sum() for t in seen])
 
-    here, there = squares(0.0), squares(LABELS)
+    here, there = squares(0.0), squares(LABEL_ERROR)
     moved, scatter = abs(there.mean() - here.mean()), here.std(ddof=1)
-    print(f"{here.mean():.4f}, in light {LABELS:g} brighter {there.mean():.4f}; twins scatter by {scatter:.4f}")
+    print(f"{here.mean():.4f}, in light {LABEL_ERROR:g} brighter {there.mean():.4f}; twins scatter by {scatter:.4f}")
     assert (moved > 100 * scatter) if known == 0.0 else (moved < 2 * scatter)

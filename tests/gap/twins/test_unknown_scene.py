@@ -15,7 +15,7 @@ from spikecam_env.gap.candidates.table import testable as can_test
 from spikecam_env.gap.compare.distance import deviates
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import refittable
-from spikecam_env.gap.observe.conditions import Shown
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.unknown_scene import EXACT, likely_rates, missed_by, simulate_seen
@@ -23,7 +23,7 @@ from spikecam_env.sensor import Effect, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 
 SHAPE, FRAMES = (40, 60), 400
-CONDITION = Shown("scene", "unknown", 0.2, None, FRAMES, "fit")
+CONDITION = Condition("scene", "unknown", 0.2, None, FRAMES, "fit")
 
 
 def scene(*effects: Effect, seed: int = 4) -> Case:

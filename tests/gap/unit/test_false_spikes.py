@@ -8,7 +8,7 @@ import numpy as np
 from small import MODEL, effect
 
 from spikecam_env.gap import Dark
-from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
@@ -22,7 +22,7 @@ def test_rates_of_slow_pixels_are_those_of_a_simulation():
     rng = np.random.default_rng(0)
     law = MODEL.draw_unit(SHAPE, 0)
     law = replace(law, dark=rng.uniform(0.5, 2.0, law.dark.size) / FRAMES)
-    [dark] = planned((Dark(),), SHAPE, FRAMES)
+    [dark] = planned_conditions((Dark(),), SHAPE, FRAMES)
     simulated = observe(expose(FALSE, law, dark, SHAPE, 0, 0), SHAPE).rate
     rate, phase = law.dark, rng.random(law.dark.size)
     count = np.floor(rate * FRAMES + phase)

@@ -9,8 +9,9 @@ from small import MODEL, SHAPE, effect, recorded, unit
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.twins.fresh_units import drawn_banks
-from spikecam_env.gap.unit.refit import unit_of, within
-from spikecam_env.gap.unit.traps import charge_of, drawn_traps, less_traps, level_of
+from spikecam_env.gap.unit.conversion import unit_from_refit
+from spikecam_env.gap.unit.refit import constrained_refit
+from spikecam_env.gap.unit.traps import drawn_traps, less_traps, trap_charge, trap_level
 from spikecam_env.sensor import SpikeSensor
 
 SEVERE = effect("random_telegraph_noise", amplitude_pA=2.0, fraction=0.04, dwell_ms=5.0)
@@ -28,7 +29,7 @@ def test_mean_levels_are_those_of_simulated_traps(dwell_ms):
     sensor = SpikeSensor(model, SHAPE, 0, unit=law)
     rate = sensor.step(np.zeros(SHAPE, np.float32), FRAMES).mean(axis=0).reshape(-1)
     share = (rate - law.dark) / charge
-    drawn = level_of(model, charge, FRAMES, np.random.default_rng(1)) / charge
+    drawn = trap_level(model, charge, FRAMES, np.random.default_rng(1)) / charge
     print("upper state:", *(f"{v.mean():.3f} +- {v.std():.3f}" for v in (share, drawn)))
     assert abs(share.mean() - drawn.mean()) < 4 * share.std() * np.sqrt(2 / share.size)
     assert abs(np.log(share.std() / drawn.std())) < 4 / np.sqrt(share.size)
@@ -36,12 +37,12 @@ def test_mean_levels_are_those_of_simulated_traps(dwell_ms):
 
 def test_a_unit_without_telegraph_noise_has_none():
     dark = unit().dark
-    assert less_traps(MODEL, unit_of(MODEL, unit(), SHAPE), dark) is dark
-    assert not level_of(MODEL, drawn_traps(MODEL, SHAPE, 0), FRAMES, np.random.default_rng(0)).any()
+    assert less_traps(MODEL, unit_from_refit(MODEL, unit(), SHAPE), dark) is dark
+    assert not trap_level(MODEL, drawn_traps(MODEL, SHAPE, 0), FRAMES, np.random.default_rng(0)).any()
 
 
 def test_bright_pixels_lose_what_a_trap_adds_and_the_others_keep_theirs():
-    law = unit_of(MODEL, unit(), SHAPE)
+    law = unit_from_refit(MODEL, unit(), SHAPE)
     dark = unit().dark
     has = drawn_traps(TRAPPED, SHAPE, 3) / 2
     less = less_traps(TRAPPED, law, dark + has)
@@ -52,13 +53,13 @@ def test_bright_pixels_lose_what_a_trap_adds_and_the_others_keep_theirs():
     top = [float(np.quantile(v, 0.99)) / float(np.median(v)) for v in (dark, dark + has, less)]
     print("dark level, 99 % over median: without, with, less", top)
     assert abs(top[2] - top[0]) < 0.2 * (top[1] - top[0])
-    assert np.all(charge_of(SEVERE, law, MODEL.frame_rate_hz) > 0)
+    assert np.all(trap_charge(SEVERE, law, MODEL.frame_rate_hz) > 0)
 
 
 def test_twins_of_a_refitted_camera_have_as_many_bright_pixels_as_it():
     """Its own traps are in the refit, the twin's elsewhere."""
     case = recorded(SEVERE)
-    [twin] = twins(case, TRAPPED, within(TRAPPED, case.base), [0])
+    [twin] = twins(case, TRAPPED, constrained_refit(TRAPPED, case.base), [0])
     assert twin.base is not None
     bright = [int(np.sum(b.dark > 2.0 * np.median(b.dark))) for b in (unit(), case.base, twin.base)]
     print("pixels of twice the usual dark level: without traps, camera, twin", bright)

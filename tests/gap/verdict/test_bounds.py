@@ -13,11 +13,11 @@ from spikecam_env.gap import Bars, Dark, Flat
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import expected_events
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.observe.conditions import planned
+from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.report.words import at_most, bounded_parameter
 from spikecam_env.gap.result import Bound
-from spikecam_env.gap.screen.templates import load
+from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.verdict.bounds import EVENTS, Score, Tried, _OfTwins, bounds, first_tried
@@ -25,7 +25,7 @@ from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames
 
 SHAPE, FRAMES = (24, 24), 800
-CONDITIONS = planned((Dark(), *(Flat(radiance=x) for x in (0.1, 0.2, 0.4)), Bars(high=1.4)), SHAPE, FRAMES)
+CONDITIONS = planned_conditions((Dark(), *(Flat(radiance=x) for x in (0.1, 0.2, 0.4)), Bars(high=1.4)), SHAPE, FRAMES)
 COUNTED = ("spurious_spikes", "missed_spikes", "hot_pixels", "dead_pixels")
 
 
@@ -44,7 +44,7 @@ def recorded(*effects, camera: int = 1) -> Case:
 
 def bounds_of(case: Case, names) -> dict[str, Bound]:
     null = model_null(case, MODEL, 8)
-    found, _ = bounds(case, MODEL, null, values_of(case.bank, null.keys), names, load())
+    found, _ = bounds(case, MODEL, null, values_of(case.bank, null.keys), names, shipped_templates())
     for b in found:
         print(b)
     return {b.name: b for b in found}
@@ -87,14 +87,14 @@ def test_what_these_recordings_would_not_show_at_its_strongest_has_no_bound():
     """Where noise is a million times as large."""
     keys = model_null(recorded(), MODEL, 6)
     nothing = replace(keys, sd=1e6 * keys.sd, floor=1e6 * keys.floor)
-    found, open_ = bounds(recorded(), MODEL, nothing, keys.mean, ["readout_skew", "vignetting"], load())
+    found, open_ = bounds(recorded(), MODEL, nothing, keys.mean, ["readout_skew", "vignetting"], shipped_templates())
     assert found == [] and [name for name, _ in open_] == ["readout_skew", "vignetting"]
     assert all("longer recordings" in needs for _, needs in open_)
 
 
 def test_without_effort_there_is_no_bound_and_that_is_said():
     case = replace(recorded(), effort=Effort(10, [9]))
-    found, open_ = bounds(case, MODEL, None, None, ["dead_time", "vignetting"], load())
+    found, open_ = bounds(case, MODEL, None, None, ["dead_time", "vignetting"], shipped_templates())
     assert found == [] and dict(open_).keys() == {"dead_time", "vignetting"}
     assert all("--effort" in needs for _, needs in open_) and case.effort.left_out == ["upper bounds"]
 

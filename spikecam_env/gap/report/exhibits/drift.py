@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.report.evidence import Panel, loudest, over_pixels, takes
 from spikecam_env.gap.result import Evidence
 
@@ -17,7 +17,7 @@ CAPTION = "The array's rate in sixteen parts of a recording, less the model's."
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     """The rate of the array in sixteen parts of a recording."""
     made = []
-    for t in takes(evidence, STATIC):
+    for t in takes(evidence, STEADY):
         if t.before.blocks.sum() < 100:
             continue
         measured, before, after, sd = over_pixels(t, lambda o: o.blocks / max(o.blocks.mean(), 1e-9))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.report.evidence import Panel, loudest, scaled, takes
 from spikecam_env.gap.result import Evidence
 
@@ -17,7 +17,7 @@ CAPTION = "How often intervals of each length occur, less the model's share."
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     """Intervals by length, and how their shares differ."""
     made = []
-    for t in takes(evidence, STATIC):
+    for t in takes(evidence, STEADY):
         total = [max(float(o.lengths.sum()), 1.0) if o else 1.0 for o in (t.measured, t.before, t.after)]
         if min(total[:2]) < 100:
             continue

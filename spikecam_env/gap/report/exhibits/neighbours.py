@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.report.evidence import Panel, loudest, scaled, takes
 from spikecam_env.gap.result import Evidence
 
@@ -19,7 +19,7 @@ CAPTION = (
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     """Spikes of a pixel with its neighbour's, in the same frame and one or two after."""
     made = []
-    for t in takes(evidence, STATIC):
+    for t in takes(evidence, STEADY):
         measured, before = (o.coincidences.T.reshape(-1) for o in (t.measured, t.before))
         if min(measured.min(), before.min()) < 20:
             continue

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
-from spikecam_env.gap.observe.conditions import STATIC
-from spikecam_env.gap.observe.observation import STEPS, Observation
+from spikecam_env.gap.observe.conditions import STEADY
+from spikecam_env.gap.observe.observation import DIFFERENCES, Observation
 from spikecam_env.gap.report.evidence import Panel, Take, against_before, by_recording, names, takes
 from spikecam_env.gap.result import Evidence
 
@@ -21,7 +21,7 @@ CAPTION = (
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     """Temporal noise of spikes: from A_k over steps and over levels, interval variance and lag-1 by recording."""
-    static = takes(evidence, STATIC)
+    static = takes(evidence, STEADY)
     steps = _noise_by_step(static)
     if steps:
         yield steps
@@ -74,4 +74,4 @@ def _jitter(observations: Sequence[Observation | None]) -> Jitter | None:
         return None
     rate = np.stack([np.where(o.times.count / o.frames > 0.9, np.nan, o.times.rate) for o in known])
     square = np.stack([o.times.square for o in known])
-    return fit_jitter(np.array(STEPS), square, np.stack([o.times.terms for o in known]).astype(np.float64), rate)
+    return fit_jitter(np.array(DIFFERENCES), square, np.stack([o.times.terms for o in known]).astype(np.float64), rate)

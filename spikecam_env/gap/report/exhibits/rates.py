@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.report.evidence import Panel, against_before, by_recording, error_known, mean_known, takes
 from spikecam_env.gap.result import Evidence
 
@@ -37,7 +37,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             None if after is None else mean_known(after, np.isfinite(after))[usable],
             error_known(measured - before, known)[usable], log="x",
         )  # fmt: skip
-    found = takes(evidence, (*STATIC, "step", "moving"))
+    found = takes(evidence, (*STEADY, "step", "moving"))
     found = [t for t in found if t.before.rate.mean() > 0]
     if found:
         measured, before, after, sd = by_recording(found, lambda o: o.rate)

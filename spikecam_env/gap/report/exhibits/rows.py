@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.observe.conditions import STATIC
+from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.report.evidence import Array, Panel, against_before, by_recording, loudest, takes
 from spikecam_env.gap.result import Evidence
@@ -19,7 +19,7 @@ CAPTION = "Variance in time of the spikes of a row or column, less what the whol
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     """Variance of rows and columns over the model's, recording by recording."""
-    found = [t for t in takes(evidence, STATIC) if t.before.frame.sum() > 500]
+    found = [t for t in takes(evidence, STEADY) if t.before.frame.sum() > 500]
     made = []
     for name in ("row", "column") if found else ():
         for frames in (1, 16):

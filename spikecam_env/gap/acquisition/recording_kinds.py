@@ -3,12 +3,12 @@
 `light(shape, frames)` is a pure function: keys that are linear between and whole frames apart, stored along the axes on
 which the light changes and no others.  Radiance 1.0 makes the nominal pixel fire once a frame.
 
-    dark            what needs no light: dark current, its patterns and its noise
+    dark            reveals dark current, its patterns and its noise
     flat            rate curve, response patterns, noise of a spike, row and frame noise
-    step            what remembers: lag, drift, history
-    bars            what depends on place and time together: read-out skew, blur
-    disk            textures in motion before still ones; nothing is like a flat: for judging
-    masked_rows     what couples a row: pixels of the same light in rows of different load
+    step            lag, drift, history
+    bars            effects of place and time together: read-out skew, blur
+    disk            textures in motion before a static one, unlike all others: for judging
+    masked_rows     coupling along a row: pixels of the same light in rows of different load
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
 MOTION_PER_KEY = 1.2
-"""Most pixels of motion between two keys; beyond it linear light is no motion any more (DESIGN section 4)."""
+"""Most pixels of motion between two keys; beyond it light that is linear between keys no longer looks like motion."""
 
 SLOWEST = 1e-9
 """Least speed of what moves [pixels/frame]: a pixel in 7 hours at 40 kHz."""
@@ -62,10 +62,10 @@ class Planned:
 
     @property
     def file_name(self) -> str:
-        """The name, or one made from what is recorded."""
-        return self.name or self._called() + ("" if self.v_d is None else f"-at-{self.v_d:g}V")
+        """The name, or one made from the kind and its level."""
+        return self.name or self._default_name() + ("" if self.v_d is None else f"-at-{self.v_d:g}V")
 
-    def _called(self) -> str:
+    def _default_name(self) -> str:
         return self.kind
 
 
@@ -76,7 +76,7 @@ class Dark(Planned):
     kind = "dark"
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
-        return _still(np.zeros((1, 1)))
+        return _unchanging(np.zeros((1, 1)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +88,9 @@ class Flat(Planned):
     radiance: float
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
-        return _still(np.full((1, 1), self.radiance))
+        return _unchanging(np.full((1, 1), self.radiance))
 
-    def _called(self) -> str:
+    def _default_name(self) -> str:
         return f"flat-{self.radiance:g}"
 
 
@@ -212,12 +212,12 @@ class MaskedRows(Planned):
         picture = np.full(shape, self.bright)
         masked = np.arange(shape[0]) // self.band % 2 == 1
         picture[masked, shape[1] // 2 :] = self.dark
-        return _still(picture)
+        return _unchanging(picture)
 
 
 KINDS: dict[str, type[Planned]] = {kind.kind: kind for kind in (Dark, Flat, Step, Bars, Disk, MaskedRows)}
 """Kinds of recordings by name."""
 
 
-def _still(picture: NDArray[np.float64]) -> Keyframes:
+def _unchanging(picture: NDArray[np.float64]) -> Keyframes:
     return Keyframes(np.zeros(1), picture[None].astype(np.float32))

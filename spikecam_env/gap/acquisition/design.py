@@ -1,4 +1,4 @@
-"""Campaigns by simulation: one unit of any model, recorded as a real camera would be."""
+"""Campaigns by simulation: designs, and one unit of any model recorded by them."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from pathlib import Path
 
 from spikecam_env.campaign import Campaign, Take, record_takes
 from spikecam_env.checked import checked_count, checked_disk, checked_shape
-from spikecam_env.gap.campaign.recording_kinds import Bars, Dark, Disk, Flat, Planned, Step
+from spikecam_env.gap.acquisition.recording_kinds import Bars, Dark, Disk, Flat, Planned, Step
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams.packing import packed_bytes
 
 FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
+"""Radiance of the flats to fit: even steps of its logarithm, up to below saturation."""
+
 HOLDOUT_LEVELS = (0.05, 0.15, 0.5)
+"""Radiance of the flats held out, between those to fit."""
+
 BRIGHT = 1.4
-"""Of the bars: above one spike a frame, so that what flows over shows."""
+"""Radiance of the bright bars: above one spike a frame, so that blooming shows."""
 
 
 def write_campaign(

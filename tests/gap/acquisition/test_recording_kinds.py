@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from spikecam_env.campaign.takes import shown
+from spikecam_env.campaign.takes import light_during
 from spikecam_env.errors import InputError
 from spikecam_env.gap import KINDS, Bars, Disk, Flat, MaskedRows, Step, second_voltage, standard_design
 from spikecam_env.sensor import SpikeSensor
@@ -32,10 +32,10 @@ def test_light_is_a_pure_function_on_whole_frames_that_broadcasts_to_the_picture
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_blocks_of_keys_give_the_bits_of_all_keys(kind: str) -> None:
     light = example(kind).light(SHAPE, FRAMES)
-    whole = SpikeSensor("scsim", SHAPE, 1).step(shown(light, 0, FRAMES, SHAPE), FRAMES)
+    whole = SpikeSensor("scsim", SHAPE, 1).step(light_during(light, 0, FRAMES, SHAPE), FRAMES)
     camera = SpikeSensor("scsim", SHAPE, 1)
     cuts = (0, 1, 65, 199, 200, 201, 384, FRAMES)
-    pieces = [camera.step(shown(light, a, b, SHAPE), b - a) for a, b in pairwise(cuts)]
+    pieces = [camera.step(light_during(light, a, b, SHAPE), b - a) for a, b in pairwise(cuts)]
     np.testing.assert_array_equal(np.concatenate(pieces), whole)
 
 

@@ -1,4 +1,4 @@
-"""What recordings of a real camera were shown: labels, from code, a CSV table or the command line.
+"""Labels: the light of recordings of a real camera, from code, a CSV table or the command line.
 
 0.2                 even, steady light of that radiance; 0 is dark
 unknown             a static scene of unknown light
@@ -74,7 +74,7 @@ def parse_radiance(text: str, where: str) -> float | str:
         return text
     if not text:
         raise InputError(f"{where}: the radiance is missing; give a number (0 is dark), an npz, or `unknown`")
-    return _number(text, f"{where}: radiance", " (0 is dark), an npz, or `unknown`")
+    return _parsed_number(text, f"{where}: radiance", " (0 is dark), an npz, or `unknown`")
 
 
 def _label(row: Mapping[str, str], where: str) -> Label:
@@ -82,7 +82,9 @@ def _label(row: Mapping[str, str], where: str) -> Label:
     if "file" not in cells:
         raise InputError(f"{where}: the file's name is missing")
     reading = {name: _reading_cell(name, cells[name], where) for name in READING if name in cells}
-    numbers = {name: _number(cells[name], f"{where}: {name}") for name in ("v_d", "temperature_k") if name in cells}
+    numbers = {
+        name: _parsed_number(cells[name], f"{where}: {name}") for name in ("v_d", "temperature_k") if name in cells
+    }
     texts = {name: cells[name] for name in ("name", "use", "note") if name in cells}
     radiance = parse_radiance(cells.get("radiance", ""), where)
     return Label(cells["file"], radiance, reading=reading, **numbers, **texts)  # type: ignore[arg-type]
@@ -95,13 +97,13 @@ def _reading_cell(name: str, text: str, where: str) -> Any:
         if text.lower() not in ("true", "false", "0", "1"):
             raise InputError(f"{where}: flip is {text!r}; it must be true or false")
         return text.lower() in ("true", "1")
-    value = _number(text, f"{where}: {name}")
+    value = _parsed_number(text, f"{where}: {name}")
     if value != int(value) or value > LARGEST_COUNT:
         raise InputError(f"{where}: {name} is {shown(text)}; it must be a whole number, at most {LARGEST_COUNT}")
     return int(value)
 
 
-def _number(text: str, what: str, otherwise: str = "") -> float:
+def _parsed_number(text: str, what: str, otherwise: str = "") -> float:
     try:
         value = float(text)
     except ValueError:

@@ -5,11 +5,10 @@ in any other unit proportional to light go through `radiance_per_unit`, the radi
 
 Rates are an npz with `rate` (H, W) [spikes/frame] and `frames` it was counted over.
 
-Flat maps (`calibration.flat_maps`) become recordings of rates, lit and dark, and where its counts can be told the one
-at 153 lux, which is held out.  How many spikes a frame 335 lux
-should give is not known, so the lit one is labelled by the camera itself, `relative`: radiance is the median over
-pixels of its rate less the dark's.  By this label the median pixel has gain 1; only how pixels
-differ, and the dark, can disagree with a model.
+Flat maps (`calibration.flat_maps`) become recordings of rates, lit and dark, and where its counts are known the one at
+153 lux, which is held out.  The radiance of 335 lux is not known, so the lit one is labelled by the camera itself,
+`relative`: radiance is the median over pixels of its rate less the dark's.  By this label the median pixel has gain 1;
+only the differences between pixels, and the dark, can disagree with a model.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from spikecam_env.campaign.reading import USES, read_light, read_rates
 from spikecam_env.campaign.writing import finish_campaign, save_light, save_rates, save_spikes
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.gap.campaign.labels import READING, RELATIVE, UNKNOWN, Label
+from spikecam_env.gap.acquisition.labels import READING, RELATIVE, UNKNOWN, Label
 from spikecam_env.names import file_name, inside
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import read_recording
@@ -38,7 +37,8 @@ from spikecam_env.streams.recording import ENDINGS, reading_options
 from spikecam_env.untrusted import array_names
 from spikecam_env.whole import whole_folder
 
-_BLOCK = 256
+_FRAMES_AT_ONCE = 256
+"""Frames written at once."""
 
 
 def import_campaign(
@@ -219,7 +219,7 @@ def _write(folder: Path, piece: _Piece) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": piece.name}
     if piece.data.ndim == 3:
         entry |= {"spikes": f"{piece.name}.dat", "frames": piece.frames}
-        blocks = (piece.data[i : i + _BLOCK] for i in range(0, piece.frames, _BLOCK))
+        blocks = (piece.data[i : i + _FRAMES_AT_ONCE] for i in range(0, piece.frames, _FRAMES_AT_ONCE))
         save_spikes(folder / f"{piece.name}.dat", blocks)
     else:
         entry["rates"] = f"{piece.name}-rates.npz"

@@ -1,0 +1,92 @@
+"""Templates by simulation: of one candidate on a campaign, and of all on the campaign at hand.
+
+The shipped templates are of the standard design.  An unknown scene has statistics that no flat has
+(`statistics/clock`), and is short and quick to simulate: its templates are made anew (`own_templates`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.baseline.null_model import unit_under
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET, candidate, is_pattern
+from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.candidate import predict, with_pattern
+from spikecam_env.gap.fit.gauss_newton import settled_there
+from spikecam_env.gap.screen.templates import Template, Templates
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.unit.refit import constrained_refit
+from spikecam_env.sensor import CATALOGUE, SensorModel
+
+Array = NDArray[np.float64]
+
+PEAK = 40.0
+"""Noises of the statistic that shows an effect best, of recordings to fit, at which its template is taken."""
+
+
+def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[str]) -> Templates:
+    """Templates of the candidates in `names` on this very campaign, whose model predicts `null`."""
+    unit = replace(case, base=unit_under(case, model))
+    todo = [(n, p) for n in names if not is_pattern(n) for p in template_parameters(n)]
+    with ThreadPoolExecutor(case.jobs) as pool:
+        entries = tuple(pool.map(lambda what: simulated_template(unit, model, null, *what), todo))
+    return Templates(
+        null.keys,
+        null.noise,
+        {c.name: c.level for c in case.conditions},
+        {c.name: "flat" for c in case.conditions},
+        entries,
+    )
+
+
+def template_parameters(name: str) -> list[dict[str, float]]:
+    """Parameters to take a candidate's templates at: the default strength, every combination of shapes."""
+    if name in NOISE_OF_A_RESET:
+        return []
+    shapes = candidate(name).shapes
+    default = {CATALOGUE[name].strength: CATALOGUE[name]().parameters()[CATALOGUE[name].strength]}
+    extra = {k: CATALOGUE[name]().parameters()[k] for k in candidate(name).fitted}
+    return [{**extra, **default, **dict(zip(shapes, values, strict=True))} for values in product(*shapes.values())]
+
+
+def simulated_template(
+    case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]
+) -> Template:
+    """A candidate's template on a campaign, at a strength where it shows clearly (PEAK)."""
+    strength = CATALOGUE[name].strength
+    power = candidate(name).power
+    to_fit = case.to_fit(null.keys)
+    now = bounded(name, parameters)
+    shift = simulated_shift(case, model, null, name, now)
+    for _ in range(4):
+        peak = float(np.abs(shift[to_fit]).max())
+        if 0.5 * PEAK < peak < 2.5 * PEAK:
+            break
+        factor = np.clip((PEAK / max(peak - 3.0, 0.3)) ** (1 / power), 1e-3, 30.0)
+        then = bounded(name, {**now, strength: now[strength] * factor})
+        if then == now:
+            break
+        now = then
+        shift = simulated_shift(case, model, null, name, now)
+    return Template(name, now, shift)
+
+
+def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Array:
+    """(S,) change of the statistics, in noise, that a candidate makes: by units drawn, or by a twin of the unit that
+    indirect inference gives: else a refit would take up a bend of the rates, and saturation show a unit too bright."""
+    there = with_effect(model, name, parameters)
+    if is_pattern(name):
+        made = with_pattern(case, there, null, null.prediction)
+    else:
+        made, _ = settled_there(
+            partial(predict, case, null=null, count=1), null, there, constrained_refit(there, case.base), []
+        )
+    return np.nan_to_num((made.mean - null.mean) / null.noise)
