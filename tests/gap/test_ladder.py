@@ -10,7 +10,7 @@ import pytest
 
 from spikecam_env.cli.main import run
 from spikecam_env.gap import Dark, Flat, Step, write_campaign
-from spikecam_env.gap.ladder import figure, ladder, table
+from spikecam_env.gap.ladder import ladder, ladder_figure, rung_rows
 
 
 @pytest.mark.slow
@@ -19,7 +19,7 @@ def test_from_ideal_the_gap_falls_with_every_effect_down_to_chance(tmp_path: Pat
     recordings = [Dark(), *(Flat(radiance=x) for x in (0.05, 0.2, 0.5)), Step(), Flat(radiance=0.12, use="holdout")]
     campaign = write_campaign(tmp_path / "c", "physical", shape=(32, 32), frames=2500, recordings=recordings, seed=3)
     made = ladder(campaign, "ideal")
-    for row in table(made):
+    for row in rung_rows(made):
         print(row)
     gaps = [r.gap for r in made.rungs]
     added = [r.added.name for r in made.rungs[1:] if r.added]
@@ -29,7 +29,7 @@ def test_from_ideal_the_gap_falls_with_every_effect_down_to_chance(tmp_path: Pat
     made.write(tmp_path / "out")
     assert json.loads((tmp_path / "out" / "ladder.json").read_text())["rungs"][1]["added"] == added[0]
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"ladder.json", "ladder.png", "model.toml"}
-    assert "added" not in figure(made).axes[0].get_title()
+    assert "added" not in ladder_figure(made).axes[0].get_title()
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from scipy import stats
 
 from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.result import Evidence
+from spikecam_env.gap.result import LABELLED_LIGHT, NOMINAL_LIGHT, Evidence
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import drawn
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
@@ -61,7 +61,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Maps:
+class PixelMaps:
     """One picture (H, W) of every pixel, measured and simulated."""
 
     title: str
@@ -87,6 +87,7 @@ def evidence_of(
 
     base, after_base: the units to simulate under each.  after: None where nothing was added.
     """
+    counted_anew = case.nominal_per_label != 1.0
 
     def twin(model: SensorModel, unit: BaseFit, number: int) -> tuple[Observation, ...]:
         seed, takes = case.seed * 1000 + 900 + number, range(len(case.conditions))
@@ -108,6 +109,7 @@ def evidence_of(
         again=again,
         drawn_before=None if case.scenes_only else drawn(before, case.base, case.shape, case.seed),
         drawn_after=drawn(after, case.base, case.shape, case.seed) if after and not case.scenes_only else None,
+        light=NOMINAL_LIGHT if counted_anew else LABELLED_LIGHT,
     )
 
 
@@ -152,13 +154,13 @@ def error_known(values: Array, known: NDArray[np.bool_]) -> Array:
     return np.sqrt((off**2).sum(axis=-1)) / count
 
 
-def loudest(panels: Sequence[Panel], number: int) -> list[Panel]:
+def largest(panels: Sequence[Panel], number: int) -> list[Panel]:
     """The panels where measured and before differ most, in the order given."""
     kept = sorted(panels, key=lambda p: -p.z)[:number]
     return [p for p in panels if p in kept]
 
 
-def scaled(sd: Array, difference: Array | None) -> Array:
+def scaled_by_twins(sd: Array, difference: Array | None) -> Array:
     """Standard errors times the root mean square of two twins' difference over them.
 
     Few points know that scale poorly: its upper 90 % limit is taken.

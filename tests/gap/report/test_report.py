@@ -14,12 +14,13 @@ import made_up
 import numpy as np
 import pytest
 
-from spikecam_env.gap.report.exhibits import by_loudness, exhibits
+from spikecam_env.gap.report.exhibits import by_z, exhibits
 from spikecam_env.gap.report.exhibits.spectrum import averaged, panels
 from spikecam_env.gap.report.exhibits.step import free_window
-from spikecam_env.gap.report.page import command_of, report, write_report
+from spikecam_env.gap.report.page import report, write_report
 from spikecam_env.gap.report.plots import strip
-from spikecam_env.gap.report.words import at_most
+from spikecam_env.gap.report.quantities import at_most
+from spikecam_env.gap.report.reproduce import command_of
 from spikecam_env.gap.result import VERDICTS
 from spikecam_env.sensor import SensorModel
 
@@ -151,7 +152,7 @@ def test_text_of_a_campaign_cannot_become_markup(tmp_path: Path) -> None:
 def test_the_exhibit_of_an_effect_is_among_the_first_and_the_patch_closes_it(effect: str, loud: str) -> None:
     d = made_up.named(effect)
     made = {e.name: e for e in exhibits(d.evidence, 40_000.0)}
-    first = by_loudness(list(made.values()), d.statistics)[0][:2]
+    first = by_z(list(made.values()), d.statistics)[0][:2]
     assert loud in [e.name for e in first]
     panel = max(made[loud].panels, key=lambda p: p.z)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import fields, replace
 
 import made_up
 import pytest
 
-from spikecam_env.gap.report.words import bare, quantity, sentence, unit_of
-from spikecam_env.gap.verdict.notes import LENT
+from spikecam_env.gap.report.quantities import quantity
+from spikecam_env.gap.report.sentence import sentence
+from spikecam_env.gap.report.words import bare, parameter_unit
+from spikecam_env.gap.result import Conclusion, Diagnosis
+from spikecam_env.gap.verdict.notes import Note
 from spikecam_env.sensor import CATALOGUE
+
+
+def sentence_of(d: Diagnosis) -> str:
+    """The sentence of what a diagnosis holds."""
+    held = vars(d) | {"notes": d.data}
+    return sentence(Conclusion(**{f.name: held[f.name] for f in fields(Conclusion)}), d.model_name)
 
 
 @pytest.mark.parametrize(
@@ -32,7 +42,7 @@ def test_every_parameter_of_the_catalogue_has_a_plain_name_and_a_unit_in_words()
     for effect, kind in CATALOGUE.items():
         for parameter in kind().parameters():
             assert "_" not in bare(effect, parameter)
-            assert isinstance(unit_of(effect, parameter), str)
+            assert isinstance(parameter_unit(effect, parameter), str)
     assert bare("light_flicker", "frequency_hz") == "frequency"
 
 
@@ -53,17 +63,26 @@ def test_every_parameter_of_the_catalogue_has_a_plain_name_and_a_unit_in_words()
     ],
 )  # fmt: skip
 def test_a_sentence_says_the_verdict(verdict: str, said: str) -> None:
-    assert sentence(made_up.EVERY[verdict]()) == said
+    assert sentence_of(made_up.EVERY[verdict]()) == said
 
 
 def test_a_gap_on_recordings_that_told_parameters_is_not_called_a_check() -> None:
-    lent = replace(made_up.named(), data=(LENT,))
-    assert sentence(lent).endswith("removes 97 % of the gap on the recordings held out, which told parameters too.")
+    fitted = replace(made_up.named(), data=(Note.PARAMETERS_FROM_HELD_OUT,))
+    assert sentence_of(fitted).endswith(
+        "removes 97 % of the gap on the recordings held out, which told parameters too."
+    )
+
+
+def test_what_a_note_is_decides_and_not_what_it_says() -> None:
+    """The same words as plain text are no note of that kind; other kinds of notes change nothing."""
+    prose = replace(made_up.named(), data=(Note.PARAMETERS_FROM_HELD_OUT.value, "The gain is 0.001 of nominal"))
+    assert sentence_of(prose) == sentence_of(made_up.named())
+    assert json.dumps([*Note]) == json.dumps([note.value for note in Note])
 
 
 def test_parameters_that_are_off_beside_an_effect_are_said() -> None:
     off = {"reset_noise": {"measured": 19.9, "nominal": 0.976, "ratio": 20.4}}
-    said = sentence(replace(made_up.named(), parameters=off))
+    said = sentence_of(replace(made_up.named(), parameters=off))
     assert said.endswith(
         "not used. Parameters of the model scsim are off as well: reset noise is 19.9 mV, not 0.976 mV."
     )
@@ -72,4 +91,4 @@ def test_parameters_that_are_off_beside_an_effect_are_said() -> None:
 def test_two_effects_are_named_together() -> None:
     d = made_up.named()
     both = replace(d, effects=(*d.effects, *made_up.named("dead_time").effects))
-    assert "1.22 ms) and dead time (tau 1.02 us); adding them removes" in sentence(both)
+    assert "1.22 ms) and dead time (tau 1.02 us); adding them removes" in sentence_of(both)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from spikecam_env.gap.report.evidence import Array, Maps, Panel, shape_of
+from spikecam_env.gap.report.evidence import Array, Panel, PixelMaps, shape_of
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Fixed pattern"
@@ -46,13 +46,13 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
                     None if after is None else after.mean(axis=axis), sd)  # fmt: skip
 
 
-def maps(evidence: Evidence) -> Iterator[Maps]:
+def maps(evidence: Evidence) -> Iterator[PixelMaps]:
     """Maps of dark level and response."""
     shape = shape_of(evidence) if np.ptp(evidence.measured_base.gain) > 0 else None
     for what, title in _TITLES.items() if shape else ():
         measured, before, after = (None if v is None else v.reshape(shape) for v in _values(evidence, what))
         assert measured is not None and before is not None
-        yield Maps(f"{title} [{_UNITS[what]}]", measured, before, after)
+        yield PixelMaps(f"{title} [{_UNITS[what]}]", measured, before, after)
 
 
 def _values(evidence: Evidence, what: str) -> list[Array | None]:

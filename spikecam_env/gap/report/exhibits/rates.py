@@ -32,7 +32,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         known = np.isfinite(measured - before)
         usable = known.sum(axis=1) > 1
         yield Panel(
-            "Rate off each pixel's line", "radiance (label)", "rate off the line [%]", level[order][usable],
+            "Rate off each pixel's line", evidence.light, "rate off the line [%]", level[order][usable],
             mean_known(measured, known)[usable], mean_known(before, known)[usable],
             None if after is None else mean_known(after, np.isfinite(after))[usable],
             error_known(measured - before, known)[usable], log="x",
