@@ -15,13 +15,12 @@ from spikecam_env.gap.candidates.table import expected_events
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.observe.conditions import planned
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.gap.report.quantities import at_most, bounded_parameter
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import load
 from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.verdict.bounds import ScoredShape, bound_of, bounds, first_strength, scored_shape
-from spikecam_env.gap.verdict.score import RULE_OF_THREE, Score, StrengthTest, TwinProbe, linear_score
+from spikecam_env.gap.verdict.score import RULE_OF_THREE, Score, StrengthTest
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames
 
@@ -100,25 +99,6 @@ def test_without_effort_there_is_no_bound_and_that_is_said():
     assert all("--effort" in needs for _, needs in open_) and case.effort.left_out == ["upper bounds"]
 
 
-def test_a_strength_of_which_few_events_are_expected_is_never_refuted():
-    assert not StrengthTest(excess=1e9, sd=1.0, quantile=1.8, events=RULE_OF_THREE).refuted_by(0.0)
-    assert StrengthTest(excess=1e9, sd=1.0, quantile=1.8, events=3.01).refuted_by(0.0)
-    assert pytest.approx(0.05) == np.exp(-RULE_OF_THREE)
-
-
-def test_a_strength_is_refuted_by_what_scores_below_nineteen_of_twenty_of_its_campaigns():
-    test = StrengthTest(excess=10.0, sd=2.0, quantile=1.8, events=np.inf)
-    assert test.refuted_by(6.3) and not test.refuted_by(6.5)
-
-
-def test_what_so_few_events_scatter_counts_however_alike_a_few_campaigns_are():
-    """Nine events expected: their number is known to a third, and so is the score."""
-    score = Score(lambda v: 0.0, np.array([-1.0, 0.0, 1.0]), 0.0, {}, 1.0)
-    alike = np.array([12.0, 12.0, 12.1, 12.0])
-    assert TwinProbe.score_variance(score, alike, excess=12.0, events=9.0) == pytest.approx(1.0 + 12.0**2 / 9)
-    assert TwinProbe.score_variance(score, alike, excess=12.0, events=np.inf) == pytest.approx(1.0)
-
-
 def test_what_is_counted_is_first_tried_where_some_are_expected():
     case = recorded()
     probe = SimpleNamespace(
@@ -129,13 +109,6 @@ def test_what_is_counted_is_first_tried_where_some_are_expected():
     assert probe.events(first_strength(look)) == pytest.approx(2 * RULE_OF_THREE)
     look.expected = 1e-3
     assert first_strength(look)["probability"] == pytest.approx(1.2e-3)
-
-
-def test_a_bound_is_rounded_up_and_says_where_it_holds():
-    bound = Bound("light_flicker", "modulation", "relative", 0.012011, {"frequency_hz": 2000.0})
-    assert at_most(bound) == "1.3 %" and bounded_parameter(bound) == "modulation (frequency 2000 Hz)"
-    assert at_most(replace(bound, below=0.012)) == "1.2 %"
-    assert at_most(Bound("spurious_spikes", "probability", "per frame", 3.81e-7)) == "3.9e-07 per frame"
 
 
 class Linear:
@@ -200,12 +173,6 @@ def test_the_least_refuted_strength_is_bracketed() -> None:
     found = bound_of(NOTHING, ScoredShape(far, misled, 0.0))
     print(found, far.tests)
     assert len(far.tests) == 2 and 0.02 < found.below < 0.02 / 0.6, "the first, four times too large, was not enough"
-
-
-def test_a_statistic_counts_as_five_noises_off_at_most() -> None:
-    null = SimpleNamespace(mean=np.zeros(2), noise=np.ones(2))
-    score = [linear_score(null, np.array([1.0, 0.0]), np.array([x, 9.0])) for x in (4.0, 6.0, 100.0, np.nan)]
-    assert score == [4.0, 5.0, 5.0, 0.0]
 
 
 @pytest.mark.parametrize("campaigns, begun", [(140, False), (160, True)])
