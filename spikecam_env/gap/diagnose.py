@@ -74,7 +74,8 @@ def diagnose(
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
-        found = of_spikes(measured, tested, names, seed, jobs, effort, twin_count, templates, stages)
+        asked = Asked(tuple(names), seed, jobs, effort, twin_count)
+        found = of_spikes(measured, tested, asked, templates, stages)
     else:
         with stages.timed("maps"):
             found = Findings(*diagnose_maps(measured, tested, names, seed, jobs))
@@ -119,22 +120,25 @@ class Findings:
     simulated: int = 0
 
 
+@dataclass(frozen=True)
+class Asked:
+    """How a campaign is to be diagnosed: names of candidates, and options as of `diagnose`."""
+
+    names: tuple[str, ...]
+    seed: int
+    jobs: int
+    effort: float
+    twin_count: int
+
+
 def of_spikes(
-    measured: Campaign,
-    tested: SensorModel,
-    names: Sequence[str],
-    seed: int,
-    jobs: int,
-    effort: float,
-    twin_count: int,
-    templates: Templates | None,
-    stages: Stages,
+    measured: Campaign, tested: SensorModel, asked: Asked, templates: Templates | None, stages: Stages
 ) -> Findings:
     """A campaign of spikes, from its files to what a diagnosis says of it: one room after another."""
     with stages.timed("read"):
-        case = read_case(measured, seed, jobs)
+        case = read_case(measured, asked.seed, asked.jobs)
         notes = said_of(case.nominal_per_label, case.base)
-    comparison = compared(case, tested, names, effort, twin_count, stages)
+    comparison = comparison_of(case, tested, asked, stages)
     case, null, values = comparison.case, comparison.null, comparison.values
     rounds: list[Round] = []
     if comparison.disagrees:
@@ -188,40 +192,38 @@ def refittable(conditions: Sequence[Shown]) -> bool:
     return scenes or sum(c.kind in KNOWN and c.use == "fit" for c in conditions) >= 2
 
 
-def compared(
-    case: Case, tested: SensorModel, names: Sequence[str], effort: float, twin_count: int, stages: Stages
-) -> Comparison:
+def comparison_of(case: Case, tested: SensorModel, asked: Asked, stages: Stages) -> Comparison:
     """The case beside a model, without a search: labels that contradict, effects that the refit says are missing, what
     is off nominal, and the null model's twins."""
     with stages.timed("audit"):
         contradictions = upheld(case, tested, audit(case))
         case = trimmed(case, contradictions)
-        case = replace(case, effort=Effort(effort * len(case.conditions), settled=bool(contradictions)))
-    names, not_testable = testable(names, case.conditions)
+        case = replace(case, effort=Effort(asked.effort * len(case.conditions), settled=bool(contradictions)))
+    names, not_testable = testable(asked.names, case.conditions)
     lacking = missing(case, tested, names)
     model = with_all(tested, lacking)
     off = Off({}, case.base) if lacking else off_nominal(case, tested, case.base)
     with stages.timed("twins"):
-        null = model_null(case, model, twin_count)
+        null = model_null(case, model, asked.twin_count)
         differs = lacking or off.parameters
         given = model_null(replace(case, base=off.nominal), tested, TWINS_AS_GIVEN) if differs else null
     return Comparison(
-        case,
-        tested,
-        model,
-        null,
-        values_of(case.bank, null.keys),
-        aligned_mean(given, null),
-        tuple(lacking),
-        off,
-        tuple(contradictions),
-        tuple(names),
-        tuple(not_testable),
+        case=case,
+        tested=tested,
+        model=model,
+        null=null,
+        values=values_of(case.bank, null.keys),
+        given=aligned_mean(given, null),
+        missing=tuple(lacking),
+        off=off,
+        contradictions=tuple(contradictions),
+        names=tuple(names),
+        not_testable=tuple(not_testable),
     )
 
 
 TWINS_AS_GIVEN = 2
-"""Twins that say what a model as given predicts, where the null model is another: for the gap before alone."""
+"""Twins of a model as given, where the null model is another: its gap is large beside what two leave open."""
 
 
 def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:

@@ -42,7 +42,7 @@ from spikecam_env.whole import whole_file, write_text_whole
 
 Array = NDArray[np.float64]
 
-FORMAT = "spikecam-ladder/1"
+LADDER_FORMAT = "spikecam-ladder/1"
 
 TWINS = 2
 """Twins of a rung that is not the last: its distance is large beside what two leave open."""
@@ -52,7 +52,7 @@ TWINS = 2
 class Rung:
     """A model on the way.  added: its newest effect, None for the first; sd: of its strength.
 
-    also: names that these recordings cannot tell it from.  gap: mean square of held-out statistics, in noise, 1 is
+    also: names that are tied with it.  gap: mean square of held-out statistics, in noise, 1 is
     chance.  groups: the same of each group of statistics, over all recordings.  off: statistics of p < 0.05.
     """
 
@@ -89,7 +89,7 @@ class Ladder:
             }
             for r in self.rungs
         ]
-        return {"format": FORMAT, "campaign": self.campaign, "seed": self.seed, "statistics": self.statistics,
+        return {"format": LADDER_FORMAT, "campaign": self.campaign, "seed": self.seed, "statistics": self.statistics,
                 "rungs": rungs}  # fmt: skip
 
     def write(self, folder: Path) -> None:

@@ -18,7 +18,7 @@ from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.whole import write_text_whole
 
-FORMAT = "spikecam-diagnosis/1"
+DIAGNOSIS_FORMAT = "spikecam-diagnosis/1"
 VERDICTS = ("none", "named", "class", "unknown", "parameter", "data")
 
 
@@ -225,7 +225,7 @@ class Diagnosis:
         """The documented format."""
         found = [s for s in self.statistics if s.p_adjusted < SIGNIFICANT]
         return {
-            "format": FORMAT,
+            "format": DIAGNOSIS_FORMAT,
             "verdict": self.verdict,
             "sentence": self.sentence,
             "effects": [e.to_json() for e in self.effects],
@@ -260,10 +260,10 @@ class Diagnosis:
         """diagnosis.json and model.toml, whole."""
         folder.mkdir(parents=True, exist_ok=True)
         self.patched.to_toml(folder / "model.toml")
-        write_text_whole(folder / "diagnosis.json", json.dumps(self.to_json(), indent=1, default=_plain))
+        write_text_whole(folder / "diagnosis.json", json.dumps(self.to_json(), indent=1, default=json_value))
 
 
-def _plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     if isinstance(value, (np.floating, np.integer)):
         return value.item()
     if isinstance(value, NDArray | np.ndarray):

@@ -14,7 +14,7 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.maps.bank import MapCase, with_use
-from spikecam_env.gap.maps.search import LINEAR_PARAMETERS, SPREAD_PARAMETERS, MapFit, PatternModel, free_of
+from spikecam_env.gap.maps.search import LINEAR_PARAMETERS, SPREAD_PARAMETERS, MapFit, PatternModel, fitted_parameters
 from spikecam_env.gap.result import MOST_CONFIDENCE, Conclusion, Estimate, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.unit.usual import USUAL
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -156,7 +156,7 @@ def fit_estimates(tried: MapFit, name: str) -> dict[str, Estimate]:
     values = next(e for e in tried.state.model.effects if e.name == name).parameters()
     return {
         p: Estimate(values[p], tried.sd.get(f"{name}.{p}", np.nan) * (1.0 if p in LINEAR_PARAMETERS else values[p]))
-        for p in free_of(name)
+        for p in fitted_parameters(name)
     }
 
 

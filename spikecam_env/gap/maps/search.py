@@ -141,10 +141,10 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array,
     if name:
         default = CATALOGUE[name]().parameters()
         state = PatternModel(with_effect(state.model, name, default), state.factors, (*state.added, name))
-    free = [("", w) for w in SPREAD_PARAMETERS if w in state.factors]
-    free += [(n, p) for n in state.added for p in free_of(n)]
+    varied = [("", w) for w in SPREAD_PARAMETERS if w in state.factors]
+    varied += [(n, p) for n in state.added for p in fitted_parameters(n)]
     use = with_use(case, null.keys, "fit")
-    sd = dict.fromkeys((f"{n}.{p}" for n, p in free), np.nan)
+    sd = dict.fromkeys((f"{n}.{p}" for n, p in varied), np.nan)
     damping, best, least = FIRST_DAMPING, state, np.inf
     for _ in range(MOST_STEPS):
         at = unit_means(state, case, null.keys, [0])
@@ -154,15 +154,15 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array,
         else:
             best, least, predicted = state, now, at
             jacobian = np.stack(
-                [unit_means(_moved(best, f, DERIVATIVE_STEP), case, null.keys, [0]) - predicted for f in free], axis=1
-            ) / DERIVATIVE_STEP if free else np.zeros((len(at), 0))  # fmt: skip
+                [unit_means(_moved(best, f, DERIVATIVE_STEP), case, null.keys, [0]) - predicted for f in varied], axis=1
+            ) / DERIVATIVE_STEP if varied else np.zeros((len(at), 0))  # fmt: skip
             damping *= 0.5
-        if not free:
+        if not varied:
             break
         step, covariance = _step(null, values, predicted, np.nan_to_num(jacobian), use, damping)
         sd = dict(zip(sd, np.sqrt(np.diag(covariance)), strict=True))
         state = best
-        for f, s in zip(free, np.clip(step, -1.0, 1.0), strict=True):
+        for f, s in zip(varied, np.clip(step, -1.0, 1.0), strict=True):
             state = _moved(state, f, float(s))
         if np.abs(step).max() < 0.01:
             break
@@ -171,7 +171,8 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array,
     return MapFit(name, best, sd, predicted, rho, misfit(rho[use]))
 
 
-def free_of(name: str) -> tuple[str, ...]:
+def fitted_parameters(name: str) -> tuple[str, ...]:
+    """What is fitted of a candidate: as in the table, and where it has a centre."""
     return (*candidate(name).fitted, *(p for p in LINEAR_PARAMETERS if p in CATALOGUE[name].__dataclass_fields__))
 
 

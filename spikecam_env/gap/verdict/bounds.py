@@ -46,7 +46,7 @@ LARGEST_SCALING = 40.0
 
 LIKELY_SDS = 1.8
 """Standard deviations of the score by which a refuted strength is likely to lie above what is seen: 1.645 of a normal
-score for CONFIDENCE, and more of the few campaigns that tell its scatter."""
+score for CONFIDENCE, and more where few campaigns estimate its scatter."""
 
 RESOLUTION, OVERSHOOT = 0.6, 1.2
 """A bound is at most 1 / RESOLUTION times the least strength that would be refuted; the first that is tested is
@@ -65,7 +65,7 @@ def bounds(
 ) -> tuple[list[Bound], list[tuple[str, str]]]:
     """(upper bounds of effects that were not found, names of those that have none with what would give one).
 
-    model, null: what explains the campaign.  measured: (S,) its statistics.  templates: say where to begin.  Of an
+    model, null: what explains the campaign.  measured: (S,) its statistics.  templates: where to begin.  Of an
     effect of several shapes the bound is of the one that shows least; of one of either sign, of its size.
     """
     if case.scenes_only:

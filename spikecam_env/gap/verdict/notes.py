@@ -31,5 +31,5 @@ def notes_of(rounds: Sequence[Round]) -> list[str]:
 
 
 def gap_is_fitted(notes: Sequence[str]) -> bool:
-    """Whether notes say that recordings held out were fitted: by what a note is, not by what it says."""
+    """Whether recordings held out were fitted, by the kinds of notes and not by their words."""
     return any(isinstance(note, Note) for note in notes)

@@ -96,7 +96,7 @@ class StrengthTest:
         return self.events > RULE_OF_THREE and excess < self.excess - self.quantile * self.sd
 
 
-class Probe:
+class EffectProbe:
     """A candidate on the campaign at hand."""
 
     def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
@@ -114,8 +114,8 @@ class Probe:
         return max(float(np.var(scores, ddof=1)), float(np.var(score.without, ddof=1)) + by_chance)
 
 
-class TwinProbe(Probe):
-    """Scores of twins of the campaign.  The last draws, with the effect where it is strong, say which statistics count;
+class TwinProbe(EffectProbe):
+    """Scores of twins of the campaign.  The last draws, with the effect where it is strong, select statistics;
     the first, how they change where it is weak."""
 
     def __init__(self, case: Case, model: SensorModel, null: Null, measured: Array, name: str):
@@ -188,7 +188,7 @@ class TwinProbe(Probe):
         return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, n - 1)), events)
 
 
-class UnitProbe(Probe):
+class UnitProbe(EffectProbe):
     """Scores of drawn units, which differ by the model's pattern and by the effect's."""
 
     def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
@@ -236,7 +236,7 @@ def linear(
 
 
 def linear_score(null: Null, weight: Array, values: Array) -> float:
-    """Score of statistics (S,) along a change; what is unknown says nothing."""
+    """Score of statistics (S,) along a change; what is unknown counts for nothing."""
     return float(weight @ np.clip(np.nan_to_num((values - null.mean) / null.noise), -MOST_DEVIATE, MOST_DEVIATE))
 
 

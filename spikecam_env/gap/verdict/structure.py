@@ -15,7 +15,7 @@ from spikecam_env.gap.verdict.where_and_when import when, where
 Array = NDArray[np.float64]
 
 CLEARLY_OFF = 5.0
-"""Noises from which a statistic says what a discrepancy looks like: of 700, chance takes none so far."""
+"""Noises from which a statistic describes a discrepancy: chance takes one of 700 so far in one campaign of 2500."""
 
 COMMON_SHARE = 0.3
 """Share of the deviance, in statistics of what many pixels have in common, from which they do have it in common."""
