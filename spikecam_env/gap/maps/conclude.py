@@ -14,7 +14,7 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.maps.bank import MapCase, with_use
-from spikecam_env.gap.maps.search import LINEAR_PARAMETERS, SPREAD_PARAMETERS, MapFit, PatternModel, fitted_parameters
+from spikecam_env.gap.maps.search import FITTED_SPREADS, LINEAR_PARAMETERS, MapFit, PatternModel, fitted_parameters
 from spikecam_env.gap.result import MOST_CONFIDENCE, Conclusion, Estimate, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.unit.usual import USUAL
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -86,7 +86,7 @@ def significant_effects(
     """The best of each round after the first, where its strength is significant in the end."""
     found = []
     for fits in rounds[1:]:
-        if is_significant(rounds[-1][0], fits[0].name):
+        if has_clear_strength(rounds[-1][0], fits[0].name):
             instead = {f.name: gap_of_maps(case, null, values, f.predicted).removed for f in fits[1:]}
             found.append(named_effect(fits, rounds[-1][0], instead))
     return tuple(found)
@@ -109,7 +109,7 @@ def patched_model(case: MapCase, tested: SensorModel, last: MapFit | None) -> Se
     if last is None:
         return tested
     patched = at_measured_dark(last.state, case)
-    for name in (n for n in last.state.added if not is_significant(last, n)):
+    for name in (n for n in last.state.added if not has_clear_strength(last, n)):
         patched = patched.without(name)
     return patched
 
@@ -121,8 +121,8 @@ def spreads_off(case: MapCase, state: PatternModel) -> dict[str, dict[str, float
         if 1 / USUAL < factor < USUAL:
             continue
         for effect in state.model.effects:
-            if effect.name in SPREAD_PARAMETERS[what]:
-                key = SPREAD_PARAMETERS[what][effect.name]
+            if effect.name in FITTED_SPREADS[what]:
+                key = FITTED_SPREADS[what][effect.name]
                 nominal = effect.parameters()[key]
                 found[effect.name] = {"measured": nominal * factor, "nominal": nominal, "ratio": factor}
     return found
@@ -146,7 +146,7 @@ def named_effect(tried: Sequence[MapFit], last: MapFit, instead: dict[str, float
     )
 
 
-def is_significant(last: MapFit, name: str) -> bool:
+def has_clear_strength(last: MapFit, name: str) -> bool:
     """Whether an effect's strength is more than two standard deviations in the end: a later one may take its place."""
     return last.sd[f"{name}.{CATALOGUE[name].strength}"] < LARGEST_RELATIVE_SD
 

@@ -30,7 +30,7 @@ def diagnose_maps(
     names: of candidates.  seed, jobs: as in `diagnose.diagnose`.  Raises InputError where no rates are in known light.
     """
     case = read_maps(campaign, seed, jobs)
-    tested = [n for n in names if is_pattern(n) and is_visible(n, case)]
+    tested = [n for n in names if is_pattern(n) and shows_in_maps(n, case)]
     measured = case.statistics
     given = spreads_matched(PatternModel(model, {}), case, measured)
     banks = [map_bank(unit_maps(given.fitted, case, n)) for n in range(PREDICTED_UNITS)]
@@ -44,7 +44,7 @@ def diagnose_maps(
     return conclusion, evidence_of_maps(case, given, rounds[-1][0] if rounds else None)
 
 
-def is_visible(name: str, case: MapCase) -> bool:
+def shows_in_maps(name: str, case: MapCase) -> bool:
     """Dark effects want a dark map, all others a lit one; what is one number with a spread of the model is none."""
     kinds = {m.shown.kind for m in case.maps}
     return "dark" in kinds if candidate(name).family == "dark" else bool(kinds & {"flat", "picture"})

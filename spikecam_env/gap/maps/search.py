@@ -29,17 +29,17 @@ Array = NDArray[np.float64]
 PREDICTED_UNITS = 8
 """Units of each model that its predictions are means over."""
 
-MOST_STEPS = 6
+MAP_FIT_STEPS = 6
 """Gauss-Newton steps of a fit."""
 
 LEAST_IMPROVEMENT = 25.0
 """Deviance that an effect has to remove to be added: statistics of one map depend on one another, and count several
 times over."""
 
-MOST_EFFECTS = 5
+MOST_MAP_EFFECTS = 5
 """Effects that one diagnosis of maps names together."""
 
-SPREAD_PARAMETERS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
+FITTED_SPREADS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
 """What is scaled to fit how pixels differ: parameters of effects, by what they spread."""
 
 LINEAR_PARAMETERS = ("centre_x", "centre_y")
@@ -64,7 +64,7 @@ class PatternModel:
     def fitted(self) -> SensorModel:
         """The model with its spreads scaled."""
         out = self.model
-        for what, spreads in SPREAD_PARAMETERS.items():
+        for what, spreads in FITTED_SPREADS.items():
             for effect in self.model.effects:
                 if effect.name in spreads and what in self.factors:
                     key = spreads[effect.name]
@@ -108,7 +108,7 @@ def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Key, floa
                 if m.shown.kind in kinds and m.shown.use == "fit"
             ]
             off = [measured[k] - simulated[k] for k in keys if k in measured and k in simulated]
-            if off and any(e.name in SPREAD_PARAMETERS[what] for e in state.model.effects):
+            if off and any(e.name in FITTED_SPREADS[what] for e in state.model.effects):
                 factors[what] = float(np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *WITHIN))
         state = replace(state, factors=factors)
     return state
@@ -121,7 +121,7 @@ def search_maps(
     was tried last and did not help."""
     rounds = [[fit_candidate(case, given, null, values, "")]]
     left = list(names)
-    while left and len(rounds) <= MOST_EFFECTS:
+    while left and len(rounds) <= MOST_MAP_EFFECTS:
         now = rounds[-1][0]
         if not alarmed(null, now.rho):
             break
@@ -141,12 +141,12 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array,
     if name:
         default = CATALOGUE[name]().parameters()
         state = PatternModel(with_effect(state.model, name, default), state.factors, (*state.added, name))
-    varied = [("", w) for w in SPREAD_PARAMETERS if w in state.factors]
+    varied = [("", w) for w in FITTED_SPREADS if w in state.factors]
     varied += [(n, p) for n in state.added for p in fitted_parameters(n)]
     use = with_use(case, null.keys, "fit")
     sd = dict.fromkeys((f"{n}.{p}" for n, p in varied), np.nan)
     damping, best, least = FIRST_DAMPING, state, np.inf
-    for _ in range(MOST_STEPS):
+    for _ in range(MAP_FIT_STEPS):
         at = unit_means(state, case, null.keys, [0])
         now = misfit(residual(null, values, mean_prediction(null, at, 1))[use])
         if now > least:

@@ -15,11 +15,11 @@ from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]
 
-STANDS_OUT = 8.0
+LOCAL_NOISES = 8.0
 """Noises by which a field or a half has to stand out: comparisons are many; in the clean campaigns of
 `tests/gap/verdict` none does."""
 
-STANDS_OUT_POOLED = 5.0
+LOCAL_NOISES_POOLED = 5.0
 """Noises by which the halves of all recordings together have to differ: one comparison, not one for each."""
 
 FIELDS_PER_SIDE = 3
@@ -82,19 +82,19 @@ def outlying_counts(irregular: Array, fields: NDArray[np.int64]) -> NDArray[np.b
     share = np.bincount(fields, minlength=FIELDS_PER_SIDE**2) / fields.size
     usual = float(np.median(count / share))
     expected = np.maximum(usual * share, 1.0)
-    return (count > TIMES_EXPECTED * expected) & (count - expected > STANDS_OUT * np.sqrt(expected))
+    return (count > TIMES_EXPECTED * expected) & (count - expected > LOCAL_NOISES * np.sqrt(expected))
 
 
 def outlying_means(values: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(9,) fields whose median of (P,) values is off by STANDS_OUT of its own error, sqrt(pi / 2) sd / sqrt(n), and of
-    the scatter of the others."""
+    """(9,) fields whose median of (P,) values is off by LOCAL_NOISES of its error, sqrt(pi / 2) sd / sqrt(n), and of the
+    scatter of the others."""
     mean = np.array([np.median(values[fields == f]) for f in range(FIELDS_PER_SIDE**2)])
     off = np.abs(mean - np.median(mean))
     inside = np.sort(off)[: FIELDS_PER_SIDE**2 - FIELDS_PER_SIDE]
     error = 1.2533 * np.array(
         [values[fields == f].std() / np.sqrt((fields == f).sum()) for f in range(FIELDS_PER_SIDE**2)]
     )
-    return off > np.maximum(STANDS_OUT * np.maximum(np.sqrt(np.mean(inside**2)), error), LEAST_OFF)
+    return off > np.maximum(LOCAL_NOISES * np.maximum(np.sqrt(np.mean(inside**2)), error), LEAST_OFF)
 
 
 def rows_and_columns(field: int, shape: tuple[int, int]) -> str:
@@ -123,13 +123,13 @@ def when(case: Case) -> str:
         blocks = o.blocks[:-1] if o.frames % BLOCKS else o.blocks
         votes += step_in_the_middle(blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))
     if len(votes) < 2:
-        votes = later_half(irregular, STANDS_OUT_POOLED)  # few events a recording, but of all together
+        votes = later_half(irregular, LOCAL_NOISES_POOLED)  # few events a recording, but of all together
     if not votes:
         return ""
     return "from about half of each recording on" if np.mean(votes) > 0.5 else "until about half of each recording"
 
 
-def later_half(halves: Array, sigmas: float = STANDS_OUT) -> list[bool]:
+def later_half(halves: Array, sigmas: float = LOCAL_NOISES) -> list[bool]:
     """Whether there are more counts in the second half; nothing where that may be chance."""
     first, second = halves
     clear = abs(first - second) > max(sigmas * np.sqrt(first + second), HALVES_DIFFER * (first + second))
@@ -148,4 +148,4 @@ def step_in_the_middle(blocks: Array, spikes: float) -> list[bool]:
     first, second = whole[: len(whole) // 2], whole[len(whole) // 2 :]
     step = float(second.mean() - first.mean())
     left = float(np.sqrt(np.mean(np.concatenate([first - first.mean(), second - second.mean()]) ** 2)))
-    return [step > 0] if abs(step) > max(STANDS_OUT * left, LEAST_STEP) else []
+    return [step > 0] if abs(step) > max(LOCAL_NOISES * left, LEAST_STEP) else []

@@ -7,7 +7,7 @@ import pytest
 from small import FRAMES, SHAPE, case_from, effect, recorded, spikes_of
 
 from spikecam_env.gap.verdict.where_and_when import (
-    STANDS_OUT_POOLED,
+    LOCAL_NOISES_POOLED,
     later_half,
     line_in_one_half,
     outlying_counts,
@@ -119,7 +119,7 @@ def test_halves_have_to_differ_by_noise_and_by_a_share() -> None:
     assert many == {0.2: [], 0.4: [True]}
     few = {d: later_half(np.array([50 * (1 - d), 50 * (1 + d)])) for d in (0.6, 0.9)}  # 6 and 9 noises of 0.1
     assert few == {0.6: [], 0.9: [True]}
-    pooled = {d: later_half(np.array([50 * (1 - d), 50 * (1 + d)]), STANDS_OUT_POOLED) for d in (0.35, 0.6)}
+    pooled = {d: later_half(np.array([50 * (1 - d), 50 * (1 + d)]), LOCAL_NOISES_POOLED) for d in (0.35, 0.6)}
     assert pooled == {0.35: [], 0.6: [True]}
 
 
