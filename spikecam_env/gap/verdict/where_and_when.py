@@ -86,8 +86,8 @@ def outlying_counts(irregular: Array, fields: NDArray[np.int64]) -> NDArray[np.b
 
 
 def outlying_means(values: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(9,) fields whose median of (P,) values is off by LOCAL_NOISES of its error, sqrt(pi / 2) sd / sqrt(n), and of the
-    scatter of the others."""
+    """(9,) fields whose median of (P,) values is off by LOCAL_NOISES of its error, sqrt(pi / 2) sd / sqrt(n), and of
+    the scatter of the others."""
     mean = np.array([np.median(values[fields == f]) for f in range(FIELDS_PER_SIDE**2)])
     off = np.abs(mean - np.median(mean))
     inside = np.sort(off)[: FIELDS_PER_SIDE**2 - FIELDS_PER_SIDE]
