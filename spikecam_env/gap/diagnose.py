@@ -27,7 +27,7 @@ from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
-from spikecam_env.gap.report.evidence import evidence_of
+from spikecam_env.gap.report.evidence import evidence_for
 from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
 from spikecam_env.gap.screen.own_templates import own_templates
@@ -37,7 +37,6 @@ from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import counted_anew, nominal_per_label, said_of
-from spikecam_env.gap.unit.refit import within
 from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.gap.verdict.verdict import conclude, with_stand_ins
@@ -240,16 +239,6 @@ def templates_for(comparison: Comparison) -> Templates:
     """The shipped templates, or of scenes that nobody measured their own."""
     case = comparison.case
     return own_templates(case, comparison.model, comparison.null, comparison.names) if case.scenes_only else load()
-
-
-def evidence_for(comparison: Comparison, rounds: Sequence[Round], conclusion: Conclusion) -> Evidence:
-    """What the report draws: the tested model with the unit as it would be, and where it differs the patched one."""
-    case, tested = comparison.case, comparison.tested
-    model = rounds[-1].model if rounds else comparison.model
-    unit = rounds[-1].base if rounds else within(model, case.base)
-    changed = model is not tested or conclusion.parameters
-    base = within(tested, comparison.off.nominal)
-    return evidence_of(case, tested, base, *((model, unit) if changed else ()))
 
 
 @dataclass

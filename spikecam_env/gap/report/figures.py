@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from spikecam_env.gap.report import plots
 from spikecam_env.gap.report.cells import number
-from spikecam_env.gap.report.evidence import PixelMaps
 from spikecam_env.gap.report.exhibits import LEAST_Z, Exhibit, by_z, exhibits
+from spikecam_env.gap.report.panels import PixelMaps
 from spikecam_env.gap.report.sentence import gap_line
 from spikecam_env.gap.result import CHANCE, Diagnosis
 from spikecam_env.page import captioned, element, picture, table

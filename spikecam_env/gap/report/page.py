@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from spikecam_env.gap.report import figures, meaning, reproduce, tables
-from spikecam_env.gap.report.evidence import shape_of
+from spikecam_env.gap.report.panels import shape_of
 from spikecam_env.gap.report.style import STYLE
 from spikecam_env.gap.report.words import HEADINGS
 from spikecam_env.gap.result import Diagnosis

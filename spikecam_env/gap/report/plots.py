@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from spikecam_env.gap.report.evidence import Array, Panel
+from spikecam_env.gap.report.panels import Array, Panel
 from spikecam_env.gap.result import Gap, Statistic
 
 MEASURED, BEFORE, AFTER, BAND, FLOOR = "#000000", "#D55E00", "#0072B2", "#D9D9D9", "#8C8C8C"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from spikecam_env.gap.report.evidence import Panel, PixelMaps
 from spikecam_env.gap.report.exhibits import (
     clock,
     drift,
@@ -19,6 +18,7 @@ from spikecam_env.gap.report.exhibits import (
     spectrum,
     step,
 )
+from spikecam_env.gap.report.panels import Panel, PixelMaps
 from spikecam_env.gap.result import Evidence, Statistic
 
 LEAST_Z = 4.0

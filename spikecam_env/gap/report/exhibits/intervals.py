@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STATIC
-from spikecam_env.gap.report.evidence import Panel, largest, scaled_by_twins, takes
+from spikecam_env.gap.report.panels import Panel, largest, scaled_by_twins, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Lengths of intervals"

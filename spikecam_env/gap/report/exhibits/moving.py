@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.report.evidence import Array, Panel, largest, takes
+from spikecam_env.gap.report.panels import Array, Panel, largest, takes
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.statistics.film import light_film
 

@@ -9,7 +9,7 @@ import numpy as np
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
 from spikecam_env.gap.observe.conditions import STATIC
 from spikecam_env.gap.observe.observation import STEPS, Observation
-from spikecam_env.gap.report.evidence import Panel, Take, against_before, by_recording, names, takes
+from spikecam_env.gap.report.panels import Panel, Take, against_before, by_recording, names, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Temporal noise"

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from spikecam_env.gap.report.evidence import Array, Panel, PixelMaps, shape_of
+from spikecam_env.gap.report.panels import Array, Panel, PixelMaps, shape_of
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Fixed pattern"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STATIC
-from spikecam_env.gap.report.evidence import Panel, against_before, by_recording, error_known, mean_known, takes
+from spikecam_env.gap.report.panels import Panel, against_before, by_recording, error_known, mean_known, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Rates and levels"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STATIC
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.report.evidence import Array, Panel, against_before, by_recording, largest, takes
+from spikecam_env.gap.report.panels import Array, Panel, against_before, by_recording, largest, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Rows and columns in time"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from spikecam_env.gap.report.evidence import Array, Panel, largest, takes
+from spikecam_env.gap.report.panels import Array, Panel, largest, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Spectrum of the population"
