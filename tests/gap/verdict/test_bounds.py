@@ -19,7 +19,14 @@ from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import load
 from spikecam_env.gap.twins.budget import Effort
 from spikecam_env.gap.twins.case import Case, case_of
-from spikecam_env.gap.verdict.bounds import ScoredShape, bound_of, bounds, first_strength, scored_shape
+from spikecam_env.gap.verdict.bounds import (
+    LONGER_RECORDINGS,
+    ScoredShape,
+    bound_of,
+    bounds,
+    first_strength,
+    scored_shape,
+)
 from spikecam_env.gap.verdict.score import RULE_OF_THREE, Score, StrengthTest
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames
@@ -169,10 +176,10 @@ def test_the_least_refuted_strength_is_bracketed() -> None:
     assert probe.tests[0] == pytest.approx(1.2 * 1.8 / 100) and found.below == probe.tests[0]
     assert 0.02 < found.below < 0.02 / 0.6
     far = Linear(100.0)
-    misled = replace(far.score({"tau_us": 0.12}), rise=far.sd * 12.0 / 4)
+    misled = replace(far.score({"tau_us": 0.12}), rise=far.sd * 12.0 / 2)
     found = bound_of(NOTHING, ScoredShape(far, misled, 0.0))
     print(found, far.tests)
-    assert len(far.tests) == 2 and 0.02 < found.below < 0.02 / 0.6, "the first, four times too large, was not enough"
+    assert len(far.tests) == 2 and 0.02 < found.below < 0.02 / 0.6, "the first, twice too large, was not enough"
 
 
 @pytest.mark.parametrize("campaigns, begun", [(140, False), (160, True)])
@@ -180,3 +187,19 @@ def test_bounds_are_begun_where_their_campaigns_are_left(campaigns: int, begun: 
     case = replace(recorded(), effort=Effort(campaigns * len(CONDITIONS)))
     bounds(case, MODEL, None, None, [], SimpleNamespace(weakest=()))
     assert (case.effort.left_out == []) == begun
+
+
+def test_a_strength_is_scaled_by_forty_at_once_at_most_and_five_times() -> None:
+    strong, faint = Linear(100.0), Linear(1e-9)
+    scored_shape(strong, NOTHING, {"tau_us": 20.0})
+    assert strong.scored[:2] == pytest.approx([20.0, 0.5])
+    scored_shape(faint, NOTHING, {"tau_us": 1e-6})
+    assert faint.scored == pytest.approx([1e-6 * 40**n for n in range(5)])
+
+
+def test_five_strengths_are_tested_at_most() -> None:
+    """None is refuted, since no campaign with the effect scores more."""
+    probe = Linear(1e5)
+    shape = ScoredShape(probe, probe.score({"tau_us": 1e-4}), 0.0)
+    probe.per = 0.0
+    assert bound_of(NOTHING, shape) == ("dead_time", LONGER_RECORDINGS) and len(probe.tests) == 5
