@@ -79,7 +79,7 @@ class Diagnose:
 def summary(diagnosis: Diagnosis) -> str:
     """The verdict, what was found with its parameters, and the gap, for a terminal."""
     from spikecam_env.cli.table import table
-    from spikecam_env.gap.report.words import gap_line
+    from spikecam_env.gap.report.sentence import gap_line
 
     parts = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
     found = _found(diagnosis)
@@ -97,14 +97,15 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
-    from spikecam_env.gap.report.words import at_most, bare, bounded_parameter, quantity, unit_of
+    from spikecam_env.gap.report.quantities import at_most, bounded_parameter, quantity
+    from spikecam_env.gap.report.words import bare, parameter_unit
 
     rows = [
         {
             "effect": e.name,
             "confidence": f"{e.confidence:.2f}",
             "parameter": bare(e.name, name),
-            "value": quantity(estimate.value, unit_of(e.name, name), estimate.sd),
+            "value": quantity(estimate.value, parameter_unit(e.name, name), estimate.sd),
         }
         for e in diagnosis.effects
         for name, estimate in e.parameters.items()

@@ -38,12 +38,13 @@ class Ladder:
 
         SensorModel.load(self.model)
         campaign = read_campaign(self.campaign, outside=True) if self.outside else self.campaign
-        from spikecam_env.gap.ladder import ladder
-        from spikecam_env.gap.ladder import table as rungs
+        from spikecam_env.gap.ladder import ladder, rung_rows
 
         with out_folder(self.out) as folder:
             made = ladder(campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
             made.write(folder)
-            print(table(rungs(made)))
+            print(table(rung_rows(made)))
             print(f"\ngap: mean square of {made.statistics} statistics' held-out part, in noise; 1 is chance")
+            for note in made.notes:
+                print(f"note: {note}")
             print(f"the figure: {folder / 'ladder.png'}   the model: {folder / 'model.toml'}")

@@ -1,9 +1,9 @@
 """The diagnosis: refit the unit, compare, and while something is left add the effect that explains most of it.
 
-    read -> audit -> refit -> twins -> alarm -> search -> gate -> verdict
+    read -> audit -> refit -> twins -> alarm -> search -> gate -> verdict -> evidence -> bounds
 
-Each step is a function of its own, usable by itself.  Held-out recordings take no part in the search, but for what
-`search` says; the gate is on all, and the gap on them alone.
+A campaign passes the rooms of this package in their order (docs/architecture.md).  Held-out recordings take no part in
+the search, but for what `search` says; the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations
@@ -11,43 +11,37 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from functools import reduce
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.errors import InputError
-from spikecam_env.gap.baseline.alarm import is_discrepant
 from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
 from spikecam_env.gap.baseline.label_audit import audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
-from spikecam_env.gap.baseline.null_model import model_null, unit_under
+from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
-from spikecam_env.gap.candidates.table import chosen, is_pattern, testable
-from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.candidates.table import chosen, testable
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
-from spikecam_env.gap.report.evidence import evidence_of
-from spikecam_env.gap.report.words import sentence, unfinished
-from spikecam_env.gap.result import Diagnosis
+from spikecam_env.gap.report.evidence import evidence_for
+from spikecam_env.gap.report.sentence import sentence, unfinished
+from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
 from spikecam_env.gap.screen.templates import Templates, shipped_templates
-from spikecam_env.gap.search.forward import Round, of_fit, search
+from spikecam_env.gap.search.forward import Round, search
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import in_nominal_units, label_unit_note, nominal_per_label
-from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.gap.verdict.bounds import bounds
-from spikecam_env.gap.verdict.verdict import concluded, grounded, harmless
+from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
+from spikecam_env.gap.verdict.verdict import conclude, with_stand_ins
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 @sums_in_one_order
@@ -74,77 +68,97 @@ def diagnose(
     """
     if not effort > 0:
         raise InputError(f"effort {effort:g}: it must be above 0")
-    stages: dict[str, float] = {}
-    timed = _stages(stages, progress)
+    stages = Stages(progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
-    assumed = model if isinstance(model, SensorModel) else SensorModel.load(model)
-    assumed = replace(assumed, frame_rate_hz=measured.frame_rate_hz)
-    names = chosen(assumed, candidates, exclude)
-    asked = {
-        "model_name": assumed.name if isinstance(model, SensorModel) else str(model),
-        "candidates": None if candidates is None else tuple(candidates),
-        "exclude": tuple(exclude),
-        "effort": effort,
-        "stages": stages,
-    }
-    if not any(r.spikes for r in measured.recordings):
-        with timed("maps"):
-            found = diagnose_maps(measured, assumed, candidates=candidates, exclude=exclude, seed=seed, jobs=jobs)
-        found = replace(found, **asked)  # type: ignore[arg-type]
-        return replace(found, sentence=sentence(found))
-    with timed("read"):
-        case = read_case(measured, seed, jobs)
-        notes = label_unit_note(case.nominal_per_label, case.base)
-    with timed("audit"):
-        contradictions = upheld(case, assumed, audit(case))
-        case = trimmed(case, contradictions)
-        case = replace(case, effort=Effort(effort * len(case.conditions), settled=bool(contradictions)))
-    names, untestable = testable(names, case.conditions)
-    lacking = missing_effects(case, assumed, names)
-    start = with_missing(assumed, lacking)
-    off = OffNominal({}, case.base) if lacking else off_nominal(case, assumed, case.base)
-    with timed("twins"):
-        null = model_null(case, start, twin_count)
-        as_given = lacking or off.parameters
-        before = model_null(replace(case, base=off.nominal), assumed, 2) if as_given else null
-    values = values_of(case.bank, null.keys)
-    rounds: list[Round] = []
-    if is_discrepant(null, of_fit(case, null, values)) or is_discrepant(null, values):
-        with timed("candidates"):
-            if case.scenes_only:
-                templates = templates or own_templates(case, start, null, names)
-            rounds = harmless(
-                case, null, values, search(case, start, null, values, names, templates or shipped_templates())
-            )
-    if rounds and not lacking:
-        off = replace(
-            off, parameters=off_nominal(case, patterned(assumed, rounds[-1].model), rounds[-1].base).parameters
-        )
-    with timed("verdict"):
-        found = concluded(
-            case, start, null, in_order(before, null), values, lacking, off, rounds, contradictions, untestable
-        )
-    with timed("evidence"):
-        base = constrained_refit(assumed, off.nominal)
-        after = rounds[-1].model if rounds else start
-        unit = rounds[-1].base if rounds else constrained_refit(start, case.base)
-        changed = after is not assumed or off.parameters
-        evidence = evidence_of(case, assumed, base, *((after, unit) if changed else ()))
-    if found.verdict in ("none", "parameter"):
-        with timed("bounds"):
-            settled = replace(case, base=unit_under(case, start)) if case.scenes_only else case
-            below, open_ = bounds(settled, start, null, values, names, templates or shipped_templates())
-        found = replace(found, bounds=tuple(below), not_bounded=tuple(open_))
-    found = replace(
-        found,
-        gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
+    tested = model if isinstance(model, SensorModel) else SensorModel.load(model)
+    tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
+    names = chosen(tested, candidates, exclude)
+    if any(r.spikes for r in measured.recordings):
+        asked = Asked(tuple(names), seed, jobs, effort, twin_count)
+        found = of_spikes(measured, tested, asked, templates, stages)
+    else:
+        with stages.timed("maps"):
+            found = Findings(*diagnose_maps(measured, tested, names, seed, jobs))
+    conclusion = found.conclusion
+    model_name = tested.name if isinstance(model, SensorModel) else str(model)
+    return Diagnosis(
+        verdict=conclusion.verdict,
+        sentence=sentence(conclusion, model_name),
+        effects=conclusion.effects,
+        unknown=conclusion.unknown,
+        class_=conclusion.class_,
+        parameters=conclusion.parameters,
+        data=(*conclusion.notes, *found.notes),
+        gap=conclusion.gap,
+        statistics=conclusion.statistics,
+        ranking=conclusion.ranking,
+        not_testable=conclusion.not_testable,
+        bounds=found.bounds,
+        patched=conclusion.patched,
+        model_name=model_name,
         campaign=str(measured.folder),
-        evidence=evidence,
-        data=(*found.data, *notes, *unfinished(case.effort)),
-        simulated=case.effort.simulated,
-        **asked,  # type: ignore[arg-type]
+        seed=seed,
+        stages=stages.seconds,
+        candidates=None if candidates is None else tuple(candidates),
+        exclude=tuple(exclude),
+        evidence=found.evidence,
+        simulated=found.simulated,
+        effort=effort,
+        not_bounded=found.not_bounded,
     )
-    return replace(found, sentence=sentence(found))
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What becomes of a campaign and a model.  notes: on labels and on what was left out."""
+
+    conclusion: Conclusion
+    evidence: Evidence
+    bounds: tuple[Bound, ...] = ()
+    not_bounded: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
+    simulated: int = 0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How a campaign is to be diagnosed: names of candidates, and options as of `diagnose`."""
+
+    names: tuple[str, ...]
+    seed: int
+    jobs: int
+    effort: float
+    twin_count: int
+
+
+def of_spikes(
+    measured: Campaign, tested: SensorModel, asked: Asked, templates: Templates | None, stages: Stages
+) -> Findings:
+    """A campaign of spikes, from its files to what a diagnosis says of it: one room after another."""
+    with stages.timed("read"):
+        case = read_case(measured, asked.seed, asked.jobs)
+        notes = label_unit_note(case.nominal_per_label, case.base)
+    comparison = comparison_of(case, tested, asked, stages)
+    case, null, values = comparison.case, comparison.null, comparison.values
+    rounds: list[Round] = []
+    if comparison.disagrees:
+        with stages.timed("candidates"):
+            templates = templates or templates_for(comparison)
+            rounds = search(case, comparison.model, null, values, comparison.names, templates)
+            rounds = with_stand_ins(case, null, values, rounds)
+    with stages.timed("verdict"):
+        conclusion = conclude(comparison, rounds, floor_of_halves(case, measured.recordings, null))
+    with stages.timed("evidence"):
+        evidence = evidence_for(comparison, rounds, conclusion)
+    bounded: list[Bound] = []
+    not_bounded: list[tuple[str, str]] = []
+    if conclusion.verdict in ("none", "parameter"):
+        with stages.timed("bounds"):
+            bounded, not_bounded = bounds(
+                case, comparison.model, null, values, comparison.names, templates or shipped_templates()
+            )
+    notes += unfinished(case.effort)
+    return Findings(conclusion, evidence, tuple(bounded), tuple(not_bounded), tuple(notes), case.effort.simulated)
 
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
@@ -180,33 +194,72 @@ def refittable(conditions: Sequence[Condition]) -> bool:
     return scenes or sum(c.kind in STEADY_KNOWN and c.use == "fit" for c in conditions) >= 2
 
 
+def comparison_of(case: Case, tested: SensorModel, asked: Asked, stages: Stages) -> Comparison:
+    """The case beside a model, without a search: labels that contradict, effects that the refit says are missing, what
+    is off nominal, and the null model's twins."""
+    with stages.timed("audit"):
+        contradictions = upheld(case, tested, audit(case))
+        case = trimmed(case, contradictions)
+        case = replace(case, effort=Effort(asked.effort * len(case.conditions), settled=bool(contradictions)))
+    names, not_testable = testable(asked.names, case.conditions)
+    lacking = missing_effects(case, tested, names)
+    model = with_missing(tested, lacking)
+    off = OffNominal({}, case.base) if lacking else off_nominal(case, tested, case.base)
+    with stages.timed("twins"):
+        null = model_null(case, model, asked.twin_count)
+        differs = lacking or off.parameters
+        given = model_null(replace(case, base=off.nominal), tested, TWINS_AS_GIVEN) if differs else null
+    return Comparison(
+        case=case,
+        tested=tested,
+        model=model,
+        null=null,
+        values=values_of(case.bank, null.keys),
+        given=aligned_mean(given, null),
+        missing=tuple(lacking),
+        off=off,
+        contradictions=tuple(contradictions),
+        names=tuple(names),
+        not_testable=tuple(not_testable),
+    )
+
+
+TWINS_AS_GIVEN = 2
+"""Twins of a model as given, where the null model is another: its gap is large beside what two leave open."""
+
+
 def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     """The case without recordings that contradict the others, where enough is left to refit the unit by."""
     bad = {r for c in contradictions for r in c.recordings}
     keep = [i for i, c in enumerate(case.conditions) if c.name not in bad]
     if not bad or not refittable([case.conditions[i] for i in keep]):
         return case
-    return case.of([case.conditions[i] for i in keep], [case.observations[i] for i in keep])
+    part = case.of([case.conditions[i] for i in keep], [case.observations[i] for i in keep])
+    return replace(part, nominal_per_label=case.nominal_per_label)
 
 
-def patterned(model: SensorModel, found: SensorModel) -> SensorModel:
-    """The model with those effects of another that make pixels differ: what they explain, its own spreads do not."""
-    return reduce(SensorModel.with_effect, (e for e in found.effects if is_pattern(e.name)), model)
+def templates_for(comparison: Comparison) -> Templates:
+    """The shipped templates, or of scenes that nobody measured their own."""
+    case = comparison.case
+    return (
+        own_templates(case, comparison.model, comparison.null, comparison.names)
+        if case.scenes_only
+        else shipped_templates()
+    )
 
 
-def in_order(other: Null, null: Null) -> Array:
-    """(S,) predictions of another model for the statistics of `null`; where it has none, those of `null`."""
-    there = dict(zip(other.keys, other.mean, strict=True))
-    return np.array([there.get(k, m) for k, m in zip(null.keys, null.mean, strict=True)])
+@dataclass
+class Stages:
+    """Seconds by stage, in the order in which they began; with progress, each is announced."""
 
+    progress: bool
+    seconds: dict[str, float] = field(default_factory=dict)
 
-def _stages(stages: dict[str, float], progress: bool):  # type: ignore[no-untyped-def]
     @contextmanager
-    def timed(name: str) -> Iterator[None]:
-        if progress:
+    def timed(self, name: str) -> Iterator[None]:
+        """Time a stage."""
+        if self.progress:
             tqdm.write(f"{name} ...")
         start = time.perf_counter()
         yield
-        stages[name] = stages.get(name, 0.0) + time.perf_counter() - start
-
-    return timed
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start

@@ -26,28 +26,33 @@ from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.diagnose import in_order, read_case
+from spikecam_env.gap.diagnose import read_case
 from spikecam_env.gap.report import plots
+from spikecam_env.gap.report.quantities import quantity
+from spikecam_env.gap.report.words import human, parameter_unit
+from spikecam_env.gap.result import SIGNIFICANT
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.search.forward import of_fit, search
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.workers import sums_in_one_order
+from spikecam_env.gap.unit.label_unit import label_unit_note
+from spikecam_env.gap.verdict.comparison import aligned_mean
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.whole import whole_file, write_text_whole
 
 Array = NDArray[np.float64]
 
-FORMAT = "spikecam-ladder/1"
+LADDER_FORMAT = "spikecam-ladder/1"
 
 TWINS = 2
-"""Twins of a rung that is not the last."""
+"""Twins of a rung that is not the last: its distance is large beside what two leave open."""
 
 
 @dataclass(frozen=True)
 class Rung:
     """A model on the way.  added: its newest effect, None for the first; sd: of its strength.
 
-    also: names that these recordings cannot tell it from.  gap: mean square of held-out statistics, in noise, 1 is
+    also: names that are tied with it.  gap: mean square of held-out statistics, in noise, 1 is
     chance.  groups: the same of each group of statistics, over all recordings.  off: statistics of p < 0.05.
     """
 
@@ -62,12 +67,13 @@ class Rung:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Rungs, first to last; statistics: how many every rung is judged by."""
+    """Rungs, first to last; statistics: how many every rung is judged by; notes: on the labels."""
 
     campaign: str
     seed: int
     statistics: int
     rungs: tuple[Rung, ...]
+    notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
@@ -83,7 +89,7 @@ class Ladder:
             }
             for r in self.rungs
         ]
-        return {"format": FORMAT, "campaign": self.campaign, "seed": self.seed, "statistics": self.statistics,
+        return {"format": LADDER_FORMAT, "campaign": self.campaign, "seed": self.seed, "statistics": self.statistics,
                 "rungs": rungs}  # fmt: skip
 
     def write(self, folder: Path) -> None:
@@ -91,7 +97,7 @@ class Ladder:
         folder.mkdir(parents=True, exist_ok=True)
         self.rungs[-1].model.to_toml(folder / "model.toml")
         with whole_file(folder / "ladder.png") as beside:
-            figure(self).savefig(beside, format="png", dpi=130)
+            ladder_figure(self).savefig(beside, format="png", dpi=130)
         write_text_whole(folder / "ladder.json", json.dumps(self.to_json(), indent=1))
 
 
@@ -111,73 +117,94 @@ def ladder(
     case = read_case(measured, seed, jobs)
     names, _ = testable(chosen(first, None, ()), case.conditions)
     lacking = missing_effects(case, first, names)
-    full = with_missing(first, lacking)
-    null = model_null(case, full, twin_count)
-    values = values_of(case.bank, null.keys)
+    null = model_null(case, with_missing(first, lacking), twin_count)
+    judge = Judge(case, null, values_of(case.bank, null.keys))
+    rungs = climbed(judge, first, lacking, progress)
+    rungs += searched(judge, with_missing(first, lacking), names)
+    notes = tuple(label_unit_note(case.nominal_per_label, case.base))
+    return Ladder(str(measured.folder), seed, len(judge.values), tuple(rungs), notes)
 
-    def rung(there: SensorModel, found: Missing | None) -> Rung:
-        mean = null.mean if there is full else in_order(model_null(case, there, TWINS), null)
-        return judged(case, null, values, mean, there, found)
 
-    rungs = [rung(first, None)]
+@dataclass(frozen=True)
+class Judge:
+    """By what all rungs are judged: the statistics of a case, (S,) as measured, in the noise of the last model."""
+
+    case: Case
+    null: Null
+    values: Array
+
+    def rung(self, model: SensorModel, mean: Array, found: Missing | None) -> Rung:
+        """A model as a rung.  mean: (S,) what it predicts; found: its newest effect."""
+        square = np.nan_to_num((self.values - mean) / self.null.noise) ** 2
+        group = np.array([k.group for k in self.null.keys])
+        p = adjusted(np.sign(self.values - mean) * np.sqrt(square))
+        return Rung(
+            model,
+            found.effect if found else None,
+            found.sd if found else np.nan,
+            found.also if found else (),
+            float(square[self.case.held_out(self.null.keys)].mean()),
+            {g: float(square[group == g].mean()) for g in dict.fromkeys(group.tolist())},
+            int((p < SIGNIFICANT).sum()),
+        )
+
+
+def climbed(judge: Judge, first: SensorModel, lacking: Sequence[Missing], progress: bool) -> list[Rung]:
+    """The first model, then what the refit found missing, one after another: each time the one that takes away most."""
+
+    def simulated(model: SensorModel, found: Missing | None, *, last: bool) -> Rung:
+        mean = judge.null.mean if last else aligned_mean(model_null(judge.case, model, TWINS), judge.null)
+        return judge.rung(model, mean, found)
+
+    rungs = [simulated(first, None, last=not lacking)]
     left = list(lacking)
     bar = tqdm(total=len(left) * (len(left) + 1) // 2, desc="ladder", unit="model", disable=not progress)
     while left:
         tried = []
         for m in left:
-            tried.append(rung(full if len(left) == 1 else rungs[-1].model.with_effect(m.effect), m))
+            last = len(left) == 1
+            model = with_missing(first, lacking) if last else rungs[-1].model.with_effect(m.effect)
+            tried.append(simulated(model, m, last=last))
             bar.update()
         best = min(range(len(left)), key=lambda i: tried[i].gap)
         rungs.append(tried[best])
         left.pop(best)
     bar.close()
-    if is_discrepant(null, of_fit(case, null, values)):
-        rounds = search(case, full, null, values, names, shipped_templates())
-        for was, now in itertools.pairwise(rounds):
-            if now.model is not was.model:
-                fit = was.fits[0]
-                effect = next(e for e in now.model.effects if e.name == fit.name)
-                sd = next(iter(fit.sd.values()), np.nan)
-                rungs.append(judged(case, null, values, now.prediction.mean, now.model, Missing(effect, sd)))
-    return Ladder(str(measured.folder), seed, len(values), tuple(rungs))
+    return rungs
 
 
-def judged(case: Case, null: Null, values: Array, mean: Array, model: SensorModel, found: Missing | None) -> Rung:
-    """A model as a rung.  mean: (S,) what it predicts."""
-    square = np.nan_to_num((values - mean) / null.noise) ** 2
-    group = np.array([k.group for k in null.keys])
-    off = adjusted(np.sign(values - mean) * np.sqrt(square))
-    return Rung(
-        model,
-        found.effect if found else None,
-        found.sd if found else np.nan,
-        found.also if found else (),
-        float(square[case.held_out(null.keys)].mean()),
-        {g: float(square[group == g].mean()) for g in dict.fromkeys(group.tolist())},
-        int((off < 0.05).sum()),
-    )
+def searched(judge: Judge, model: SensorModel, names: Sequence[str]) -> list[Rung]:
+    """Rungs of effects that a search adds to a model, where that still differs from the recordings to fit."""
+    case, null, values = judge.case, judge.null, judge.values
+    if not is_discrepant(null, of_fit(case, null, values)):
+        return []
+    rungs = []
+    for was, now in itertools.pairwise(search(case, model, null, values, names, shipped_templates())):
+        if now.model is not was.model:
+            fit = was.fits[0]
+            effect = next(e for e in now.model.effects if e.name == fit.name)
+            sd = next(iter(fit.sd.values()), np.nan)
+            rungs.append(judge.rung(now.model, now.prediction.mean, Missing(effect, sd)))
+    return rungs
 
 
-def said(rung: Rung) -> str:
+def rung_line(rung: Rung) -> str:
     """A rung in a line: its effect and how large it is."""
-    from spikecam_env.gap.report.words import human, quantity, unit_of
-
     if rung.added is None:
         return rung.model.name
     key = type(rung.added).strength
-    size = quantity(rung.added.parameters()[key], unit_of(rung.added.name, key), rung.sd)
+    size = quantity(rung.added.parameters()[key], parameter_unit(rung.added.name, key), rung.sd)
     return f"+ {human(rung.added.name)}, {size}"
 
 
-def figure(made: Ladder) -> Figure:
+def ladder_figure(made: Ladder) -> Figure:
     """The gap at every rung, and of the groups of statistics that it falls in."""
-    return plots.rungs([said(r) for r in made.rungs], [r.gap for r in made.rungs], [r.groups for r in made.rungs])
+    return plots.rungs([rung_line(r) for r in made.rungs], [r.gap for r in made.rungs], [r.groups for r in made.rungs])
 
 
-def table(made: Ladder) -> list[dict[str, Any]]:
+def rung_rows(made: Ladder) -> list[dict[str, Any]]:
     """A row a rung."""
-    return [{"rung": said(r), "gap": r.gap, "statistics off": r.off, "or": _or(r.also)} for r in made.rungs]
-
-
-def _or(also: Sequence[str]) -> str:
-    return ", ".join(also) or "-"
+    return [
+        {"rung": rung_line(r), "gap": r.gap, "statistics off": r.off, "or": ", ".join(r.also) or "-"}
+        for r in made.rungs
+    ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.whole import write_text_whole
 
-FORMAT = "spikecam-diagnosis/1"
+DIAGNOSIS_FORMAT = "spikecam-diagnosis/1"
 VERDICTS = ("none", "named", "class", "unknown", "parameter", "data")
 
 
@@ -27,6 +28,10 @@ class Estimate:
 
     value: float
     sd: float
+
+
+MOST_CONFIDENCE = 0.99
+"""Confidence in a name without a rival: an effect outside of the catalogue may explain as much."""
 
 
 @dataclass(frozen=True)
@@ -102,11 +107,22 @@ class Bound:
     at: dict[str, float] = field(default_factory=dict)
 
 
+SIGNIFICANT = 0.05
+"""Adjusted p-value below which a statistic is listed as one that differs."""
+
+CHANCE = 1.0
+"""Gap of statistics that lie off by their own noise alone."""
+
+LEAST_GAP = 1.5
+"""Times its floor that a gap is at least, for a removed share to be stated: the mean square of 30 statistics scatters,
+by chance, by a quarter of itself, sqrt(2 / 30)."""
+
+
 @dataclass(frozen=True)
 class Gap:
     """Mean square distance of held-out statistics, in noise.
 
-    floor: of two halves of the measurement; in the pattern, of two units.
+    floor: of two halves of the measurement; in the pattern, of two units.  removed: share that is gone after.
     """
 
     before: float
@@ -115,6 +131,19 @@ class Gap:
     removed: float
     by_recording: dict[str, dict[str, float]]
 
+    @classmethod
+    def of(
+        cls, before: float, after: float, by_recording: Mapping[str, tuple[float, float]], floor: float = CHANCE
+    ) -> Gap:
+        """From mean squares before and after, of all that is held out and by recording, and one floor."""
+        removed = (before - after) / (before - floor) if before > LEAST_GAP * floor else 0.0
+        rows = {name: {"before": b, "after": a, "floor": floor} for name, (b, a) in by_recording.items()}
+        return cls(before, after, floor, removed, rows)
+
+
+LABELLED_LIGHT, NOMINAL_LIGHT = "radiance (label)", "radiance (nominal)"
+"""Names of the light on a page: as it was labelled, or counted anew (`unit.label_unit`)."""
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -122,19 +151,40 @@ class Evidence:
 
     again: another twin of the model before, with another seed: what chance alone makes differ.
     drawn_before, drawn_after: gain and dark (P,) of a fresh unit of each model (`fresh_units.drawn`): the fixed pattern
-    to expect, where twins have the measured one.
+    to expect, where twins have the measured one.  light: the name of the axis of light.
     """
 
     conditions: tuple[Condition, ...]
     measured: tuple[Observation, ...]
     before: tuple[Observation, ...]
     after: tuple[Observation, ...] | None
-    measured_base: BaseFit
+    free_refit: BaseFit
     before_base: BaseFit
     after_base: BaseFit | None
     again: tuple[Observation, ...] | None = None
     drawn_before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     drawn_after: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    light: str = LABELLED_LIGHT
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the rooms of a diagnosis find, before it is put in words: fields as in `Diagnosis`.
+
+    notes: contradictions first, then how the gap is to be read (`verdict.notes.Note`).
+    """
+
+    verdict: str
+    effects: tuple[NamedEffect, ...]
+    unknown: dict[str, Any] | None
+    class_: dict[str, Any] | None
+    parameters: dict[str, dict[str, float]]
+    notes: tuple[str, ...]
+    gap: Gap | None
+    statistics: tuple[Statistic, ...]
+    ranking: tuple[Ranked, ...]
+    not_testable: tuple[tuple[str, str], ...]
+    patched: SensorModel
 
 
 @dataclass(frozen=True)
@@ -173,9 +223,9 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
-        found = [s for s in self.statistics if s.p_adjusted < 0.05]
+        found = [s for s in self.statistics if s.p_adjusted < SIGNIFICANT]
         return {
-            "format": FORMAT,
+            "format": DIAGNOSIS_FORMAT,
             "verdict": self.verdict,
             "sentence": self.sentence,
             "effects": [e.to_json() for e in self.effects],
@@ -210,10 +260,10 @@ class Diagnosis:
         """diagnosis.json and model.toml, whole."""
         folder.mkdir(parents=True, exist_ok=True)
         self.patched.to_toml(folder / "model.toml")
-        write_text_whole(folder / "diagnosis.json", json.dumps(self.to_json(), indent=1, default=_plain))
+        write_text_whole(folder / "diagnosis.json", json.dumps(self.to_json(), indent=1, default=json_value))
 
 
-def _plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     if isinstance(value, (np.floating, np.integer)):
         return value.item()
     if isinstance(value, NDArray | np.ndarray):

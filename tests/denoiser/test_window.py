@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from denoiser.recipe import RECIPES
 from denoiser.pixel_map import PixelMap
+from denoiser.recipe import RECIPES
 from denoiser.window import RollingWindow, WindowLayout
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_planes

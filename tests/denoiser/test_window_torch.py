@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser.recipe import RECIPES
 from denoiser.pixel_map import PixelMap
+from denoiser.recipe import RECIPES
 from denoiser.window import RollingWindow, WindowLayout
 from denoiser.window_torch import Windows, learned, pushed
 from spikecam_env.errors import InputError

@@ -16,9 +16,10 @@ from spikecam_env.cli.diagnose import summary
 from spikecam_env.errors import InputError
 from spikecam_env.gap import Bars, Flat, Step, read_campaign, write_campaign
 from spikecam_env.gap.diagnose import diagnose, read_case
-from spikecam_env.gap.report.page import command_of, report
+from spikecam_env.gap.report.page import report
+from spikecam_env.gap.report.reproduce import command_of
 from spikecam_env.gap.result import VERDICTS, Diagnosis
-from spikecam_env.gap.verdict.notes import HELD_OUT_ALONE
+from spikecam_env.gap.verdict.notes import Note
 from spikecam_env.sensor import SensorModel
 
 pytestmark = pytest.mark.slow
@@ -127,7 +128,7 @@ def test_what_shows_in_nothing_but_motion_held_out_is_found_and_not_called_a_che
     found = asked(written(tmp_path / "held", MODEL.with_effect(LAG), design), candidates=ONLY)
     assert found.verdict == "named" and [e.name for e in found.effects] == ["photodiode_lag"]
     assert found.effects[0].parameters["fraction"].value == pytest.approx(0.08, rel=0.15)
-    assert HELD_OUT_ALONE in found.data and "which told parameters too" in found.sentence
+    assert Note.ONLY_HELD_OUT_DISAGREE in found.data and "which told parameters too" in found.sentence
 
 
 def test_so_it_is_beside_an_effect_that_the_others_have_shown(tmp_path):
@@ -136,7 +137,7 @@ def test_so_it_is_beside_an_effect_that_the_others_have_shown(tmp_path):
     found = asked(written(tmp_path / "held", both, design), candidates=("dead_time", *ONLY))
     assert found.verdict == "named" and [e.name for e in found.effects] == ["dead_time", "photodiode_lag"]
     assert found.effects[1].parameters["fraction"].value == pytest.approx(0.08, rel=0.15)
-    assert HELD_OUT_ALONE in found.data
+    assert Note.ONLY_HELD_OUT_DISAGREE in found.data
 
 
 def test_a_parameter_that_is_off_is_set_and_shrinks_the_gap(tmp_path):

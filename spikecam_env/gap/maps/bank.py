@@ -26,7 +26,7 @@ class RateMap:
 
 
 @dataclass(frozen=True)
-class Maps:
+class MapCase:
     """All of a campaign.  response: medians of lit maps less the dark's, by name.  dark: median dark level."""
 
     shape: tuple[int, int]
@@ -37,11 +37,12 @@ class Maps:
     jobs: int
 
     @property
-    def bank(self) -> dict[Key, float]:
-        return bank(self.maps)
+    def statistics(self) -> dict[Key, float]:
+        """Statistics of the measured maps."""
+        return map_bank(self.maps)
 
 
-def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Maps:
+def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> MapCase:
     """The rates of a campaign in known, steady light."""
     maps = []
     for r in campaign.recordings:
@@ -55,7 +56,7 @@ def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Maps:
     dark = dark_of(maps)
     level = float(np.median(dark)) if dark is not None else 0.0
     response = {m.shown.name: float(np.median(m.rate)) - level for m in maps if m.shown.kind != "dark"}
-    return Maps(campaign.shape, tuple(maps), response, level, seed, jobs)
+    return MapCase(campaign.shape, tuple(maps), response, level, seed, jobs)
 
 
 def spread_evenly(rate: Array, frames: int) -> Array:
@@ -68,7 +69,7 @@ def dark_of(maps: Sequence[RateMap]) -> Array | None:
     return np.mean(dark, axis=0) if dark else None
 
 
-def bank(maps: Sequence[RateMap]) -> dict[Key, float]:
+def map_bank(maps: Sequence[RateMap]) -> dict[Key, float]:
     """Statistics of every map; texture of lit ones less the dark."""
     dark = dark_of(maps)
     found = {}
@@ -80,7 +81,7 @@ def bank(maps: Sequence[RateMap]) -> dict[Key, float]:
     return found
 
 
-def unit_maps(model: SensorModel, case: Maps, number: int) -> tuple[RateMap, ...]:
+def unit_maps(model: SensorModel, case: MapCase, number: int) -> tuple[RateMap, ...]:
     """Maps of a fresh unit at the measured medians, counted over as many frames."""
     gain, dark = unit_levels(model, case, number)
     rng = np.random.default_rng([case.seed, number])
@@ -94,7 +95,7 @@ def unit_maps(model: SensorModel, case: Maps, number: int) -> tuple[RateMap, ...
     return tuple(made)
 
 
-def unit_levels(model: SensorModel, case: Maps, number: int) -> tuple[Array, Array]:
+def unit_levels(model: SensorModel, case: MapCase, number: int) -> tuple[Array, Array]:
     """(H, W) response over its median, and dark level [spikes/frame], of a fresh unit."""
     unit = model.draw_unit(case.shape, case.seed + number)
     gain = unit.gain / max(float(np.median(unit.gain)), 1e-12)
@@ -103,7 +104,7 @@ def unit_levels(model: SensorModel, case: Maps, number: int) -> tuple[Array, Arr
     return gain.reshape(case.shape), dark.reshape(case.shape)
 
 
-def of_use(case: Maps, keys: Sequence[Key], use: str) -> NDArray[np.bool_]:
+def with_use(case: MapCase, keys: Sequence[Key], use: str) -> NDArray[np.bool_]:
     """(S,) which statistics are of recordings of this use."""
     names = {m.shown.name for m in case.maps if m.shown.use == use}
     return np.array([k.recording in names for k in keys])

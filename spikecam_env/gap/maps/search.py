@@ -18,37 +18,42 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import HEAVY, alarmed, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
-from spikecam_env.gap.maps.bank import Maps, bank, of_use, unit_maps
+from spikecam_env.gap.maps.bank import MapCase, map_bank, unit_maps, with_use
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.twins.fresh_units import SPREADS as OF_A_UNIT
+from spikecam_env.gap.twins.fresh_units import SPREADS as UNIT_SPREADS
 from spikecam_env.gap.twins.fresh_units import WITHIN
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
 
-UNITS = 8
+PREDICTED_UNITS = 8
 """Units of each model that its predictions are means over."""
 
-STEPS = 6
+MAP_FIT_STEPS = 6
 """Gauss-Newton steps of a fit."""
 
-GAIN = 25.0
-"""Misfit that an effect has to remove to be added."""
+LEAST_IMPROVEMENT = 25.0
+"""Deviance that an effect has to remove to be added: statistics of one map depend on one another, and count several
+times over."""
 
-MOST = 5
+MOST_MAP_EFFECTS = 5
 """Effects that one diagnosis of maps names together."""
 
-SPREADS = {"response": OF_A_UNIT["gain"], "dark": OF_A_UNIT["dark"]}
+FITTED_SPREADS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
 """What is scaled to fit how pixels differ: parameters of effects, by what they spread."""
 
-SHARES = ("centre_x", "centre_y")
+LINEAR_PARAMETERS = ("centre_x", "centre_y")
 """Parameters that are fitted as they are; all others by their logarithm."""
 
-_NUDGE = 0.1
+DERIVATIVE_STEP = 0.1
+"""Step of a derivative, of a parameter's logarithm or in its own unit."""
+
+FIRST_DAMPING = 0.02
+"""Share of the curvature that is added to it at first (Levenberg and Marquardt)."""
 
 
 @dataclass(frozen=True)
-class State:
+class PatternModel:
     """A model on its way: names of effects added to it, and factors of its own spreads."""
 
     model: SensorModel
@@ -59,7 +64,7 @@ class State:
     def fitted(self) -> SensorModel:
         """The model with its spreads scaled."""
         out = self.model
-        for what, spreads in SPREADS.items():
+        for what, spreads in FITTED_SPREADS.items():
             for effect in self.model.effects:
                 if effect.name in spreads and what in self.factors:
                     key = spreads[effect.name]
@@ -70,31 +75,31 @@ class State:
 
 
 @dataclass(frozen=True)
-class Tried:
+class MapFit:
     """A fit.  name: of the candidate, "" for spreads alone.  parameters, sd: of the candidate, and of factors."""
 
     name: str
-    state: State
+    state: PatternModel
     sd: dict[str, float]
     predicted: Array
     rho: Array
     misfit: float
 
 
-def predicted_by(null: Null, mean: Array, units: int) -> Prediction:
+def mean_prediction(null: Null, mean: Array, units: int) -> Prediction:
     """A mean over that many units."""
     return Prediction(mean, null.sd / np.sqrt(units), null.sd)
 
 
-def predict(state: State, case: Maps, keys: Sequence[Key], units: Sequence[int]) -> Array:
+def unit_means(state: PatternModel, case: MapCase, keys: Sequence[Key], units: Sequence[int]) -> Array:
     """(S,) mean statistics over units."""
-    return np.mean([values_of(bank(unit_maps(state.fitted, case, n)), keys) for n in units], axis=0)
+    return np.mean([values_of(map_bank(unit_maps(state.fitted, case, n)), keys) for n in units], axis=0)
 
 
-def within(state: State, case: Maps, measured: dict[Key, float]) -> State:
+def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Key, float]) -> PatternModel:
     """Spreads moved towards the measured width of each kind of map, as far as units differ."""
     for _ in range(2):
-        simulated = bank(unit_maps(state.fitted, case, 0))
+        simulated = map_bank(unit_maps(state.fitted, case, 0))
         factors = dict(state.factors)
         for what, kinds in (("response", ("flat", "picture")), ("dark", ("dark",))):
             keys = [
@@ -103,74 +108,75 @@ def within(state: State, case: Maps, measured: dict[Key, float]) -> State:
                 if m.shown.kind in kinds and m.shown.use == "fit"
             ]
             off = [measured[k] - simulated[k] for k in keys if k in measured and k in simulated]
-            if off and any(e.name in SPREADS[what] for e in state.model.effects):
+            if off and any(e.name in FITTED_SPREADS[what] for e in state.model.effects):
                 factors[what] = float(np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *WITHIN))
         state = replace(state, factors=factors)
     return state
 
 
-def search(
-    case: Maps, given: State, null: Null, values: Array, names: Sequence[str]
-) -> tuple[list[list[Tried]], list[Tried]]:
+def search_maps(
+    case: MapCase, given: PatternModel, null: Null, values: Array, names: Sequence[str]
+) -> tuple[list[list[MapFit]], list[MapFit]]:
     """(rounds, rejected): the spreads alone; then, each round, candidates, the one that leaves least first; and what
     was tried last and did not help."""
-    rounds = [[fitted(case, given, null, values, "")]]
+    rounds = [[fit_candidate(case, given, null, values, "")]]
     left = list(names)
-    while left and len(rounds) <= MOST:
+    while left and len(rounds) <= MOST_MAP_EFFECTS:
         now = rounds[-1][0]
         if not alarmed(null, now.rho):
             break
         with ThreadPoolExecutor(case.jobs) as pool:
-            tried = list(pool.map(lambda n, start=now.state: fitted(case, start, null, values, n), left))
+            tried = list(pool.map(lambda n, start=now.state: fit_candidate(case, start, null, values, n), left))
         tried.sort(key=lambda t: t.misfit)
-        if tried[0].misfit > now.misfit - GAIN:
+        if tried[0].misfit > now.misfit - LEAST_IMPROVEMENT:
             return rounds, tried
         rounds.append(tried)
         left = [t.name for t in tried[1:] if t.misfit < now.misfit]
     return rounds, []
 
 
-def fitted(case: Maps, start: State, null: Null, values: Array, name: str) -> Tried:
+def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array, name: str) -> MapFit:
     """A candidate's parameters, all that were added before, and the spreads, together."""
     state = start
     if name:
         default = CATALOGUE[name]().parameters()
-        state = State(with_effect(state.model, name, default), state.factors, (*state.added, name))
-    free = [("", w) for w in SPREADS if w in state.factors]
-    free += [(n, p) for n in state.added for p in free_of(n)]
-    use = of_use(case, null.keys, "fit")
-    sd = dict.fromkeys((f"{n}.{p}" for n, p in free), np.nan)
-    damping, best, least = 0.02, state, np.inf
-    for _ in range(STEPS):
-        at = predict(state, case, null.keys, [0])
-        now = misfit(residual(null, values, predicted_by(null, at, 1))[use])
+        state = PatternModel(with_effect(state.model, name, default), state.factors, (*state.added, name))
+    varied = [("", w) for w in FITTED_SPREADS if w in state.factors]
+    varied += [(n, p) for n in state.added for p in fitted_parameters(n)]
+    use = with_use(case, null.keys, "fit")
+    sd = dict.fromkeys((f"{n}.{p}" for n, p in varied), np.nan)
+    damping, best, least = FIRST_DAMPING, state, np.inf
+    for _ in range(MAP_FIT_STEPS):
+        at = unit_means(state, case, null.keys, [0])
+        now = misfit(residual(null, values, mean_prediction(null, at, 1))[use])
         if now > least:
             damping *= 8.0
         else:
             best, least, predicted = state, now, at
             jacobian = np.stack(
-                [predict(_moved(best, f, _NUDGE), case, null.keys, [0]) - predicted for f in free], axis=1
-            ) / _NUDGE if free else np.zeros((len(at), 0))  # fmt: skip
+                [unit_means(_moved(best, f, DERIVATIVE_STEP), case, null.keys, [0]) - predicted for f in varied], axis=1
+            ) / DERIVATIVE_STEP if varied else np.zeros((len(at), 0))  # fmt: skip
             damping *= 0.5
-        if not free:
+        if not varied:
             break
         step, covariance = _step(null, values, predicted, np.nan_to_num(jacobian), use, damping)
         sd = dict(zip(sd, np.sqrt(np.diag(covariance)), strict=True))
         state = best
-        for f, s in zip(free, np.clip(step, -1.0, 1.0), strict=True):
+        for f, s in zip(varied, np.clip(step, -1.0, 1.0), strict=True):
             state = _moved(state, f, float(s))
         if np.abs(step).max() < 0.01:
             break
-    predicted = predict(best, case, null.keys, range(UNITS))
-    rho = residual(null, values, predicted_by(null, predicted, UNITS))
-    return Tried(name, best, sd, predicted, rho, misfit(rho[use]))
+    predicted = unit_means(best, case, null.keys, range(PREDICTED_UNITS))
+    rho = residual(null, values, mean_prediction(null, predicted, PREDICTED_UNITS))
+    return MapFit(name, best, sd, predicted, rho, misfit(rho[use]))
 
 
-def free_of(name: str) -> tuple[str, ...]:
-    return (*candidate(name).fitted, *(p for p in SHARES if p in CATALOGUE[name].__dataclass_fields__))
+def fitted_parameters(name: str) -> tuple[str, ...]:
+    """What is fitted of a candidate: as in the table, and where it has a centre."""
+    return (*candidate(name).fitted, *(p for p in LINEAR_PARAMETERS if p in CATALOGUE[name].__dataclass_fields__))
 
 
-def _moved(state: State, what: tuple[str, str], step: float) -> State:
+def _moved(state: PatternModel, what: tuple[str, str], step: float) -> PatternModel:
     """A parameter changed by a step, of its logarithm or in its own unit."""
     name, key = what
     if not name:
@@ -179,7 +185,7 @@ def _moved(state: State, what: tuple[str, str], step: float) -> State:
         )
     effect = next(e for e in state.model.effects if e.name == name)
     old = effect.parameters()
-    new = old[key] + step if key in SHARES else old[key] * np.exp(step)
+    new = old[key] + step if key in LINEAR_PARAMETERS else old[key] * np.exp(step)
     return replace(state, model=with_effect(state.model, name, bounded(name, {**old, key: new})))
 
 
@@ -187,7 +193,7 @@ def _step(
     null: Null, values: Array, predicted: Array, jacobian: Array, use: NDArray[np.bool_], damping: float
 ) -> tuple[Array, Array]:
     """Damped Gauss-Newton step under the heavy-tailed loss, and the covariance of parameters."""
-    rho = residual(null, values, predicted_by(null, predicted, 1))
+    rho = residual(null, values, mean_prediction(null, predicted, 1))
     gap = np.nan_to_num(values - predicted)
     noise = np.where(np.abs(rho) > 1e-9, np.abs(gap) / np.maximum(np.abs(rho), 1e-9), null.noise)
     w = np.where(use, (HEAVY + 1) / (HEAVY + rho**2) / noise**2, 0.0)

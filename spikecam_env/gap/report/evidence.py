@@ -1,83 +1,29 @@
-"""Evidence as curves: pure functions from what was observed to what the report draws.
-
-An exhibit is one way to look at recordings (rates, noise, spectrum ...), with a few panels: a measured curve, one twin
-of the model before and one after, and `sd`, the standard error of measured less before.  It comes from the scatter of
-that difference over pixels or columns, which the fixed pattern, the same on both sides, drops out of.
-
-Shares of intervals and coincidences have no such scatter, and regular spikes are far less random than independent
-ones: their sd is that of independent spikes, scaled by what two twins of one model differ by, where there are two.
-"""
+"""Evidence: what the report draws of a case, simulated under the model before and after."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy import stats
-
-from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.result import Evidence
+from spikecam_env.gap.result import LABELLED_LIGHT, NOMINAL_LIGHT, Conclusion, Evidence
+from spikecam_env.gap.search.forward import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import drawn
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
-from spikecam_env.gap.unit.refit import BaseFit, free_refit
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit, free_refit
+from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.sensor import SensorModel
 
-Array = NDArray[np.floating[Any]]
 
-
-@dataclass(frozen=True)
-class Panel:
-    """One plot.  x, measured, before, sd (N,); after (N,) or None.  log: axes that are logarithmic, "", "x", "y", "xy".
-
-    labels: names of the points instead of numbers on the x axis.
-    """
-
-    title: str
-    xlabel: str
-    ylabel: str
-    x: Array
-    measured: Array
-    before: Array
-    after: Array | None
-    sd: Array
-    log: str = ""
-    labels: tuple[str, ...] = ()
-
-    @property
-    def z(self) -> float:
-        """Largest |measured - before| in standard errors, of logarithms where y is; 0 where there is none."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            if "y" in self.log:
-                z = np.abs(np.log(self.measured / self.before)) * self.before / self.sd
-            else:
-                z = np.abs(self.measured - self.before) / self.sd
-        return float(np.max(z[np.isfinite(z)], initial=0.0))
-
-
-@dataclass(frozen=True)
-class Maps:
-    """One picture (H, W) of every pixel, measured and simulated."""
-
-    title: str
-    measured: Array
-    before: Array
-    after: Array | None
-
-
-class Take(NamedTuple):
-    """One recording: its conditions, and what was observed."""
-
-    shown: Condition
-    measured: Observation
-    before: Observation
-    after: Observation | None
-    again: Observation | None
+def evidence_for(comparison: Comparison, rounds: Sequence[Round], conclusion: Conclusion) -> Evidence:
+    """What the report draws: the tested model with the unit as it would be, and where it differs the patched one."""
+    case, tested = comparison.case, comparison.tested
+    model = rounds[-1].model if rounds else comparison.model
+    unit = rounds[-1].base if rounds else constrained_refit(model, case.base)
+    changed = model is not tested or conclusion.parameters
+    base = constrained_refit(tested, comparison.off.nominal)
+    return evidence_of(case, tested, base, *((model, unit) if changed else ()))
 
 
 def evidence_of(
@@ -87,6 +33,7 @@ def evidence_of(
 
     base, after_base: the units to simulate under each.  after: None where nothing was added.
     """
+    counted_anew = case.nominal_per_label != 1.0
 
     def twin(model: SensorModel, unit: BaseFit, number: int) -> tuple[Observation, ...]:
         seed, takes = case.seed * 1000 + 900 + number, range(len(case.conditions))
@@ -102,97 +49,11 @@ def evidence_of(
         measured=case.observations,
         before=first,
         after=last,
-        measured_base=case.base,
+        free_refit=case.base,
         before_base=free_refit(list(first), list(case.conditions)),
         after_base=free_refit(list(last), list(case.conditions)) if last else None,
         again=again,
         drawn_before=None if case.scenes_only else drawn(before, case.base, case.shape, case.seed),
         drawn_after=drawn(after, case.base, case.shape, case.seed) if after and not case.scenes_only else None,
+        light=NOMINAL_LIGHT if counted_anew else LABELLED_LIGHT,
     )
-
-
-def shape_of(evidence: Evidence) -> tuple[int, int] | None:
-    """(rows, columns) of the camera: of its spikes, or of the light that it was shown."""
-    seen = [o.shape for o in evidence.measured if o is not None]
-    shown = [c.light.radiance.shape[1:] for c in evidence.conditions if c.light is not None]
-    rows, columns = (*seen, *shown, (0, 0))[0]
-    return (rows, columns) if rows else None
-
-
-def takes(evidence: Evidence, kinds: Sequence[str]) -> list[Take]:
-    """Recordings of spikes in these kinds of light, in order."""
-    nothing = (None,) * len(evidence.conditions)
-    after, again = evidence.after or nothing, evidence.again or nothing
-    rows = zip(evidence.conditions, evidence.measured, evidence.before, after, again, strict=True)
-    return [Take(*row) for row in rows if row[0].kind in kinds and row[1] is not None and row[2] is not None]
-
-
-def over_pixels(take: Take, of: Callable[[Observation], Array]) -> tuple[Array, Array, Array | None, Array]:
-    """Means over the last axis: measured, before, after, and the standard error of measured less before."""
-    measured, before = of(take.measured), of(take.before)
-    known = np.isfinite(measured) & np.isfinite(before)
-    after = of(take.after) if take.after else None
-    return (
-        mean_known(measured, known),
-        mean_known(before, known),
-        None if after is None else mean_known(after, np.isfinite(after)),
-        error_known(measured - before, known),
-    )
-
-
-def mean_known(values: Array, known: NDArray[np.bool_]) -> Array:
-    """Mean over the last axis of what is known; 0 where nothing is."""
-    return np.where(known, values, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
-
-
-def error_known(values: Array, known: NDArray[np.bool_]) -> Array:
-    """Standard error of that mean."""
-    off = np.where(known, values - mean_known(values, known)[..., None], 0.0)
-    count = np.maximum(known.sum(axis=-1), 1)
-    return np.sqrt((off**2).sum(axis=-1)) / count
-
-
-def loudest(panels: Sequence[Panel], number: int) -> list[Panel]:
-    """The panels where measured and before differ most, in the order given."""
-    kept = sorted(panels, key=lambda p: -p.z)[:number]
-    return [p for p in panels if p in kept]
-
-
-def scaled(sd: Array, difference: Array | None) -> Array:
-    """Standard errors times the root mean square of two twins' difference over them.
-
-    Few points know that scale poorly: its upper 90 % limit is taken.
-    """
-    if difference is None:
-        return sd
-    known = (sd > 0) & np.isfinite(difference)
-    if known.sum() < 3:
-        return sd
-    square = float(np.sum((difference[known] / sd[known]) ** 2))
-    return sd * np.sqrt(square / stats.chi2.ppf(0.1, int(known.sum()) - 1))
-
-
-def by_recording(found: Sequence[Take], of: Callable[[Observation], Array]) -> tuple[Array, Array, Array | None, Array]:
-    rows = [over_pixels(t, of) for t in found]
-    after = [r[2] for r in rows]
-    return (
-        np.array([r[0] for r in rows], dtype=np.float64),
-        np.array([r[1] for r in rows], dtype=np.float64),
-        None if any(a is None for a in after) else np.array(after, dtype=np.float64),
-        np.array([r[3] for r in rows], dtype=np.float64),
-    )
-
-
-def against_before(
-    title: str, ylabel: str, found: Sequence[Take], measured: Array, before: Array, after: Array | None, sd: Array,
-    scale: Array,
-) -> Panel:  # fmt: skip
-    """A quantity of each recording less the model's, times `scale`."""
-    return Panel(
-        title, "", ylabel, np.arange(len(found), dtype=np.float64), scale * (measured - before), np.zeros(len(found)),
-        None if after is None else scale * (after - before), scale * sd, labels=names(found),
-    )  # fmt: skip
-
-
-def names(found: Sequence[Take]) -> tuple[str, ...]:
-    return tuple(t.shown.name for t in found)

@@ -1,7 +1,7 @@
 """Plots of a diagnosis: one small figure a panel, so that a page can lay them out for any width.
 
 Measured black dots, model before orange dashes and squares, model after blue line and triangles, noise band grey:
-colours of Okabe and Ito, told apart by form as well.
+colours of Okabe and Ito, separate by form as well.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from spikecam_env.gap.report.evidence import Array, Panel
+from spikecam_env.gap.report.panels import Array, Panel
 from spikecam_env.gap.result import Gap, Statistic
 
 MEASURED, BEFORE, AFTER, BAND, FLOOR = "#000000", "#D55E00", "#0072B2", "#D9D9D9", "#8C8C8C"
@@ -128,10 +128,10 @@ def map_limits(values: Array) -> tuple[float, float]:
 
 
 def strip(statistics: Sequence[Statistic]) -> Figure:
-    """z of every statistic by group, before and after; loudest group on top."""
+    """z of every statistic by group, before and after; the group that is furthest off on top."""
     patched = any(s.after != s.before for s in statistics)
-    there = dict.fromkeys(s.group for s in statistics)
-    groups = sorted(there, key=lambda g: max(abs(s.z) for s in statistics if s.group == g))
+    names = dict.fromkeys(s.group for s in statistics)
+    groups = sorted(names, key=lambda g: max(abs(s.z) for s in statistics if s.group == g))
     with mpl.rc_context(_FONTS):
         figure, axis = _plot(0.8 + 0.36 * len(groups), groups, top=0.08)
         axis.axvspan(-3, 3, color=BAND, lw=0, zorder=0)

@@ -1,15 +1,35 @@
-"""Notes on a diagnosis: where its gap on recordings held out is no check."""
+"""Notes on a diagnosis that change how its gap is to be read."""
 
 from __future__ import annotations
 
-LENT = (
-    "Within the errors of their fit, parameters were told by the recordings held out as well: "
-    "the gap on them is a fit, and no check."
-)
-"""A note on the data of a diagnosis: where the recordings to fit left something open."""
+from collections.abc import Sequence
+from enum import StrEnum
 
-HELD_OUT_ALONE = (
-    "The recordings to fit agree with the model, as given or with what was found first, and those held out do not. "
-    "What moves among them was fitted: the gap on it is a fit, and no check."
-)
-"""A note on the data of a diagnosis: where nothing else shows what is missing."""
+from spikecam_env.gap.search.forward import Round
+
+
+class Note(StrEnum):
+    """Why the gap on recordings held out is no check.  The value is the sentence that page, terminal and JSON state."""
+
+    PARAMETERS_FROM_HELD_OUT = (
+        "Within the errors of their fit, parameters were told by the recordings held out as well: "
+        "the gap on them is a fit, and no check."
+    )
+    """The recordings to fit left parameters open, and those held out were fitted too."""
+
+    ONLY_HELD_OUT_DISAGREE = (
+        "The recordings to fit agree with the model, as given or with what was found first, and those held out do not. "
+        "What moves among them was fitted: the gap on it is a fit, and no check."
+    )
+    """Nothing but motion held out shows what is missing."""
+
+
+def notes_of(rounds: Sequence[Round]) -> list[str]:
+    """Notes on the rounds of a search whose effects were kept."""
+    from_held_out = [Note.PARAMETERS_FROM_HELD_OUT] if any(r.lent for r in rounds) else []
+    return [*from_held_out, *([Note.ONLY_HELD_OUT_DISAGREE] if any(r.alone for r in rounds) else [])]
+
+
+def gap_is_fitted(notes: Sequence[str]) -> bool:
+    """Whether recordings held out were fitted, by the kinds of notes and not by their words."""
+    return any(isinstance(note, Note) for note in notes)

@@ -14,18 +14,27 @@ from spikecam_env.gap.verdict.where_and_when import when, where
 
 Array = NDArray[np.float64]
 
-CLEAR = 5.0
-"""Noises from which a statistic counts as seen."""
+CLEARLY_OFF = 5.0
+"""Noises from which a statistic describes a discrepancy: chance takes one of 700 so far in one campaign of 2500."""
+
+COMMON_SHARE = 0.3
+"""Share of the deviance, in statistics of what many pixels have in common, from which they do have it in common."""
+
+LEAST_LEVELS = 3
+"""Flats on which a statistic has to be clearly off for its power of the level."""
 
 _MEMORY = ("step", "moving")
 _COMMON = ("spectrum", "rows", "neighbours")
 
 
 def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
-    """off: (S,) measured less predicted, in noise, under the model as given."""
+    """Its description, as in `unknown` of diagnosis.json.
+
+    off: (S,) measured less predicted, in noise, under the null model.
+    """
     kind = {c.name: c.kind for c in case.conditions}
     level = {c.name: c.level for c in case.conditions}
-    seen = np.abs(off) > CLEAR
+    seen = np.abs(off) > CLEARLY_OFF
     weight = {g: 0.0 for g in dict.fromkeys(k.group for k in null.keys)}
     for k, o in zip(null.keys, off, strict=True):
         weight[k.group] += float(np.log1p(o**2 / HEAVY))
@@ -37,8 +46,8 @@ def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
     total = max(sum(weight.values()), 1e-9)
     return {
         "light": "in the dark and in the light" if dark and lit else "in the dark" if dark else "in the light",
-        "level_exponent": _exponent(null, off, kind, level),
-        "extent": "common to many pixels" if common > 0.3 * total else "pixel by pixel",
+        "levellevel_exponent": level_exponent(null, off, kind, level),
+        "extent": "common to many pixels" if common > COMMON_SHARE * total else "pixel by pixel",
         "time_scale_s": None,
         "history": any(k.group in _MEMORY and k.name not in ("level", "square", "row", "column") for k in keys),
         "neighbours": any(k.group == "neighbours" for k in keys),
@@ -50,7 +59,7 @@ def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
     }
 
 
-def _exponent(null: Null, off: Array, kind: dict[str, str], level: dict[str, float]) -> float | None:
+def level_exponent(null: Null, off: Array, kind: dict[str, str], level: dict[str, float]) -> float | None:
     """Slope of log |statistic| on log level over the flats, of the statistic that is seen on most of them, the
     first of several."""
     best: tuple[float, float] | None = None
@@ -58,9 +67,9 @@ def _exponent(null: Null, off: Array, kind: dict[str, str], level: dict[str, flo
         points = [
             (level[k.recording], abs(o) * n)
             for k, o, n in zip(null.keys, off, null.noise, strict=True)
-            if (k.group, k.name) == (group, name) and kind[k.recording] == "flat" and abs(o) > CLEAR
+            if (k.group, k.name) == (group, name) and kind[k.recording] == "flat" and abs(o) > CLEARLY_OFF
         ]
-        if len(points) < 3:
+        if len(points) < LEAST_LEVELS:
             continue
         x, y = np.log(np.array(points)).T
         weight = float(len(points)) + float(np.std(x))

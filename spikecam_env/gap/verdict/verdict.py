@@ -1,214 +1,170 @@
-"""From a search to a verdict: what is named, what is left, and the gap on recordings that were held out."""
+"""The verdict: whether what was found explains the campaign, and what is said where it does not."""
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.contradiction import Contradiction
-from spikecam_env.gap.baseline.missing_from_refit import Missing
-from spikecam_env.gap.baseline.off_nominal import OffNominal, with_strengths
-from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
+from spikecam_env.gap.candidates.table import candidate, is_pattern
 from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.result import Conclusion, NamedEffect, Statistic
 from spikecam_env.gap.search.forward import BESIDE, SECOND, Round
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.verdict.notes import HELD_OUT_ALONE, LENT
+from spikecam_env.gap.verdict.comparison import Comparison
+from spikecam_env.gap.verdict.gap import gap_of, usable_floor
+from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, ranking
+from spikecam_env.gap.verdict.notes import notes_of
 from spikecam_env.gap.verdict.structure import structure
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-SURE = 0.002
-"""Adjusted p-value below which a discrepancy is unknown where no candidate takes it up; above, it may be chance."""
+CHANCE_P = 0.002
+"""Adjusted p-value from which what no candidate explains may be chance; set on the trial's part `tune`."""
 
-UNEXPLAINED = 0.02
-"""Share of the evidence that may stay unexplained when something is named."""
+MOST_DEVIANCE_LEFT = 0.02
+"""Share of the deviance beyond chance that may be left when something is named; set on the trial's part `tune`."""
 
-QUIET = 0.1
-"""The loudest statistic that may be left, over the loudest before; the robust misfit hardly hears a single one."""
-
-
-def explains(null: Null, before: Array, rho: Array, predicted: Prediction) -> bool:
-    """Whether residuals `rho` of a prediction are chance; or, beside those of the model as given, little and quiet, and
-    none that was not there, which would contradict what was added."""
-    by_chance = float(np.sum(null.weight * np.ones(len(rho))))
-    left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
-    quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
-    contradicted = alarmed(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0), predicted)
-    return not alarmed(null, rho, predicted) or bool(left < UNEXPLAINED and quiet and not contradicted)
+MOST_DEVIATE_LEFT = 0.1
+"""Largest deviate that may be left, over the largest before; set on the trial's part `tune`.  The misfit, whose loss is
+heavy-tailed, counts a single statistic by its logarithm alone."""
 
 
-def harmless(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
-    """The rounds; where what they found does not explain the data, they end where they came nearest to recordings held
-    out: a stand-in has to be of use where nobody looked."""
-    *before, last = rounds
-    given, rho = residual(null, values, null.prediction), residual(null, values, last.prediction)
-    if explains(null, given, rho, last.prediction):
-        return list(rounds)
-    left = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
-    return [*before, replace(rounds[int(np.argmin(left))], fits=())]
-
-
-def concluded(
-    case: Case,
-    model: SensorModel,
-    null: Null,
-    given: Array,
-    values: Array,
-    lacking: Sequence[Missing],
-    off: OffNominal,
-    rounds: Sequence[Round],
-    contradictions: Sequence[Contradiction],
-    untestable: Sequence[tuple[str, str]],
-) -> Diagnosis:
-    """From the search to a verdict.  given: (S,) predictions of the model as it was given."""
+def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> Conclusion:
+    """From a search to a verdict.  rounds: with stand-ins where they explain nothing; floor: of the gap, by halves."""
+    case, null = comparison.case, comparison.null
     last = rounds[-1].prediction if rounds else null.prediction
-    before, rho = residual(null, values, null.prediction), residual(null, values, last)
-    found = accepted(rounds)
-    there, then = where(case), when(case)
-    effects = tuple(
-        replace(named(f, r, removed_instead(case, null, values, given, r)), where=there, when=then) for f, r in found
-    )
-    rivals = next(((f.name, *r.rivals) for f, r in found if r.rivals), ())
-    explained, left_open = explains(null, before, rho, last), SECOND in case.effort.left_out
-    chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
-    if explained or chance or not rounds:
-        effects = (*(named_missing(m) for m in lacking), *effects)
-    unknown, class_ = None, None
-    if contradictions:
-        verdict = "data"
-    elif rounds and not chance and not (found and explained and not left_open):
-        verdict, effects = "unknown", ()
-        unknown = {**structure(case, null, before), "best_candidate": found[0][0].name if found else None}
-        unknown |= {"not_looked_for": SECOND, "effort": enough(case)} if left_open else {}
-    elif rivals and not lacking:
-        verdict = "class"
-        class_ = {"members": list(rivals), "experiment": candidate(rivals[0]).experiment}
-    elif found or lacking:
-        verdict = "named"
-    else:
-        verdict = "parameter" if off.parameters else "none"
-    z = deviates(replace(null, mean=given), values)
-    return Diagnosis(
+    left = residual(null, comparison.values, last)
+    explained = explains(null, comparison.residuals, left, last)
+    found = kept(rounds)
+    off = parameters_off(comparison, rounds)
+    verdict = verdict_of(comparison, rounds, found, explained) or ("parameter" if off else "none")
+    model = rounds[-1].model if rounds else comparison.model
+    return Conclusion(
         verdict=verdict,
-        sentence="",
-        effects=effects,
-        unknown=unknown,
-        class_=class_,
-        parameters=off.parameters,
-        data=(*(c.text for c in contradictions), *told_of(found)),
-        gap=gap_of(case, null, values, given, last),
-        statistics=table(case, null, values, given, z, adjusted(z), last.mean, rho),
-        ranking=tuple(ranked(f, r, f is r.fits[0] and any(r is t for _, t in found)) for r in rounds for f in r.fits),
-        not_testable=tuple(untestable),
-        bounds=(),
-        patched=with_strengths(rounds[-1].model if rounds else model, off.parameters),
-        model_name=model.name,
-        campaign="",
-        seed=case.seed,
-        stages={},
+        effects=() if verdict == "unknown" else named(comparison, rounds, found, explained),
+        unknown=described(comparison, found) if verdict == "unknown" else None,
+        class_=tied(found) if verdict == "class" else None,
+        parameters=off,
+        notes=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in found])),
+        gap=gap_of(case, null, comparison.values, comparison.given, last, usable_floor(floor)),
+        statistics=statistics_rows(comparison, last.mean, left),
+        ranking=ranking(rounds, found),
+        not_testable=comparison.not_testable,
+        patched=with_strengths(model, off),
     )
 
 
-def enough(case: Case) -> int:
+def verdict_of(
+    comparison: Comparison, rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], explained: bool
+) -> str:
+    """The verdict on effects, empty where none is missing.  found: those that were kept; explained: whether the last
+    round leaves chance."""
+    enough = found and explained and not second_left_out(comparison.case)
+    if comparison.contradictions:
+        return "data"
+    if rounds and not may_be_chance(comparison, found) and not enough:
+        return "unknown"
+    if any(r.rivals for _, r in found) and not comparison.missing:
+        return "class"
+    return "named" if found or comparison.missing else ""
+
+
+def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str, dict[str, float]]:
+    """Effects of the tested model that are there in another amount, as `Off.parameters`: judged by the unit in which
+    the search ended, beside the patterns that it found."""
+    if not rounds or comparison.missing:
+        return comparison.off.parameters
+    last = rounds[-1]
+    return off_nominal(comparison.case, with_patterns_of(comparison.tested, last.model), last.base).parameters
+
+
+def with_patterns_of(model: SensorModel, found: SensorModel) -> SensorModel:
+    """The model with those effects of another that make pixels differ: what they explain, its own spreads do not."""
+    return reduce(SensorModel.with_effect, (e for e in found.effects if is_pattern(e.name)), model)
+
+
+def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> bool:
+    """Whether nothing was found, and the alarm was a weak one."""
+    return not found and comparison.smallest_p > CHANCE_P
+
+
+def second_left_out(case: Case) -> bool:
+    """Whether a second effect was not looked for, to save time."""
+    return SECOND in case.effort.left_out
+
+
+def explains(null: Null, before: Array, left: Array, predicted: Prediction) -> bool:
+    """Whether residuals (S,) `left` of a prediction are chance; or, beside (S,) those of the null model, few and small,
+    and none that agreed before, which would contradict what was added."""
+    by_chance = float(np.sum(null.weight * np.ones(len(left))))
+    share = (misfit(left, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
+    small = np.abs(left).max() < MOST_DEVIATE_LEFT * np.abs(before).max()
+    contradicted = alarmed(null, np.where(np.abs(left) > np.abs(before), left, 0.0), predicted)
+    return not alarmed(null, left, predicted) or bool(share < MOST_DEVIANCE_LEFT and small and not contradicted)
+
+
+def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
+    """The rounds; where what they found does not explain the data, they end where they came nearest to recordings held
+    out: an empirical patch has to be of use in recordings that took no part."""
+    *before, last = rounds
+    given, left = residual(null, values, null.prediction), residual(null, values, last.prediction)
+    if explains(null, given, left, last.prediction):
+        return list(rounds)
+    gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
+    return [*before, replace(rounds[int(np.argmin(gaps))], fits=())]
+
+
+def named(
+    comparison: Comparison, rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], explained: bool
+) -> tuple[NamedEffect, ...]:
+    """What the refit found missing, then what the search kept; the former not where the latter leaves something."""
+    place, time = where(comparison.case), when(comparison.case)
+    by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in found)
+    if explained or may_be_chance(comparison, found) or not rounds:
+        return (*(named_by_refit(m) for m in comparison.missing), *by_search)
+    return by_search
+
+
+def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
+    """What an unknown discrepancy looks like, and what was not looked for."""
+    case = comparison.case
+    about = structure(case, comparison.null, comparison.residuals)
+    about["best_candidate"] = found[0][0].name if found else None
+    if second_left_out(case):
+        about |= {"not_looked_for": SECOND, "effort": enough_effort(case)}
+    return about
+
+
+def enough_effort(case: Case) -> int:
     """Effort with which another effect would have been looked for beside those found, in tens."""
     return 10 * math.ceil((case.effort.simulated / len(case.conditions) + BESIDE + 1) / 10)
 
 
-def accepted(rounds: Sequence[Round]) -> list[tuple[Fit, Round]]:
-    """The best of each round that was kept, with its parameters as they are in the end, and the round."""
-    kept = {e.name: e.parameters() for e in rounds[-1].model.effects} if rounds else {}
-    added = [r for r, after in itertools.pairwise(rounds) if after.model is not r.model]
-    found = [(r.fits[0], r) for r in added if r.fits[0].name in kept]
-    return [(replace(f, parameters={k: kept[f.name][k] for k in f.parameters}), r) for f, r in found]
+def tied(found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
+    """The candidates of the first tie, and the experiment that separates them."""
+    members = next([f.name, *r.rivals] for f, r in found if r.rivals)
+    return {"members": members, "experiment": candidate(members[0]).experiment}
 
 
-def removed_instead(case: Case, null: Null, values: Array, given: Array, turn: Round) -> dict[str, float]:
-    """Share of the gap that the others of a round would remove alone, of those that were confirmed."""
-    sure = [f for f in turn.fits[1:] if len(f.prediction.draws) > 1]
-    return {f.name: gap_of(case, null, values, given, f.prediction).removed for f in sure}
-
-
-def told_of(found: Sequence[tuple[Fit, Round]]) -> list[str]:
-    """What to know of how it was found."""
-    lent = [LENT] if any(r.lent for _, r in found) else []
-    return lent + ([HELD_OUT_ALONE] if any(r.alone for _, r in found) else [])
-
-
-def named_missing(found: Missing) -> NamedEffect:
-    """An effect of the base pixel, as the refit measured it."""
-    effect = found.effect
-    key = type(effect).strength
-    estimate = {key: Estimate(effect.parameters()[key], found.sd)}
-    share = 0.99 / (1 + len(found.also))
-    rivals = tuple((name, share) for name in found.also)
-    return NamedEffect(effect.name, candidate(effect.name).family, share, estimate, rivals)
-
-
-def named(found: Fit, turn: Round, instead: Mapping[str, float]) -> NamedEffect:
-    """A candidate as the diagnosis names it, with its rivals; instead: share of the gap that some of these remove."""
-    rivals = [(f, float(np.exp(-max(f.misfit - found.misfit, 0.0) / 2))) for f in turn.fits if f.name != found.name]
-    total = 1.0 + sum(w for _, w in rivals)
-    parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
-    return NamedEffect(
-        found.name,
-        candidate(found.name).family,
-        min(1.0 / total, 0.99),
-        parameters,
-        tuple((f.name, w / total) for f, w in rivals),
-        instead=dict(instead),
-    )
-
-
-def ranked(found: Fit, turn: Round, accepted: bool) -> Ranked:
-    """A row of the ranking; the misfit of what was added is beside all that was found, in their noise."""
-    before = turn.misfit
-    parameters = {k: Estimate(v, found.sd.get(k, np.nan)) for k, v in found.parameters.items()}
-    worst = float(np.abs(found.rho).max())
-    reason = f"leaves {worst:.1f} noises at worst" if accepted or found.misfit < before else "explains nothing"
-    return Ranked(found.name, candidate(found.name).family, before, found.misfit, parameters, accepted, reason)
-
-
-def gap_of(case: Case, null: Null, values: Array, given: Array, after: Prediction) -> Gap:
-    """Mean square distance on held-out recordings, in the noise that each model predicts."""
-    held = case.held_out(null.keys)
-    wider = np.sqrt(np.maximum(after.spread**2 - null.sd**2, 0.0) + null.noise**2)
-    b, a = (np.nan_to_num((values - mean) / sd) ** 2 for mean, sd in ((given, null.noise), (after.mean, wider)))
-    by = {}
-    for c in case.conditions:
-        of = np.array([k.recording == c.name for k in null.keys])
-        if np.any(of):
-            by[c.name] = {"before": float(b[of].mean()), "after": float(a[of].mean()), "floor": 1.0}
-    before, then = float(b[held].mean()), float(a[held].mean())
-    return grounded(Gap(before, then, 1.0, 0.0, by), 1.0)
-
-
-def grounded(gap: Gap, floor: float) -> Gap:
-    """A gap with its floor: what chance alone makes of it (`halves_floor`), or 1 where that is not known, or where
-    halves of a recording differ by more than chance: the camera changes with time, and the floor would hold what is to
-    be found."""
-    ground = min(floor, 1.0) if np.isfinite(floor) else 1.0
-    removed = (gap.before - gap.after) / (gap.before - ground) if gap.before > 1.5 * ground else 0.0
-    by = {name: {**values, "floor": ground} for name, values in gap.by_recording.items()}
-    return Gap(gap.before, gap.after, ground, removed, by)
-
-
-def table(
-    case: Case, null: Null, values: Array, given: Array, z: Array, p: Array, after: Array, rho: Array
-) -> tuple[Statistic, ...]:
-    """The bank as the result states it."""
+def statistics_rows(comparison: Comparison, after: Array, left: Array) -> tuple[Statistic, ...]:
+    """Every statistic under the model as given, and after: (S,) its mean, and what that leaves in noise."""
+    case, null, values, given = comparison.case, comparison.null, comparison.values, comparison.given
+    z = deviates(replace(null, mean=given), values)
+    p = adjusted(z)
     return tuple(
         Statistic(f"{k.group}: {k.name}", k.group, (k.recording,), float(values[j]), float(given[j]),
-                  float(after[j]), float(null.noise[j]), float(z[j]), float(rho[j]), float(p[j]),
+                  float(after[j]), float(null.noise[j]), float(z[j]), float(left[j]), float(p[j]),
                   case.use(k.recording) == "holdout")
         for j, k in enumerate(null.keys)
     )  # fmt: skip

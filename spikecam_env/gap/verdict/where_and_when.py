@@ -1,7 +1,7 @@
 """Where and when: whether a discrepancy is everywhere and always, or in a part of the array or of the time.
 
-Odd intervals, rate residuals and the strongest spectral line are counted in nine fields of the array and in both halves
-of the recordings.
+Irregular intervals, rate residuals and the strongest spectral line are compared between nine fields of the array and
+between both halves of the recordings.
 """
 
 from __future__ import annotations
@@ -15,109 +15,137 @@ from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]
 
-SIGMAS = 8.0
-"""Noises by which a field or a half has to stand out."""
+LOCAL_NOISES = 8.0
+"""Noises by which a field or a half has to stand out: comparisons are many; in the clean campaigns of
+`tests/gap/verdict` none does."""
 
-TOGETHER = 5.0
+LOCAL_NOISES_POOLED = 5.0
 """Noises by which the halves of all recordings together have to differ: one comparison, not one for each."""
 
-LEAST_FRAMES = 1000
+FIELDS_PER_SIDE = 3
+"""Fields along each side of the array."""
+
+TIMES_EXPECTED = 2.0
+"""Times the irregular intervals that are expected of a field which has to have more for an effect to act there."""
+
+LEAST_OFF = 1e-4
+"""Relative rate by which a field has to be off: five times what labels can be known to."""
+
+LEAST_FRAMES_OF_A_LINE = 1000
 """Shortest recording whose halves are compared by their lines: pixels of one rate make a line of their own at first."""
 
-FIELDS = 3
-"""Fields along each side of the array."""
+LINE_POWER, LINE_RATIO = 60.0, 6.0
+"""Power of a line over its surroundings in one half, and times that in the other, from which it is of one half."""
+
+HALVES_DIFFER = 0.3
+"""Share of all irregular intervals by which the halves have to differ, however many there are."""
+
+LEAST_STEP = 2e-5
+"""Relative rate by which the second half has to differ: what labels can be known to."""
 
 
 def where(case: Case) -> str:
     """Rows and columns of the fields that stand out; empty where none does, or most do."""
-    odd = np.zeros(case.base.gain.size)
-    bent = np.zeros(case.base.gain.size)
+    irregular = np.zeros(case.base.gain.size)
+    off = np.zeros(case.base.gain.size)
     for c, o in zip(case.conditions, case.observations, strict=True):
         if not c.moves:
-            odd += o.short + o.long
+            irregular += o.short + o.long
     known = np.isfinite(case.base.residual)
-    bent = np.where(known, case.base.residual, 0.0)[_bright(case)].mean(axis=0) if len(known) else bent
-    fields = _fields(case.shape)
-    out = _outlying_counts(odd, fields) | _outlying_means(bent, fields)
-    if not 0 < out.sum() <= FIELDS:
+    off = np.where(known, case.base.residual, 0.0)[brightest_flats(case)].mean(axis=0) if len(known) else off
+    fields = fields_of(case.shape)
+    out = outlying_counts(irregular, fields) | outlying_means(off, fields)
+    if not 0 < out.sum() <= FIELDS_PER_SIDE:
         return ""
-    names = [_name(int(f), case.shape) for f in np.flatnonzero(out)]
+    names = [rows_and_columns(int(f), case.shape) for f in np.flatnonzero(out)]
     return "; ".join(names)
 
 
-def _bright(case: Case) -> list[int]:
+def brightest_flats(case: Case) -> list[int]:
+    """The three brightest flats, by their place among the recordings that the refit has residuals of."""
     static = [c for c in case.conditions if c.kind in ("dark", "flat", "picture")]
     order = sorted((c.level, i) for i, c in enumerate(static) if c.kind == "flat")
     return [i for _, i in order[-3:]]
 
 
-def _fields(shape: tuple[int, int]) -> NDArray[np.int64]:
-    rows = np.arange(shape[0]) * FIELDS // shape[0]
-    columns = np.arange(shape[1]) * FIELDS // shape[1]
-    both: NDArray[np.int64] = (rows[:, None] * FIELDS + columns[None, :]).reshape(-1)
+def fields_of(shape: tuple[int, int]) -> NDArray[np.int64]:
+    """(P,) the field of each pixel, by rows."""
+    rows = np.arange(shape[0]) * FIELDS_PER_SIDE // shape[0]
+    columns = np.arange(shape[1]) * FIELDS_PER_SIDE // shape[1]
+    both: NDArray[np.int64] = (rows[:, None] * FIELDS_PER_SIDE + columns[None, :]).reshape(-1)
     return both
 
 
-def _outlying_counts(odd: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
-    count = np.bincount(fields, odd, FIELDS**2)
-    share = np.bincount(fields, minlength=FIELDS**2) / fields.size
+def outlying_counts(irregular: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(9,) fields with more irregular intervals, (P,) of each pixel, than the median field lets expect."""
+    count = np.bincount(fields, irregular, FIELDS_PER_SIDE**2)
+    share = np.bincount(fields, minlength=FIELDS_PER_SIDE**2) / fields.size
     usual = float(np.median(count / share))
     expected = np.maximum(usual * share, 1.0)
-    return (count > 2.0 * expected) & (count - expected > SIGMAS * np.sqrt(expected))
+    return (count > TIMES_EXPECTED * expected) & (count - expected > LOCAL_NOISES * np.sqrt(expected))
 
 
-def _outlying_means(values: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Fields whose median is off by SIGMAS of its own error, sqrt(pi / 2) sd / sqrt(n), and of the others' scatter."""
-    mean = np.array([np.median(values[fields == f]) for f in range(FIELDS**2)])
+def outlying_means(values: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(9,) fields whose median of (P,) values is off by LOCAL_NOISES of its error, sqrt(pi / 2) sd / sqrt(n), and of
+    the scatter of the others."""
+    mean = np.array([np.median(values[fields == f]) for f in range(FIELDS_PER_SIDE**2)])
     off = np.abs(mean - np.median(mean))
-    inside = np.sort(off)[: FIELDS**2 - FIELDS]
-    error = 1.2533 * np.array([values[fields == f].std() / np.sqrt((fields == f).sum()) for f in range(FIELDS**2)])
-    return off > np.maximum(SIGMAS * np.maximum(np.sqrt(np.mean(inside**2)), error), 1e-4)
+    inside = np.sort(off)[: FIELDS_PER_SIDE**2 - FIELDS_PER_SIDE]
+    error = 1.2533 * np.array(
+        [values[fields == f].std() / np.sqrt((fields == f).sum()) for f in range(FIELDS_PER_SIDE**2)]
+    )
+    return off > np.maximum(LOCAL_NOISES * np.maximum(np.sqrt(np.mean(inside**2)), error), LEAST_OFF)
 
 
-def _name(field: int, shape: tuple[int, int]) -> str:
-    r, c = divmod(int(field), FIELDS)
-    rows = -(-r * shape[0] // FIELDS), -(-(r + 1) * shape[0] // FIELDS) - 1
-    columns = -(-c * shape[1] // FIELDS), -(-(c + 1) * shape[1] // FIELDS) - 1
+def rows_and_columns(field: int, shape: tuple[int, int]) -> str:
+    """A field as rows and columns of the array."""
+    r, c = divmod(int(field), FIELDS_PER_SIDE)
+    rows = -(-r * shape[0] // FIELDS_PER_SIDE), -(-(r + 1) * shape[0] // FIELDS_PER_SIDE) - 1
+    columns = -(-c * shape[1] // FIELDS_PER_SIDE), -(-(c + 1) * shape[1] // FIELDS_PER_SIDE) - 1
     return f"rows {rows[0]}-{rows[1]}, columns {columns[0]}-{columns[1]}"
 
 
 def when(case: Case) -> str:
     """From (or until) which part of steady recordings it acts; empty where always."""
     votes = []
-    odd = np.zeros(2)
+    irregular = np.zeros(2)
     for c, o in zip(case.conditions, case.observations, strict=True):
         if c.moves or o.frame.sum() < 1000:
             continue
         half = o.frames // 2
         own = np.array([o.odd[:half].sum(), o.odd[half:].sum()], np.float64)
-        odd += own
-        votes += _more(own)
+        irregular += own
+        votes += later_half(own)
         halves = [strongest_line(spectrum(part)) for part in (o.frame[:half], o.frame[half:])]
         (_a, first_line), (_b, second_line) = halves
-        louder, quieter = max(first_line, second_line), min(first_line, second_line)
-        if o.frames >= LEAST_FRAMES and louder > 60 and louder > 6 * quieter:
-            votes.append(second_line > first_line)
+        if o.frames >= LEAST_FRAMES_OF_A_LINE:
+            votes += line_in_one_half(first_line, second_line)
         blocks = o.blocks[:-1] if o.frames % TIME_BLOCKS else o.blocks
-        votes += _jump(blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))
+        votes += step_in_the_middle(blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))
     if len(votes) < 2:
-        votes = _more(odd, TOGETHER)  # few events a recording, but of all together
+        votes = later_half(irregular, LOCAL_NOISES_POOLED)  # few events a recording, but of all together
     if not votes:
         return ""
     return "from about half of each recording on" if np.mean(votes) > 0.5 else "until about half of each recording"
 
 
-def _more(halves: Array, sigmas: float = SIGMAS) -> list[bool]:
+def later_half(halves: Array, sigmas: float = LOCAL_NOISES) -> list[bool]:
     """Whether there are more counts in the second half; nothing where that may be chance."""
     first, second = halves
-    clear = abs(first - second) > max(sigmas * np.sqrt(first + second), 0.3 * (first + second))
+    clear = abs(first - second) > max(sigmas * np.sqrt(first + second), HALVES_DIFFER * (first + second))
     return [bool(second > first)] if clear else []
 
 
-def _jump(blocks: Array, spikes: float) -> list[bool]:
+def line_in_one_half(first: float, second: float) -> list[bool]:
+    """Whether the line of one half alone is in the second, by their powers; nothing where it is in both or in none."""
+    stronger, weaker = max(first, second), min(first, second)
+    return [second > first] if stronger > LINE_POWER and stronger > LINE_RATIO * weaker else []
+
+
+def step_in_the_middle(blocks: Array, spikes: float) -> list[bool]:
     """A step of the array's rate in the middle that explains nearly all of its change."""
     whole = blocks[: TIME_BLOCKS // 2 * 2] / blocks.mean()
     first, second = whole[: len(whole) // 2], whole[len(whole) // 2 :]
     step = float(second.mean() - first.mean())
     left = float(np.sqrt(np.mean(np.concatenate([first - first.mean(), second - second.mean()]) ** 2)))
-    return [step > 0] if abs(step) > max(SIGMAS * left, 2e-5) else []
+    return [step > 0] if abs(step) > max(LOCAL_NOISES * left, LEAST_STEP) else []

@@ -14,7 +14,7 @@ from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.result import Gap
 from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.conversion import unit_from_refit
-from spikecam_env.gap.verdict.verdict import grounded
+from spikecam_env.gap.verdict.gap import usable_floor
 from spikecam_env.streams import unpack_frames
 
 
@@ -37,6 +37,6 @@ def test_where_nothing_is_wrong_the_gap_is_its_floor_pattern_and_all():
 @pytest.mark.parametrize("halves, floor", [(0.4, 0.4), (np.nan, 1.0), (190.0, 1.0)])
 def test_halves_that_differ_by_more_than_chance_are_no_floor(halves, floor):
     """A dark level that climbs makes them differ by what the model lacks."""
-    gap = grounded(Gap(87.0, 0.5, 1.0, 0.0, {"dark": {"before": 87.0, "after": 0.5, "floor": 1.0}}), halves)
+    gap = Gap.of(87.0, 0.5, {"dark": (87.0, 0.5)}, usable_floor(halves))
     assert gap.floor == gap.by_recording["dark"]["floor"] == floor
     assert gap.removed == pytest.approx(86.5 / (87.0 - floor))

@@ -14,13 +14,14 @@ import made_up
 import numpy as np
 import pytest
 
-from spikecam_env.gap.report.exhibits import by_loudness, exhibits
+from spikecam_env.gap.report.exhibits import Exhibit, by_z, exhibits
 from spikecam_env.gap.report.exhibits.spectrum import averaged, panels
 from spikecam_env.gap.report.exhibits.step import free_window
-from spikecam_env.gap.report.page import command_of, report, write_report
+from spikecam_env.gap.report.page import report, write_report
 from spikecam_env.gap.report.plots import strip
-from spikecam_env.gap.report.words import at_most
-from spikecam_env.gap.result import VERDICTS
+from spikecam_env.gap.report.quantities import at_most
+from spikecam_env.gap.report.reproduce import command_of
+from spikecam_env.gap.result import NOMINAL_LIGHT, VERDICTS
 from spikecam_env.sensor import SensorModel
 
 VOID = {"meta", "img", "br", "link"}
@@ -151,7 +152,7 @@ def test_text_of_a_campaign_cannot_become_markup(tmp_path: Path) -> None:
 def test_the_exhibit_of_an_effect_is_among_the_first_and_the_patch_closes_it(effect: str, loud: str) -> None:
     d = made_up.named(effect)
     made = {e.name: e for e in exhibits(d.evidence, 40_000.0)}
-    first = by_loudness(list(made.values()), d.statistics)[0][:2]
+    first = by_z(list(made.values()), d.statistics)[0][:2]
     assert loud in [e.name for e in first]
     panel = max(made[loud].panels, key=lambda p: p.z)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -172,7 +173,7 @@ def test_without_a_gap_the_panels_stay_within_their_bands() -> None:
         ]
     )
     print(f"{z.size} points: rms z {np.sqrt(np.mean(z**2)):.2f}, outside the band {np.mean(np.abs(z) > 2):.1%}")
-    # The loudest recordings are the ones drawn, so that somewhat more than 4.6 % are outside.
+    # The recordings furthest off are the ones drawn, so that somewhat more than 4.6 % are outside.
     assert np.mean(np.abs(z) > 2) < 0.12
 
 
@@ -181,8 +182,8 @@ def test_recordings_without_spikes_or_labels_leave_out_what_they_cannot_show() -
     e = d.evidence
     unlabelled = tuple(replace(c, kind="unknown", level=np.nan, light=None) if c.name == "flat-200" else c
                        for c in e.conditions)  # fmt: skip
-    bases = [replace(b, residual=b.residual[:5]) for b in (e.measured_base, e.before_base, e.after_base)]
-    e = replace(e, conditions=unlabelled, measured_base=bases[0], before_base=bases[1], after_base=bases[2])
+    bases = [replace(b, residual=b.residual[:5]) for b in (e.free_refit, e.before_base, e.after_base)]
+    e = replace(e, conditions=unlabelled, free_refit=bases[0], before_base=bases[1], after_base=bases[2])
     assert {x.name for x in exhibits(e, 40_000.0)} - {"clock"} == {x.name for x in exhibits(d.evidence, 40_000.0)}
     only_rates = (None,) * len(e.conditions)
     e = replace(e, measured=only_rates, before=only_rates, after=only_rates, again=None)
@@ -221,7 +222,21 @@ def test_a_model_that_is_silent_in_the_dark_has_a_spectrum_to_draw() -> None:
         assert np.isfinite(p.sd).all() and np.isfinite(p.before).all(), p.title
 
 
-def test_groups_as_loud_as_each_other_are_drawn_in_the_order_of_the_statistics() -> None:
+@pytest.mark.parametrize("z, shown", [(3.0, False), (6.0, True)])
+def test_exhibits_that_differ_by_four_standard_deviations_are_shown(z: float, shown: bool) -> None:
+    quiet = replace(made_up.named().statistics[0], group="rates", z=z)
+    first, folded = by_z([Exhibit("rates", "Rates", "", ())], [quiet])
+    assert (len(first), len(folded)) == ((1, 0) if shown else (0, 1))
+
+
+def test_light_that_was_counted_anew_has_its_own_name_on_the_axes() -> None:
+    labelled = made_up.evidence("dead_time")
+    for seen, name in ((labelled, "radiance (label)"), (replace(labelled, light=NOMINAL_LIGHT), "radiance (nominal)")):
+        axes = {p.xlabel for e in exhibits(seen, 40_000.0) for p in e.panels if p.xlabel.startswith("radiance")}
+        assert axes == {name}
+
+
+def test_groups_as_far_off_as_each_other_are_drawn_in_the_order_of_the_statistics() -> None:
     """Deviates end at 40, where several groups may be: an order of chance would draw another page in every process."""
     first = made_up.named().statistics[0]
     names = [f"group {n}" for n in range(8)]

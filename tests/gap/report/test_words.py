@@ -1,75 +1,18 @@
-"""Words of a diagnosis: quantities keep the digits that their errors leave, and units an engineer reads."""
+"""The catalogue in plain words."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import made_up
-import pytest
-
-from spikecam_env.gap.report.words import bare, quantity, sentence, unit_of
-from spikecam_env.gap.verdict.notes import LENT
+from spikecam_env.gap.report.words import bare, listed, parameter_unit
 from spikecam_env.sensor import CATALOGUE
-
-
-@pytest.mark.parametrize(
-    "value, unit, sd, said",
-    [
-        (0.0612, "relative", 0.0012, "6.12 ± 0.12 %"),
-        (1224.0, "us", 24.0, "1.224 ± 0.024 ms"),
-        (2.4, "us", 0.1, "2.40 ± 0.10 us"),
-        (31000.0, "electrons", 800.0, "31000 ± 800 electrons"),
-        (0.0, "pA", 0.0, "0 pA"),
-        (5.0, "", None, "5"),
-        (1e-12, "V", 1e-13, "1e-12 ± 1e-13 V"),
-    ],
-)
-def test_a_quantity_has_the_digits_that_its_error_leaves(value, unit, sd, said) -> None:
-    assert quantity(value, unit, sd) == said
 
 
 def test_every_parameter_of_the_catalogue_has_a_plain_name_and_a_unit_in_words() -> None:
     for effect, kind in CATALOGUE.items():
         for parameter in kind().parameters():
             assert "_" not in bare(effect, parameter)
-            assert isinstance(unit_of(effect, parameter), str)
+            assert isinstance(parameter_unit(effect, parameter), str)
     assert bare("light_flicker", "frequency_hz") == "frequency"
 
 
-@pytest.mark.parametrize(
-    "verdict, said",
-    [
-        ("none", "No gap: these recordings and the model scsim agree to within the noise."),
-        ("named", "Your camera has photodiode lag (fraction 6.12 %, tau 1.22 ms); adding it removes 97 % of the gap on "
-         "recordings that were not used."),
-        ("class", "Your camera has photo response nonlinearity or IR drop: these recordings cannot tell which; adding "
-         "either removes 97 % of the gap on recordings that were not used."),
-        ("unknown", "Your camera does something that no candidate explains; adding an empirical patch removes 79 % of "
-         "the gap on recordings that were not used."),
-        ("parameter", "No effect is missing, but parameters of the model scsim are off: shot noise is 3.1e+04 "
-         "electrons, not 5e+04 electrons."),
-        ("data", "The recordings contradict their own labels: flat-300: rates are 2.1 % (31 sd) above the line through "
-         "the other flats; its label fits 0.3063."),
-    ],
-)  # fmt: skip
-def test_a_sentence_says_the_verdict(verdict: str, said: str) -> None:
-    assert sentence(made_up.EVERY[verdict]()) == said
-
-
-def test_a_gap_on_recordings_that_told_parameters_is_not_called_a_check() -> None:
-    lent = replace(made_up.named(), data=(LENT,))
-    assert sentence(lent).endswith("removes 97 % of the gap on the recordings held out, which told parameters too.")
-
-
-def test_parameters_that_are_off_beside_an_effect_are_said() -> None:
-    off = {"reset_noise": {"measured": 19.9, "nominal": 0.976, "ratio": 20.4}}
-    said = sentence(replace(made_up.named(), parameters=off))
-    assert said.endswith(
-        "not used. Parameters of the model scsim are off as well: reset noise is 19.9 mV, not 0.976 mV."
-    )
-
-
-def test_two_effects_are_named_together() -> None:
-    d = made_up.named()
-    both = replace(d, effects=(*d.effects, *made_up.named("dead_time").effects))
-    assert "1.22 ms) and dead time (tau 1.02 us); adding them removes" in sentence(both)
+def test_names_are_listed_with_a_word_before_the_last() -> None:
+    assert listed(["a", "b", "c"], "or") == "a, b or c" and listed(["a"], "and") == "a" and listed([], "and") == ""

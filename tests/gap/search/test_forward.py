@@ -32,7 +32,7 @@ from spikecam_env.gap.search.forward import (
 from spikecam_env.gap.search.rivals import CLOSE, LEAST, is_rival, lead
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Effort
-from spikecam_env.gap.verdict.verdict import explains, harmless
+from spikecam_env.gap.verdict.verdict import explains, with_stand_ins
 
 COUNT, TWINS = 200, 12
 DEAD_TIME = effect("dead_time", tau_us=0.2)
@@ -357,7 +357,7 @@ def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
     for held_out, kept in ((0.5, True), (-1.0, False)):
         found = a_fit(n, "optical_blur", np.where(FIT, 0.9 * change, held_out * change), seen)
         end = Round(patched, unit(), found.prediction, found.rho, found.misfit)
-        after = harmless(case, n, values, [replace(start, fits=(found,)), end])
+        after = with_stand_ins(case, n, values, [replace(start, fits=(found,)), end])
         assert (after[-1].model is patched) == kept and len(after) == 2 and after[-1].fits == ()
 
 

@@ -17,7 +17,7 @@ from spikecam_env.gap.compare.distance import judged, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.fit import joint as polish
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.report.words import sentence, unfinished
+from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.search import forward as searching
 from spikecam_env.gap.search.forward import (
     BESIDE,
@@ -31,7 +31,8 @@ from spikecam_env.gap.search.forward import (
 )
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
-from spikecam_env.gap.verdict.verdict import concluded
+from spikecam_env.gap.verdict.comparison import Comparison
+from spikecam_env.gap.verdict.verdict import conclude
 
 
 def test_nothing_is_left_out_while_there_is_less_than_the_most():
@@ -190,13 +191,14 @@ def test_nothing_is_named_where_a_second_effect_was_not_looked_for(left_out: lis
     first = Round(small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0, (fit,))
     rounds = [first, Round(model, case.base, close, fit.rho, 1.0)]
     off = OffNominal({}, case.base)
-    said = concluded(case, small.MODEL, null, null.mean, values, (), off, rounds, (), ())
+    comparison = Comparison(case, small.MODEL, small.MODEL, null, values, null.mean, (), off, ())
+    said = conclude(comparison, rounds, floor=1.0)
     assert said.verdict == verdict and said.patched == model
     if verdict == "unknown":
         asked = said.unknown["effort"]
         assert said.unknown["not_looked_for"] == SECOND and said.unknown["best_candidate"] == "dead_time"
         assert len(case.conditions) * asked > 300 + BESIDE * len(case.conditions) and asked % 10 == 0
-        assert f"--effort {asked}" in sentence(said) and "dead time comes nearest" in sentence(said)
+        assert f"--effort {asked}" in sentence(said, "scsim") and "dead time comes nearest" in sentence(said, "scsim")
 
 
 def test_the_most_by_default_is_enough_to_look_for_a_second_effect():

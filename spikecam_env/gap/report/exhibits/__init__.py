@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from spikecam_env.gap.report.evidence import Maps, Panel
 from spikecam_env.gap.report.exhibits import (
     clock,
     drift,
@@ -19,9 +18,10 @@ from spikecam_env.gap.report.exhibits import (
     spectrum,
     step,
 )
+from spikecam_env.gap.report.panels import Panel, PixelMaps
 from spikecam_env.gap.result import Evidence, Statistic
 
-LOUD = 4.0
+LEAST_Z = 4.0
 """|z| from which an exhibit is shown among the evidence."""
 
 
@@ -33,7 +33,7 @@ class Exhibit:
     title: str
     caption: str
     panels: tuple[Panel, ...]
-    maps: tuple[Maps, ...] = ()
+    maps: tuple[PixelMaps, ...] = ()
 
     def z(self, statistics: Sequence[Statistic]) -> float:
         """Largest |z| of its statistics; of its own panels where the bank has none of this group."""
@@ -51,7 +51,7 @@ def exhibits(evidence: Evidence, frame_rate_hz: float) -> list[Exhibit]:
     return [e for e in made if e.panels or e.maps]
 
 
-def by_loudness(made: Sequence[Exhibit], statistics: Sequence[Statistic]) -> tuple[list[Exhibit], list[Exhibit]]:
-    """Exhibits where measured and before differ, loudest first, and the others."""
+def by_z(made: Sequence[Exhibit], statistics: Sequence[Statistic]) -> tuple[list[Exhibit], list[Exhibit]]:
+    """Exhibits where measured and before differ, largest first, and the others."""
     order = sorted(made, key=lambda e: -e.z(statistics))
-    return [e for e in order if e.z(statistics) >= LOUD], [e for e in order if e.z(statistics) < LOUD]
+    return [e for e in order if e.z(statistics) >= LEAST_Z], [e for e in order if e.z(statistics) < LEAST_Z]

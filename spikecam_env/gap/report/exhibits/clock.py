@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import ideal_second_difference
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.report.evidence import Panel, takes
+from spikecam_env.gap.report.panels import Panel, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Spikes against the clock"

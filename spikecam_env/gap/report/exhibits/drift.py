@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.evidence import Panel, loudest, over_pixels, takes
+from spikecam_env.gap.report.panels import Panel, largest, over_pixels, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Through the recording"
@@ -25,4 +25,4 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         made.append(Panel(f"Rate through {t.shown.name}", "time [ms]", "rate over its mean, less 1 [%]", x,
                             100 * (measured - before), np.zeros(x.size),
                             None if after is None else 100 * (after - before), 100 * sd))  # fmt: skip
-    yield from loudest(made, 2)
+    yield from largest(made, 2)

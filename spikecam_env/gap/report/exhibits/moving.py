@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.report.evidence import Array, Panel, loudest, takes
+from spikecam_env.gap.report.panels import Array, Panel, largest, takes
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.statistics.film import light_film
 
@@ -26,14 +26,14 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         if films[0] is None or films[1] is None:
             continue
         assert t.shown.light is not None
-        for name, feature in features(light_film(t.shown.light, t.shown.frames), t.measured.shape).items():
+        for name, feature in light_features(light_film(t.shown.light, t.shown.frames), t.measured.shape).items():
             panel = _over_feature(f"{name} ({t.shown.name})", feature, films)
             if panel:
                 made.append(panel)
-    yield from loudest(made, 4)
+    yield from largest(made, 4)
 
 
-def features(light: Array, shape: tuple[int, int]) -> dict[str, Array]:
+def light_features(light: Array, shape: tuple[int, int]) -> dict[str, Array]:
     """What of a film of light (bins, P) a pixel may notice, (bins, P) each, relative to the mean light."""
     bins = len(light)
     film = (light / max(float(light.mean()), 1e-12)).reshape(bins, *shape)

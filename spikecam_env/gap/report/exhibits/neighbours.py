@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.evidence import Panel, loudest, scaled, takes
+from spikecam_env.gap.report.panels import Panel, largest, scaled_by_twins, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Neighbours"
@@ -27,11 +27,11 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         labels = tuple(f"{where}, {lag}" for where in ("in a row", "in a column") for lag in range(len(measured) // 2))
         again = t.again.coincidences.T.reshape(-1) if t.again else None
         # Every pair is counted both ways round.
-        sd = scaled(np.sqrt(2 / measured + 2 / before), None if again is None else again / before - 1)
+        sd = scaled_by_twins(np.sqrt(2 / measured + 2 / before), None if again is None else again / before - 1)
         made.append(Panel(
             f"Coincidences of neighbours, {t.shown.name}", "", "over the model's, less 1 [%]",
             np.arange(len(labels), dtype=np.float64), 100 * (measured / before - 1), np.zeros(len(labels)),
             None if after is None else 100 * (after / before - 1), 100 * sd,
             labels=labels,
         ))  # fmt: skip
-    yield from loudest(made, 2)
+    yield from largest(made, 2)

@@ -9,7 +9,7 @@ import numpy as np
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
 from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.observe.observation import DIFFERENCES, Observation
-from spikecam_env.gap.report.evidence import Panel, Take, against_before, by_recording, names, takes
+from spikecam_env.gap.report.panels import Panel, Take, against_before, by_recording, names, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Temporal noise"
@@ -26,7 +26,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     if steps:
         yield steps
     lit = [t for t in static if t.shown.level > 0]
-    levels = _noise_by_level(sorted(lit, key=lambda t: t.shown.level))
+    levels = _noise_by_level(sorted(lit, key=lambda t: t.shown.level), evidence.light)
     if levels:
         yield levels
     enough = [t for t in static if np.isfinite(t.measured.variance - t.before.variance).sum() > 1]
@@ -54,7 +54,7 @@ def _noise_by_step(static: Sequence[Take]) -> Panel | None:
     )  # fmt: skip
 
 
-def _noise_by_level(lit: Sequence[Take]) -> Panel | None:
+def _noise_by_level(lit: Sequence[Take], light: str) -> Panel | None:
     """s^2 of each recording by itself."""
     fits = [[_jitter([getattr(t, side)]) for side in ("measured", "before", "after")] for t in lit]
     whole = [(t, f) for t, f in zip(lit, fits, strict=True) if f[0] and f[1] and (f[2] or t.after is None)]
@@ -63,7 +63,7 @@ def _noise_by_level(lit: Sequence[Take]) -> Panel | None:
     white = np.array([[1e5 * j.white if j else np.nan for j in f] for _, f in whole])
     sd = np.array([1e5 * np.hypot(f[0].white_sd, f[1].white_sd) for _, f in whole])  # type: ignore[union-attr]
     after = None if any(t.after is None for t, _ in whole) else white[:, 2]
-    return Panel("Noise of a spike, by level", "radiance (label)", "noise², 1e-5 threshold²",
+    return Panel("Noise of a spike, by level", light, "noise², 1e-5 threshold²",
                  np.array([t.shown.level for t, _ in whole]), white[:, 0], white[:, 1], after, sd, log="x")  # fmt: skip
 
 

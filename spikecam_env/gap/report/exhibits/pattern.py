@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from spikecam_env.gap.report.evidence import Array, Maps, Panel, shape_of
+from spikecam_env.gap.report.panels import Array, Panel, PixelMaps, shape_of
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Fixed pattern"
@@ -19,12 +19,12 @@ CAPTION = (
     "profiles are means over the other direction."
 )
 _TITLES = {"gain": "Response", "dark": "Dark level"}
-_UNITS = {"gain": "thresholds a frame at radiance 1", "dark": "thresholds a frame"}
+_AXIS_UNITS = {"gain": "thresholds a frame at radiance 1", "dark": "thresholds a frame"}
 
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     """Dark level and response of pixels: how they are spread, and by row and column."""
-    if np.ptp(evidence.measured_base.gain) == 0:  # unknown scenes: no pattern can be told from them
+    if np.ptp(evidence.free_refit.gain) == 0:  # unknown scenes: their light hides the pattern
         return
     for what in _TITLES:
         histogram = _histogram(what, _values(evidence, what))
@@ -46,19 +46,19 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
                     None if after is None else after.mean(axis=axis), sd)  # fmt: skip
 
 
-def maps(evidence: Evidence) -> Iterator[Maps]:
+def maps(evidence: Evidence) -> Iterator[PixelMaps]:
     """Maps of dark level and response."""
-    shape = shape_of(evidence) if np.ptp(evidence.measured_base.gain) > 0 else None
+    shape = shape_of(evidence) if np.ptp(evidence.free_refit.gain) > 0 else None
     for what, title in _TITLES.items() if shape else ():
         measured, before, after = (None if v is None else v.reshape(shape) for v in _values(evidence, what))
         assert measured is not None and before is not None
-        yield Maps(f"{title} [{_UNITS[what]}]", measured, before, after)
+        yield PixelMaps(f"{title} [{_AXIS_UNITS[what]}]", measured, before, after)
 
 
 def _values(evidence: Evidence, what: str) -> list[Array | None]:
     """Measured, before, after (P,): of fresh units where there are any, else of the twins."""
     index = list(_TITLES).index(what)
-    bases = (evidence.measured_base, evidence.before_base, evidence.after_base)
+    bases = (evidence.free_refit, evidence.before_base, evidence.after_base)
     drawn = (None, evidence.drawn_before, evidence.drawn_after)
     return [
         d[index] if d is not None else None if b is None else np.asarray(getattr(b, what))
@@ -81,5 +81,5 @@ def _histogram(what: str, values: Sequence[Array | None]) -> Panel | None:
     counts = [None if v is None else np.histogram(v, edges)[0].astype(np.float64) for v in values]
     assert counts[0] is not None and counts[1] is not None
     middle = np.sqrt(edges[1:] * edges[:-1]) if log else (edges[1:] + edges[:-1]) / 2
-    return Panel(f"{_TITLES[what]} of pixels", _UNITS[what], "pixels", middle, counts[0], counts[1], counts[2],
+    return Panel(f"{_TITLES[what]} of pixels", _AXIS_UNITS[what], "pixels", middle, counts[0], counts[1], counts[2],
                  np.sqrt(np.maximum(counts[0] + counts[1], 1)), log="x" if log else "")  # fmt: skip

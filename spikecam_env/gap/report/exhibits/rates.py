@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.evidence import Panel, against_before, by_recording, error_known, mean_known, takes
+from spikecam_env.gap.report.panels import Panel, against_before, by_recording, error_known, mean_known, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Rates and levels"
@@ -21,7 +21,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     """How far rates are off the line of each pixel, and off the model's."""
     static = [c for c in evidence.conditions if c.kind in ("dark", "flat", "picture")]
     lit = np.array([c.level > 0 for c in static])
-    bases = (evidence.measured_base, evidence.before_base, evidence.after_base)
+    bases = (evidence.free_refit, evidence.before_base, evidence.after_base)
     if lit.sum() > 1 and all(b is None or len(b.residual) == len(static) for b in bases):
         level = np.array([c.level for c in static])[lit]
         order = np.argsort(level)
@@ -32,7 +32,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         known = np.isfinite(measured - before)
         usable = known.sum(axis=1) > 1
         yield Panel(
-            "Rate off each pixel's line", "radiance (label)", "rate off the line [%]", level[order][usable],
+            "Rate off each pixel's line", evidence.light, "rate off the line [%]", level[order][usable],
             mean_known(measured, known)[usable], mean_known(before, known)[usable],
             None if after is None else mean_known(after, np.isfinite(after))[usable],
             error_known(measured - before, known)[usable], log="x",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.report.evidence import Array, Panel, against_before, by_recording, loudest, takes
+from spikecam_env.gap.report.panels import Array, Panel, against_before, by_recording, largest, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Rows and columns in time"
@@ -23,19 +23,19 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     made = []
     for name in ("row", "column") if found else ():
         for frames in (1, 16):
-            measured, before, after, sd = by_recording(found, partial(_variance_of, name, frames))
+            measured, before, after, sd = by_recording(found, partial(_line_variance_of, name, frames))
             title = f"Variance of {name}s in {frames} frame{'s' if frames > 1 else ''}"
             made.append(against_before(title, "over the model's, less 1 [%]", found, measured, before, after, sd,
                                        100 / before))  # fmt: skip
-    yield from loudest(made, 3)
+    yield from largest(made, 3)
 
 
-def _variance_of(name: str, frames: int, observation: Observation) -> Array:
-    return variance(observation.row if name == "row" else observation.column, frames)
+def _line_variance_of(name: str, frames: int, observation: Observation) -> Array:
+    return line_variance(observation.row if name == "row" else observation.column, frames)
 
 
-def variance(lines: NDArray[np.int32], frames: int) -> Array:
-    """(lines,) variance in time of spikes in `frames` frames (F, lines), less the mean over lines."""
+def line_variance(lines: NDArray[np.int32], frames: int) -> Array:
+    """(lines,) line_variance in time of spikes in `frames` frames (F, lines), less the mean over lines."""
     whole = len(lines) // frames * frames
     binned = lines[:whole].reshape(-1, frames, lines.shape[1]).sum(axis=1).astype(np.float64)
     binned -= binned.mean(axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from spikecam_env.gap.report.evidence import Array, Panel, loudest, takes
+from spikecam_env.gap.report.panels import Array, Panel, largest, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Spectrum of the population"
@@ -38,7 +38,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             sd = np.maximum(sd, before * _local_scatter(np.log(np.maximum(measured, NONE) / np.maximum(before, NONE))))
             made.append(Panel(f"Power spectrum, {t.shown.name}", "frequency [Hz]", "power over white noise's",
                                 frequency, measured, before, after, sd, log="xy"))  # fmt: skip
-        yield from loudest(made, 1)
+        yield from largest(made, 1)
 
 
 def _local_scatter(log_ratio: Array) -> Array:

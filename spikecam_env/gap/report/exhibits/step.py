@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.report.evidence import Array, Panel, takes
+from spikecam_env.gap.report.panels import Array, Panel, takes
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.statistics.step import edges_of, uniform_light
 

@@ -1,0 +1,214 @@
+"""From a search among maps to a verdict."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, residual
+from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.maps.bank import MapCase, with_use
+from spikecam_env.gap.maps.search import FITTED_SPREADS, LINEAR_PARAMETERS, MapFit, PatternModel, fitted_parameters
+from spikecam_env.gap.result import MOST_CONFIDENCE, Conclusion, Estimate, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.unit.usual import USUAL
+from spikecam_env.sensor import CATALOGUE, SensorModel
+
+Array = NDArray[np.float64]
+
+MOST_SQUARE_LEFT = 0.08
+"""Share of the mean square beyond chance that may be left when something is named.  Of a mean square, and not of a
+robust deviance: statistics of maps are hundreds of noises off."""
+
+LARGEST_RELATIVE_SD = 0.5
+"""Relative standard deviation of a strength below which an effect is significant: two standard deviations."""
+
+LISTED = 6
+"""Statistics that are listed of what is left."""
+
+
+def conclude_maps(
+    case: MapCase,
+    tested: SensorModel,
+    null: Null,
+    values: Array,
+    rounds: Sequence[Sequence[MapFit]],
+    rejected: Sequence[MapFit],
+    not_testable: Sequence[tuple[str, str]],
+) -> Conclusion:
+    """The verdict of a search.
+
+    rounds: spreads alone, then the fits of each round, best first; rejected: those of the round that added none.
+    """
+    last = rounds[-1][0] if rounds else None
+    rho = last.rho if last else residual(null, values, null.prediction)
+    predicted = last.predicted if last else null.mean
+    square = [float(np.mean(((values - mean) / null.noise) ** 2)) for mean in (null.mean, predicted)]
+    left = (square[1] - 1.0) / max(square[0] - 1.0, 1e-9)
+    significant = alarmed(null, rho)
+    explained = not rounds or not significant or left < MOST_SQUARE_LEFT
+    parameters = spreads_off(case, last.state) if last else {}
+    effects = significant_effects(case, null, values, rounds)
+    found = [e.name for e in effects]
+    if not explained:
+        verdict = "unknown"
+    elif effects:
+        verdict = "named"
+    else:
+        verdict = "parameter" if parameters else "none"
+    return Conclusion(
+        verdict=verdict,
+        effects=effects if explained else (),
+        unknown=None if explained else maps_structure(null, rho, left, found),
+        class_=None,
+        parameters=parameters,
+        notes=(note_on_what_is_left(null, rho, left),) if rounds and explained and significant else (),
+        gap=gap_of_maps(case, null, values, predicted),
+        statistics=map_statistics(case, null, values, predicted, rho),
+        ranking=tuple(
+            ranked_fit(fit, was[0].misfit, fit is r[0] and r is not rejected)
+            for was, r in itertools.pairwise([*rounds, rejected])
+            for fit in r
+        ),
+        not_testable=tuple(not_testable),
+        patched=patched_model(case, tested, last),
+    )
+
+
+def significant_effects(
+    case: MapCase, null: Null, values: Array, rounds: Sequence[Sequence[MapFit]]
+) -> tuple[NamedEffect, ...]:
+    """The best of each round after the first, where its strength is significant in the end."""
+    found = []
+    for fits in rounds[1:]:
+        if has_clear_strength(rounds[-1][0], fits[0].name):
+            instead = {f.name: gap_of_maps(case, null, values, f.predicted).removed for f in fits[1:]}
+            found.append(named_effect(fits, rounds[-1][0], instead))
+    return tuple(found)
+
+
+def map_statistics(case: MapCase, null: Null, values: Array, predicted: Array, rho: Array) -> tuple[Statistic, ...]:
+    """Every statistic, measured, before and after; rho: (S,) what is left, in noise."""
+    use, z = with_use(case, null.keys, "fit"), deviates(null, values)
+    p = adjusted(z)
+    return tuple(
+        Statistic(f"{k.group}: {k.name}", k.group, (k.recording,), float(values[j]), float(null.mean[j]),
+                  float(predicted[j]), float(null.noise[j]), float(z[j]), float(rho[j]), float(p[j]),
+                  not bool(use[j]))
+        for j, k in enumerate(null.keys)
+    )  # fmt: skip
+
+
+def patched_model(case: MapCase, tested: SensorModel, last: MapFit | None) -> SensorModel:
+    """The fitted model without effects that are not significant in the end; the tested one where nothing was fitted."""
+    if last is None:
+        return tested
+    patched = at_measured_dark(last.state, case)
+    for name in (n for n in last.state.added if not has_clear_strength(last, n)):
+        patched = patched.without(name)
+    return patched
+
+
+def spreads_off(case: MapCase, state: PatternModel) -> dict[str, dict[str, float]]:
+    """Spreads of the model that this unit has in another amount than units differ by: as `baseline.off_nominal`."""
+    found = {}
+    for what, factor in state.factors.items():
+        if 1 / USUAL < factor < USUAL:
+            continue
+        for effect in state.model.effects:
+            if effect.name in FITTED_SPREADS[what]:
+                key = FITTED_SPREADS[what][effect.name]
+                nominal = effect.parameters()[key]
+                found[effect.name] = {"measured": nominal * factor, "nominal": nominal, "ratio": factor}
+    return found
+
+
+def named_effect(tried: Sequence[MapFit], last: MapFit, instead: dict[str, float]) -> NamedEffect:
+    """The best of a round, with parameters as they are in the end; confidence and rivals are the round's.
+
+    instead: share of the gap that the others would remove.
+    """
+    best = tried[0]
+    weights = [(t.name, float(np.exp(-max(t.misfit - best.misfit, 0.0) / 2))) for t in tried[1:]]
+    total = 1.0 + sum(w for _, w in weights)
+    return NamedEffect(
+        best.name,
+        candidate(best.name).family,
+        min(1.0 / total, MOST_CONFIDENCE),
+        fit_estimates(last, best.name),
+        tuple((n, w / total) for n, w in weights),
+        instead=instead,
+    )
+
+
+def has_clear_strength(last: MapFit, name: str) -> bool:
+    """Whether an effect's strength is more than two standard deviations in the end: a later one may take its place."""
+    return last.sd[f"{name}.{CATALOGUE[name].strength}"] < LARGEST_RELATIVE_SD
+
+
+def fit_estimates(tried: MapFit, name: str) -> dict[str, Estimate]:
+    """The parameters of an effect; errors of those that were fitted by their logarithm are relative."""
+    values = next(e for e in tried.state.model.effects if e.name == name).parameters()
+    return {
+        p: Estimate(values[p], tried.sd.get(f"{name}.{p}", np.nan) * (1.0 if p in LINEAR_PARAMETERS else values[p]))
+        for p in fitted_parameters(name)
+    }
+
+
+def ranked_fit(t: MapFit, before: float, accepted: bool) -> Ranked:
+    """A row of the ranking."""
+    worst = float(np.abs(t.rho).max())
+    reason = f"leaves {worst:.1f} noises at worst" if t.misfit < before else "explains nothing"
+    return Ranked(t.name, candidate(t.name).family, before, t.misfit, fit_estimates(t, t.name), accepted, reason)
+
+
+def worst_left(null: Null, rho: Array) -> list[str]:
+    """The statistics with the largest deviates."""
+    order = sorted(range(len(rho)), key=lambda j: -abs(rho[j]))[:LISTED]
+    return [f"{null.keys[j].recording} {null.keys[j].name} ({rho[j]:+.1f})" for j in order]
+
+
+def note_on_what_is_left(null: Null, rho: Array, left: float) -> str:
+    """A note on a name that does not explain everything."""
+    return (
+        f"what is named leaves {100 * left:.1f} % of the mean square distance, and that is no chance; "
+        f"largest, in noises: {', '.join(worst_left(null, rho))}"
+    )
+
+
+def maps_structure(null: Null, rho: Array, left: float, found: list[str]) -> dict[str, Any]:
+    """What is left once all that helps is in."""
+    return {
+        "light": "rates alone: in the dark and in the light",
+        "left": round(left, 3),
+        "found": found,
+        "worst": worst_left(null, rho),
+        "patch": f"what helps: {', '.join(found)}, and spreads" if found else "spreads as fitted",
+    }
+
+
+def gap_of_maps(case: MapCase, null: Null, values: Array, predicted: Array) -> Gap:
+    """Mean squares in the null's noise: a fitted model of maps scatters as the null does."""
+    b, a = (((values - mean) / null.noise) ** 2 for mean in (null.mean, predicted))
+    by_recording = {}
+    for m in case.maps:
+        own = np.array([k.recording == m.shown.name for k in null.keys])
+        by_recording[m.shown.name] = float(b[own].mean()), float(a[own].mean())
+    held = with_use(case, null.keys, "holdout")
+    held = held if held.any() else np.ones(len(held), bool)
+    return Gap.of(float(b[held].mean()), float(a[held].mean()), by_recording)
+
+
+def at_measured_dark(state: PatternModel, case: MapCase) -> SensorModel:
+    """The fitted model, its dark level the measured one."""
+    out = state.fitted
+    level = next((e for e in out.effects if e.name == "dark_current"), None)
+    middle = float(np.median(out.draw_unit(case.shape, case.seed).dark))
+    if level is None or middle <= 0 or case.dark <= 0:
+        return out
+    return out.with_effect(replace(level, mean_pA=level.parameters()["mean_pA"] * case.dark / middle))  # type: ignore[call-arg]

@@ -1,0 +1,186 @@
+"""What a verdict means: the section that opens a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from spikecam_env.gap.report.cells import bullets, number, percent, value_in_words
+from spikecam_env.gap.report.quantities import SDS_OF_90_PERCENT, quantity
+from spikecam_env.gap.report.tables import bounds_tables
+from spikecam_env.gap.report.words import bare, equation_of, human, meaning_of, parameter_unit, sheet
+from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect
+from spikecam_env.page import element, table
+from spikecam_env.sensor import CATALOGUE
+
+
+def meaning_section(d: Diagnosis) -> Iterator[str]:
+    """The verdict explained, and what to do with it."""
+    yield from _OPENINGS[d.verdict](d)
+    if d.verdict != "parameter" and d.parameters:
+        yield element("p", "Parameters of effects that the model has, off as well:")
+        yield parameters_table(d)
+
+
+def none_meaning(d: Diagnosis) -> Iterator[str]:
+    """Nothing found: upper bounds."""
+    yield element(
+        "p",
+        "After this unit's own response, dark level and noise were fitted, no statistic of the bank differs from the "
+        "model by more than chance explains. Effects may still be there, below what these recordings can show:",
+    )
+    yield from bounds_tables(d)
+
+
+def named_meaning(d: Diagnosis) -> Iterator[str]:
+    """A card an effect."""
+    said = f"The model {d.model_name}, fitted to this unit, does not make these recordings."
+    if d.statistics:
+        before, after = max(abs(s.z) for s in d.statistics), max(abs(s.z_after) for s in d.statistics)
+        said += (
+            f" With what is named here, the largest of {len(d.statistics)} deviations falls from |z| {before:.1f} "
+            f"to {after:.1f}."
+        )
+    yield element("p", said)
+    for effect in d.effects:
+        yield from effect_card(effect)
+
+
+def class_meaning(d: Diagnosis) -> Iterator[str]:
+    """The tied effects, and the experiment that separates them."""
+    class_ = d.class_ or {}
+    yield element(
+        "p", "Something is missing from the model, and several effects explain it equally well in these recordings:"
+    )
+    for name in class_.get("members", ()):
+        yield from effect_summary(str(name))
+    if class_.get("experiment"):
+        yield '<div class="do">'
+        yield element("h3", "The experiment that would tell")
+        yield element("p", str(class_["experiment"]))
+        yield "</div>"
+    for effect in d.effects:
+        yield from effect_card(effect)
+
+
+def unknown_meaning(d: Diagnosis) -> Iterator[str]:
+    """What the discrepancy looks like."""
+    about = d.unknown or {}
+    one = "no single candidate" if "not_looked_for" in about else "no candidate"
+    yield element(
+        "p",
+        f"The recordings and the model differ by more than chance, and {one} of the catalogue leaves the noise "
+        "alone once it is fitted. What the difference looks like:",
+    )
+    yield structure_table(about)
+    yield element(
+        "p",
+        "The patched model below makes the gap smaller by an empirical correction. It describes; it claims no physics "
+        "and may not hold for light that these recordings do not have.",
+        class_="warn",
+    )
+    for effect in d.effects:
+        yield from effect_card(effect)
+
+
+def parameter_meaning(d: Diagnosis) -> Iterator[str]:
+    """Strengths as measured and as the model has them."""
+    yield element(
+        "p",
+        "No effect is missing. An effect that the model has is there with another strength; the patched model has the "
+        "fitted value.",
+    )
+    yield parameters_table(d)
+
+
+def data_meaning(d: Diagnosis) -> Iterator[str]:
+    """The contradictions."""
+    yield element(
+        "p",
+        "These recordings disagree with what their campaign says of them, so a comparison with a model would blame the "
+        "camera for it. Correct the following and diagnose again:",
+    )
+    yield bullets(d.data)
+
+
+_OPENINGS: dict[str, Callable[[Diagnosis], Iterator[str]]] = {
+    "none": none_meaning,
+    "named": named_meaning,
+    "class": class_meaning,
+    "unknown": unknown_meaning,
+    "parameter": parameter_meaning,
+    "data": data_meaning,
+}
+
+
+def effect_card(effect: NamedEffect) -> Iterator[str]:
+    """An effect that was found: what it is, how large, and what may be there instead."""
+    yield '<div class="card">'
+    yield from effect_summary(effect.name)
+    rows = [parameter_row(effect.name, name, e) for name, e in effect.parameters.items()]
+    if rows:
+        yield table(("parameter", "value ± sd", "90 % interval", "meaning"), rows, numbers=(1, 2), stack=True)
+    others = "; ".join(f"{human(n)} {percent(c) if c > 1e-3 else 'below 0.1 %'}" for n, c in effect.alternatives)
+    family = f"Family: {human(effect.family)}. Confidence in the name: {percent(effect.confidence)}."
+    yield element("p", family + (f" Instead of it: {others}." if others else ""))
+    yield "</div>"
+
+
+def effect_summary(name: str) -> Iterator[str]:
+    """An effect as the catalogue describes it."""
+    found = sheet(name)
+    if not found:
+        yield element("h3", human(name).capitalize())
+    else:
+        title, _, said = found.summary.partition(": ")
+        yield element("h3", title)
+        yield element("p", said[:1].upper() + said[1:])
+        yield element("pre", equation_of(name))
+        if "Seen in" in found.sections:
+            yield element("p", f"Seen in: {found.sections['Seen in']}")
+
+
+def parameter_row(effect: str, name: str, e: Estimate) -> tuple[str, ...]:
+    """Name, value with error, 90 % interval, meaning."""
+    unit = parameter_unit(effect, name)
+    half = SDS_OF_90_PERCENT * e.sd
+    interval = f"{quantity(e.value - half, unit)} … {quantity(e.value + half, unit)}" if half > 0 else "–"
+    return bare(effect, name), quantity(e.value, unit, e.sd), interval, meaning_of(effect, name)
+
+
+def parameters_table(d: Diagnosis) -> str:
+    """One row an effect: its strength as measured, and as the model has it."""
+    rows = []
+    for name, row in d.parameters.items():
+        key = CATALOGUE[name].strength
+        what, unit = f"{human(name)}: {bare(name, key)}", parameter_unit(name, key)
+        values = (quantity(row["measured"], unit), quantity(row["nominal"], unit))
+        rows.append((what, *values, number(row["ratio"]), meaning_of(name, key)))
+    return table(("parameter", "measured", "in the model", "ratio", "meaning"), rows, numbers=(1, 2, 3), stack=True)
+
+
+def structure_table(unknown: dict[str, Any]) -> str:
+    """`unknown` of diagnosis.json, in words."""
+    rows = [(_STRUCTURE.get(key, human(key)), value_in_words(value)) for key, value in unknown.items()]
+    return table(("", ""), rows)
+
+
+_STRUCTURE = {
+    "light": "Light or dark",
+    "level_exponent": "Grows with the level to the power of",
+    "extent": "Local or common",
+    "time_scale_s": "Time scale [s]",
+    "time_scale_us": "Time scale [us]",
+    "time_scale_frames": "Time scale [frames]",
+    "history": "Depends on earlier spikes",
+    "neighbours": "Depends on neighbours",
+    "clock": "Differs where intervals are whole numbers of frames",
+    "where": "Where",
+    "when": "When",
+    "best_candidate": "Nearest candidate",
+    "not_looked_for": "Not looked for",
+    "effort": "--effort that looks for it",
+    "worst_group": "Statistics that are off most",
+    "groups": "Share of what is off, by statistics",
+    "patch": "What the patched model holds",
+}

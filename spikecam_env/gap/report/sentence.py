@@ -1,0 +1,114 @@
+"""What is found, in a sentence for each verdict, and in lines beside it."""
+
+from __future__ import annotations
+
+import math
+
+from spikecam_env.gap.report.quantities import plain_sizes, quantity
+from spikecam_env.gap.report.words import human, listed, parameter_unit
+from spikecam_env.gap.result import CHANCE, Conclusion, Gap
+from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.verdict.notes import gap_is_fitted
+from spikecam_env.sensor import CATALOGUE
+
+
+def sentence(found: Conclusion, model_name: str) -> str:
+    """The verdict in one sentence; in two, where beside effects parameters are off."""
+    said = _SENTENCES[found.verdict](found, model_name)
+    if found.verdict in ("named", "class") and found.parameters:
+        said += f" Parameters of the model {model_name} are off as well: {all_off(found.parameters)}."
+    return said
+
+
+def none_sentence(found: Conclusion, model_name: str) -> str:
+    """Nothing is off."""
+    return f"No gap: these recordings and the model {model_name} agree to within the noise."
+
+
+def named_sentence(found: Conclusion, model_name: str) -> str:
+    """Effects with their sizes."""
+    named = [f"{human(e.name)} ({plain_sizes(e)})" if e.parameters else human(e.name) for e in found.effects]
+    return f"Your camera has {listed(named, 'and')}{removed_phrase(found, 'it' if len(named) == 1 else 'them')}."
+
+
+def class_sentence(found: Conclusion, model_name: str) -> str:
+    """Candidates that are tied, beside effects that are not."""
+    members = [human(str(name)) for name in (found.class_ or {}).get("members", ())]
+    beside = [human(e.name) for e in found.effects if human(e.name) not in members]
+    said = listed([*beside, listed(members, "or")], "and")
+    removed = removed_phrase(found, "them" if beside else "either")
+    return f"Your camera has {said}: these recordings cannot tell which{removed}."
+
+
+def unknown_sentence(found: Conclusion, model_name: str) -> str:
+    """A gap that no candidate closes; where a second effect was not looked for, no single one."""
+    patch = removed_phrase(found, "an empirical patch")
+    about = found.unknown or {}
+    if "not_looked_for" not in about:
+        return f"Your camera does something that no candidate explains{patch}."
+    best = f"; {human(about['best_candidate'])} comes nearest" if about["best_candidate"] else ""
+    return (
+        f"Your camera does something that no single candidate explains{best}{patch}. "
+        f"{about['not_looked_for'].capitalize()} was not looked for: --effort {about['effort']} looks for it."
+    )
+
+
+def parameter_sentence(found: Conclusion, model_name: str) -> str:
+    """Effects of the model that are there in another amount."""
+    return f"No effect is missing, but parameters of the model {model_name} are off: {all_off(found.parameters)}."
+
+
+def data_sentence(found: Conclusion, model_name: str) -> str:
+    """The first contradiction."""
+    said = found.notes[0].rstrip(".") if found.notes else "see the notes"
+    return f"The recordings contradict their own labels: {said}."
+
+
+_SENTENCES = {
+    "none": none_sentence,
+    "named": named_sentence,
+    "class": class_sentence,
+    "unknown": unknown_sentence,
+    "parameter": parameter_sentence,
+    "data": data_sentence,
+}
+
+
+def all_off(parameters: dict[str, dict[str, float]]) -> str:
+    """Strengths as measured, beside those of the model."""
+    rows = [(effect, parameter_unit(effect, CATALOGUE[effect].strength), row) for effect, row in parameters.items()]
+    return listed(
+        [f"{human(e)} is {quantity(row['measured'], u)}, not {quantity(row['nominal'], u)}" for e, u, row in rows],
+        "and",
+    )
+
+
+def removed_phrase(found: Conclusion, what: str) -> str:
+    """How much of the gap goes with what was added; empty where nothing does."""
+    gap = found.gap
+    if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
+        return ""
+    fitted = gap_is_fitted(found.notes)
+    which = "the recordings held out, which told parameters too" if fitted else "recordings that were not used"
+    return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on {which}"
+
+
+def gap_line(gap: Gap) -> str:
+    """What a model's patch did to the gap."""
+    off = f"statistics are {gap.before:.3g} off the model (mean square, in noise)"
+    chance = "1 is chance" if gap.floor == CHANCE else f"chance, by two halves of the measurement, {gap.floor:.3g}"
+    said = f"On the recordings held out, {off}; {chance}."
+    if not math.isfinite(gap.removed) or gap.before <= HARDLY_A_GAP * gap.floor:
+        return said
+    removed = f"{100 * min(gap.removed, 1.0):.0f} % of the gap is removed"
+    return f"{said} With the patched model they are {gap.after:.3g} off: {removed}."
+
+
+HARDLY_A_GAP = 1.2
+"""Times its floor up to which a gap is hardly one, and no share of it is stated to be removed."""
+
+
+def unfinished(effort: Effort) -> list[str]:
+    """A note on what was not begun because enough had been simulated; none where nothing was left out."""
+    left_out = listed([human(what) for what in effort.left_out], "and")
+    return [f"To save time, not looked for: {left_out}. A larger --effort does."] if left_out else []

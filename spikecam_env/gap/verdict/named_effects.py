@@ -1,0 +1,83 @@
+"""Effects as a diagnosis names them: those that a search kept, and those that the refit found missing."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from spikecam_env.gap.baseline.missing_from_refit import Missing
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.result import MOST_CONFIDENCE, Estimate, NamedEffect, Ranked
+from spikecam_env.gap.search.forward import Round
+from spikecam_env.gap.verdict.comparison import Comparison
+from spikecam_env.gap.verdict.gap import gap_of
+
+
+def kept(rounds: Sequence[Round]) -> list[tuple[Fit, Round]]:
+    """The best of each round whose effect is in the last model, with its parameters there, and the round."""
+    last = {e.name: e.parameters() for e in rounds[-1].model.effects} if rounds else {}
+    added = [r for r, after in itertools.pairwise(rounds) if after.model is not r.model]
+    found = [(r.fits[0], r) for r in added if r.fits[0].name in last]
+    return [(replace(f, parameters={k: last[f.name][k] for k in f.parameters}), r) for f, r in found]
+
+
+def named_by_refit(found: Missing) -> NamedEffect:
+    """An effect of the base pixel, as the refit measured it."""
+    effect = found.effect
+    key = type(effect).strength
+    estimate = {key: Estimate(effect.parameters()[key], found.sd)}
+    share = MOST_CONFIDENCE / (1 + len(found.also))
+    rivals = tuple((name, share) for name in found.also)
+    return NamedEffect(effect.name, candidate(effect.name).family, share, estimate, rivals)
+
+
+def named_by_search(comparison: Comparison, found: Fit, turn: Round, place: str, time: str) -> NamedEffect:
+    """A kept candidate with the others of its round, weighted by their likelihoods; place, time: where and when."""
+    weights = [(f.name, relative_likelihood(f.misfit, found.misfit)) for f in turn.fits if f.name != found.name]
+    total = 1.0 + sum(w for _, w in weights)
+    return NamedEffect(
+        found.name,
+        candidate(found.name).family,
+        min(1.0 / total, MOST_CONFIDENCE),
+        estimates(found.parameters, found.sd),
+        tuple((name, w / total) for name, w in weights),
+        where=place,
+        when=time,
+        instead=removed_instead(comparison, turn),
+    )
+
+
+def relative_likelihood(misfit: float, best: float) -> float:
+    """Of a fit against the best one, at most 1: misfits are deviances, twice a log likelihood."""
+    return float(np.exp(-max(misfit - best, 0.0) / 2))
+
+
+def removed_instead(comparison: Comparison, turn: Round) -> dict[str, float]:
+    """Share of the gap that the others of a round would remove alone, of those that were confirmed by several twins."""
+    case, null, values, given = comparison.case, comparison.null, comparison.values, comparison.given
+    confirmed = [f for f in turn.fits[1:] if len(f.prediction.draws) > 1]
+    return {f.name: gap_of(case, null, values, given, f.prediction).removed for f in confirmed}
+
+
+def ranking(rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]]) -> tuple[Ranked, ...]:
+    """Every fit of every round.  found: those that were kept, with their rounds."""
+    return tuple(
+        ranked(f, r.misfit, f is r.fits[0] and any(r is turn for _, turn in found)) for r in rounds for f in r.fits
+    )
+
+
+def ranked(found: Fit, before: float, accepted: bool) -> Ranked:
+    """A row of the ranking; the misfit of what was added is beside all that was found, in their noise."""
+    worst = float(np.abs(found.rho).max())
+    reason = f"leaves {worst:.1f} noises at worst" if accepted or found.misfit < before else "explains nothing"
+    own = estimates(found.parameters, found.sd)
+    return Ranked(found.name, candidate(found.name).family, before, found.misfit, own, accepted, reason)
+
+
+def estimates(parameters: Mapping[str, float], sd: Mapping[str, float]) -> dict[str, Estimate]:
+    """Parameters with their standard deviations, NaN where none is known."""
+    return {k: Estimate(v, sd.get(k, np.nan)) for k, v in parameters.items()}

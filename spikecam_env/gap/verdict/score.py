@@ -1,0 +1,256 @@
+"""The score of an effect: a number of a campaign that it makes larger, and what campaigns with the effect score.
+
+A score, linear in the statistics, is taken along what the effect changes where it is strong.  Campaigns with the effect
+at a weaker strength say how large the score then is, and how widely it scatters.
+
+Of what is counted (false spikes, hot pixels) a strength that lets expect RULE_OF_THREE of them or fewer is never
+refuted: one campaign in twenty has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from spikecam_env.gap.candidates.strength import with_effect
+from spikecam_env.gap.candidates.table import candidate, expected_events
+from spikecam_env.gap.compare.prediction import Null, Prediction, of_a_pair, pooled
+from spikecam_env.gap.compare.step import is_clear
+from spikecam_env.gap.fit.candidate import WANDER, concerned, predict, twins_of, with_pattern
+from spikecam_env.gap.fit.gauss_newton import settled_there
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.fresh_units import UNITS
+from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
+from spikecam_env.sensor import CATALOGUE, SensorModel
+
+Array = NDArray[np.float64]
+Parameters = dict[str, float]
+
+CONFIDENCE = 0.95
+"""Share of campaigns with an effect of the stated strength that score higher than the measurement."""
+
+RULE_OF_THREE = -float(np.log(1.0 - CONFIDENCE))
+"""Events expected, 3.0, of which there are none by chance of 1 - CONFIDENCE."""
+
+MOST_DEVIATE = 5.0
+"""Noises at which a statistic counts as no farther off: one false spike in a quiet pixel is a hundred noises."""
+
+TWINS_A_TEST = 4
+"""Campaigns by which a strength is tested."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """One number of a campaign that an effect makes larger.
+
+    of: (S,) statistics -> score.  without: (n,) of campaigns without the effect.  error: of the score, by what labels
+    and laws are not known to.  rise: how much more it is at `parameters`, where the unit `bare` settled as `unit`.
+    """
+
+    of: Callable[[Array], float]
+    without: Array
+    error: float
+    parameters: Parameters
+    rise: float
+    bare: BaseFit | None = None
+    unit: BaseFit | None = None
+
+    @property
+    def mean(self) -> float:
+        """Mean score without the effect."""
+        return float(np.mean(self.without))
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of a campaign's score without the effect, beside that mean."""
+        n = len(self.without)
+        return float(np.sqrt(np.var(self.without, ddof=1) * (1 + 1 / n) + self.error**2))
+
+    @property
+    def effect_size(self) -> float:
+        """Noises by which the effect shows at `parameters`."""
+        return self.rise / self.sd
+
+
+@dataclass(frozen=True)
+class StrengthTest:
+    """A strength that was simulated.  excess: mean score of its campaigns, beyond that without the effect; sd: of the
+    distance of a campaign from that mean; quantile: of that distance, CONFIDENCE of campaigns are nearer or above.
+
+    events: expected of what can be counted, infinite elsewhere.
+    """
+
+    excess: float
+    sd: float
+    quantile: float
+    events: float
+
+    def refuted_by(self, excess: float) -> bool:
+        """Whether a campaign that scores so much scores too little for it."""
+        return self.events > RULE_OF_THREE and excess < self.excess - self.quantile * self.sd
+
+
+class EffectProbe:
+    """A candidate on the campaign at hand."""
+
+    def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
+        self.case, self.model, self.null, self.name = case, model, null, name
+
+    def events(self, parameters: Parameters) -> float:
+        """Expected of what can be counted; infinite elsewhere."""
+        return expected_events(self.name, parameters, self.case.conditions, self.case.observations)
+
+    @staticmethod
+    def score_variance(score: Score, scores: Array, excess: float, events: float) -> float:
+        """Of the score of a campaign with the effect, `excess` on average: what few campaigns show, and at least what
+        there is without it and what so few events make."""
+        by_chance = excess**2 / events
+        return max(float(np.var(scores, ddof=1)), float(np.var(score.without, ddof=1)) + by_chance)
+
+
+class TwinProbe(EffectProbe):
+    """Scores of twins of the campaign.  The last draws, with the effect where it is strong, select statistics;
+    the first, how they change where it is weak."""
+
+    def __init__(self, case: Case, model: SensorModel, null: Null, measured: Array, name: str):
+        super().__init__(case, model, null, name)
+        self.only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
+        used = {case.conditions[i].name for i in self.only}
+        self.usable = np.array([k.group != "pattern" and k.recording in used for k in null.keys])
+        self.random_course = candidate(name).wanders
+
+    def score(self, parameters: Parameters, count: int = 1) -> Score | None:
+        """The score by the statistics that the effect clearly changes at some strength; None where it changes none."""
+        count = min(WANDER if self.random_course else count, len(self.null.draws) // 2)
+        strong = with_effect(self.model, self.name, parameters)
+        bare = constrained_refit(strong, constrained_refit(self.model, self.case.base))
+
+        def probe(model: SensorModel, unit: BaseFit) -> Prediction:
+            return predict(self.case, model, unit, self.null, count, self.only)
+
+        made, unit = settled_there(probe, self.null, strong, bare, [])
+        found = (self._scatter_score if self.random_course else self._change_score)(made, parameters)
+        return replace(found, bare=bare, unit=unit) if found else None
+
+    def refined(self, score: Score) -> Score:
+        """The score of single events by more campaigns: of few, which statistics they change is chance."""
+        if not candidate(self.name).share:
+            return score
+        return self.score(score.parameters, twins_of(self.name)) or score
+
+    def _change_score(self, made: Prediction, parameters: Parameters) -> Score | None:
+        null, count = self.null, len(made.draws)
+        change = np.where(self.usable, np.nan_to_num(made.mean - null.mean), 0.0)
+        own2 = (of_a_pair(null.keys) * null.noise) ** 2 / count
+        change = np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0)
+        without = {d.number: d.values for d in null.draws}
+        each = np.nan_to_num([d.values - without[d.number] for d in made.draws])
+        scatter = each.std(axis=0, ddof=1) if count > 1 else 0.0
+        return linear(null, change, [d.values for d in null.draws[:-count]], parameters, scatter)
+
+    def _scatter_score(self, made: Prediction, parameters: Parameters) -> Score | None:
+        null = self.null
+        z2 = np.mean([np.nan_to_num((d.values - null.mean) / null.noise) ** 2 for d in made.draws], axis=0)
+        moves = np.where(self.usable, np.maximum(pooled(null.keys, z2) - 2.0, 0.0), 0.0)
+        if not moves.any():
+            return None
+        weight = moves / (1.0 + moves)
+        of = partial(log_mean_square, null, weight / weight.sum())
+        without = np.array([of(d.values) for d in null.draws[: -len(made.draws)]])
+        rise = float(np.mean([of(d.values) for d in made.draws]) - without.mean())
+        return Score(of, without, 0.0, parameters, rise)
+
+    def test(self, score: Score, parameters: Parameters) -> StrengthTest:
+        """What campaigns with the effect at a strength score."""
+        assert score.bare is not None and score.unit is not None
+        key, events = strength_of(self.name), self.events(parameters)
+        times = abs(parameters[key] / score.parameters[key]) ** power_of(self.name)
+        count = min(WANDER if self.random_course else TWINS_A_TEST, len(score.without))
+        null = replace(self.null, draws=self.null.draws[:count])
+        unit = extrapolated_unit(score.bare, score.unit, min(times, 1.0))
+        made = predict(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
+        scores, without = (np.array([score.of(d.values) for d in draws]) for draws in (made.draws, null.draws))
+        if self.random_course:
+            sd = float(scores.std(ddof=1)) * np.sqrt(1 + 1 / count)
+            return StrengthTest(
+                float(scores.mean()) - score.mean, sd, float(stats.t.ppf(CONFIDENCE, count - 1)), events
+            )
+        change, n = scores - without, len(score.without)
+        excess = float(change.mean())
+        own2 = self.score_variance(score, scores, excess, events)
+        sd = float(np.sqrt(own2 * (1 + 1 / n) + np.var(change, ddof=1) / count + score.error**2))
+        return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, n - 1)), events)
+
+
+class UnitProbe(EffectProbe):
+    """Scores of drawn units, which differ by the model's pattern and by the effect's."""
+
+    def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
+        super().__init__(case, model, null, name)
+        self.without = self._units(model)
+
+    def score(self, parameters: Parameters) -> Score | None:
+        """The score by the statistics of the pattern that the effect changes; None where it changes none."""
+        units = self._units(with_effect(self.model, self.name, parameters))
+        change = np.nan_to_num((units - self.without).mean(axis=0))
+        return linear(self.null, change, self.without, parameters)
+
+    def refined(self, score: Score) -> Score:
+        """The same: units are many."""
+        return score
+
+    def test(self, score: Score, parameters: Parameters) -> StrengthTest:
+        """What units with the effect at a strength score."""
+        units, events = self._units(with_effect(self.model, self.name, parameters)), self.events(parameters)
+        scores = np.array([score.of(v) for v in units])
+        excess = float(scores.mean()) - score.mean
+        sd = float(np.sqrt(self.score_variance(score, scores, excess, events) * (1 + 1 / UNITS) + score.error**2))
+        return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, UNITS - 1)), events)
+
+    def _units(self, model: SensorModel) -> Array:
+        units = with_pattern(self.case, model, self.null, self.null.prediction).units
+        assert units is not None
+        return units
+
+
+def linear(
+    null: Null, change: Array, without: Sequence[Array] | Array, parameters: Parameters, scatter: Array | float = 0.0
+) -> Score | None:
+    """The score along what an effect changes (S,) at some strength; None where it changes nothing.
+
+    scatter: (S,) by which that differs from campaign to campaign: what few events change by much is known poorly.
+    """
+    deviates = np.clip(change / null.noise, -MOST_DEVIATE, MOST_DEVIATE)
+    weight = null.weight * deviates / (1.0 + np.minimum(scatter / null.noise, MOST_DEVIATE) ** 2)
+    if not weight.any():
+        return None
+    of = partial(linear_score, null, weight)
+    error = float(np.sqrt(np.sum((weight * null.floor / null.noise) ** 2)))
+    return Score(of, np.array([of(v) for v in without]), error, parameters, float(weight @ deviates))
+
+
+def linear_score(null: Null, weight: Array, values: Array) -> float:
+    """Score of statistics (S,) along a change; what is unknown counts for nothing."""
+    return float(weight @ np.clip(np.nan_to_num((values - null.mean) / null.noise), -MOST_DEVIATE, MOST_DEVIATE))
+
+
+def log_mean_square(null: Null, weight: Array, values: Array) -> float:
+    """Score of statistics (S,) that an effect scatters, each way equally: the logarithm of their mean square."""
+    square = float(weight @ np.nan_to_num((values - null.mean) / null.noise) ** 2)
+    return float(np.log(max(square, 1e-12)))
+
+
+def strength_of(name: str) -> str:
+    """The parameter that is an effect's strength."""
+    return CATALOGUE[name].strength
+
+
+def power_of(name: str) -> float:
+    """The power of a strength that statistics go with."""
+    return candidate(name).power

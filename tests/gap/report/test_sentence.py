@@ -1,0 +1,72 @@
+"""What is found, in a sentence."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields, replace
+
+import made_up
+import pytest
+
+from spikecam_env.gap.report.sentence import gap_line, sentence
+from spikecam_env.gap.result import Conclusion, Diagnosis, Gap
+from spikecam_env.gap.verdict.notes import Note
+
+
+def sentence_of(d: Diagnosis) -> str:
+    """The sentence of what a diagnosis holds."""
+    held = vars(d) | {"notes": d.data}
+    return sentence(Conclusion(**{f.name: held[f.name] for f in fields(Conclusion)}), d.model_name)
+
+
+@pytest.mark.parametrize(
+    "verdict, said",
+    [
+        ("none", "No gap: these recordings and the model scsim agree to within the noise."),
+        ("named", "Your camera has photodiode lag (fraction 6.12 %, tau 1.22 ms); adding it removes 97 % of the gap on "
+         "recordings that were not used."),
+        ("class", "Your camera has photo response nonlinearity or IR drop: these recordings cannot tell which; adding "
+         "either removes 97 % of the gap on recordings that were not used."),
+        ("unknown", "Your camera does something that no candidate explains; adding an empirical patch removes 79 % of "
+         "the gap on recordings that were not used."),
+        ("parameter", "No effect is missing, but parameters of the model scsim are off: shot noise is 3.1e+04 "
+         "electrons, not 5e+04 electrons."),
+        ("data", "The recordings contradict their own labels: flat-300: rates are 2.1 % (31 sd) above the line through "
+         "the other flats; its label fits 0.3063."),
+    ],
+)  # fmt: skip
+def test_a_sentence_says_the_verdict(verdict: str, said: str) -> None:
+    assert sentence_of(made_up.EVERY[verdict]()) == said
+
+
+def test_a_gap_on_recordings_that_told_parameters_is_not_called_a_check() -> None:
+    fitted = replace(made_up.named(), data=(Note.PARAMETERS_FROM_HELD_OUT,))
+    assert sentence_of(fitted).endswith(
+        "removes 97 % of the gap on the recordings held out, which told parameters too."
+    )
+
+
+def test_what_a_note_is_decides_and_not_what_it_says() -> None:
+    """The same words as plain text are no note of that kind; other kinds of notes change nothing."""
+    prose = replace(made_up.named(), data=(Note.PARAMETERS_FROM_HELD_OUT.value, "The gain is 0.001 of nominal"))
+    assert sentence_of(prose) == sentence_of(made_up.named())
+    assert json.dumps([*Note]) == json.dumps([note.value for note in Note])
+
+
+def test_parameters_that_are_off_beside_an_effect_are_said() -> None:
+    off = {"reset_noise": {"measured": 19.9, "nominal": 0.976, "ratio": 20.4}}
+    said = sentence_of(replace(made_up.named(), parameters=off))
+    assert said.endswith(
+        "not used. Parameters of the model scsim are off as well: reset noise is 19.9 mV, not 0.976 mV."
+    )
+
+
+def test_two_effects_are_named_together() -> None:
+    d = made_up.named()
+    both = replace(d, effects=(*d.effects, *made_up.named("dead_time").effects))
+    assert "1.22 ms) and dead time (tau 1.02 us); adding them removes" in sentence_of(both)
+
+
+@pytest.mark.parametrize("before, stated", [(1.1, False), (1.3, True)])
+def test_a_removed_share_is_said_where_there_is_a_gap(before: float, stated: bool) -> None:
+    assert ("is removed" in gap_line(Gap(before, 1.0, 1.0, 1.0, {}))) == stated

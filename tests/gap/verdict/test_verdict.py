@@ -1,0 +1,95 @@
+"""The verdict of made-up comparisons: limits of what may be chance, and of what may be left."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from spikecam_env.gap.baseline.off_nominal import OffNominal
+from spikecam_env.gap.compare.distance import HEAVY, misfit
+from spikecam_env.gap.compare.prediction import Null, Prediction
+from spikecam_env.gap.result import Gap
+from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
+from spikecam_env.gap.verdict.notes import Note, gap_is_fitted, notes_of
+from spikecam_env.gap.verdict.verdict import explains, may_be_chance, verdict_of
+
+COUNT = 100
+NULL = Null(
+    tuple(Key("rates", "flat", f"{n}") for n in range(COUNT)), np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT), 10**6,
+    10**6,
+)  # fmt: skip
+EXACT = Prediction(np.zeros(COUNT), np.zeros(COUNT), np.ones(COUNT))
+
+
+def comparison(**others) -> Comparison:
+    """Of nothing that disagrees."""
+    case = SimpleNamespace(effort=SimpleNamespace(left_out=[]))
+    plain = Comparison(case, None, None, NULL, np.zeros(COUNT), np.zeros(COUNT), (), OffNominal({}, None), ())
+    return replace(plain, **others)
+
+
+def off_by_p(p: float) -> np.ndarray:
+    """(S,) of which one is off by an adjusted p-value."""
+    from scipy import stats
+
+    return np.where(np.arange(COUNT) == 0, stats.norm.isf(p / COUNT / 2), 0.0)
+
+
+@pytest.mark.parametrize("p, chance", [(0.003, True), (0.0015, False)])
+def test_a_weak_alarm_without_a_name_may_be_chance(p: float, chance: bool) -> None:
+    made = comparison(values=off_by_p(p))
+    print(f"{made.smallest_p:.5f}")
+    assert made.smallest_p == pytest.approx(p, rel=0.02)
+    assert may_be_chance(made, []) == chance and not may_be_chance(made, [("fit", "round")])
+
+
+@pytest.mark.parametrize("share, explained", [(0.015, True), (0.03, False)])
+def test_a_name_leaves_a_fiftieth_of_the_deviance_at_most(share: float, explained: bool) -> None:
+    """Sixty statistics are 100 noises off before; one is left at 6, no chance, and the others share the rest evenly."""
+    before = np.where(np.arange(COUNT) < 60, 100.0, 0.0)
+    one = misfit(np.array([6.0]))
+    each = (COUNT + share * (misfit(before) - COUNT) - one) / 59
+    left = np.where(before > 0, np.sqrt(HEAVY * np.expm1(each / (HEAVY + 1.0))), 0.0)
+    left[0] = 6.0
+    print(f"{(misfit(left) - COUNT) / (misfit(before) - COUNT):.4f} left, {left[1]:.1f} noises each")
+    assert explains(NULL, before, left, EXACT) == explained
+
+
+@pytest.mark.parametrize("largest, explained", [(8.0, True), (13.0, False)])
+def test_a_name_leaves_a_tenth_of_the_largest_deviate_at_most(largest: float, explained: bool) -> None:
+    before = np.where(np.arange(COUNT) < 60, 100.0, 0.0)
+    assert explains(NULL, before, np.where(np.arange(COUNT) == 0, largest, 0.0), EXACT) == explained
+
+
+def test_contradictions_come_first_then_what_is_left_then_ties_then_names() -> None:
+    found = [("fit", SimpleNamespace(rivals=()))]
+    tied = [("fit", SimpleNamespace(rivals=("other",)))]
+    rounds = ["a round"]
+    assert verdict_of(comparison(contradictions=("label",)), rounds, found, True) == "data"
+    assert verdict_of(comparison(), rounds, found, False) == "unknown"
+    assert verdict_of(comparison(), rounds, tied, True) == "class"
+    assert verdict_of(comparison(missing=("dark",)), rounds, tied, True) == "named"
+    assert verdict_of(comparison(), rounds, found, True) == "named"
+    assert verdict_of(comparison(), [], [], True) == ""
+    left_out = SimpleNamespace(effort=SimpleNamespace(left_out=["a second effect"]))
+    assert verdict_of(comparison(case=left_out), rounds, found, True) == "unknown"
+
+
+def test_a_share_of_a_gap_is_stated_where_there_is_one() -> None:
+    assert Gap.of(1.4, 1.0, {}).removed == 0.0 and Gap.of(1.6, 1.0, {}).removed == pytest.approx(1.0)
+    assert Gap.of(0.8, 0.5, {}, floor=0.5).removed == pytest.approx(1.0)
+
+
+def test_notes_are_by_kind() -> None:
+    plain, lent, alone = (SimpleNamespace(lent=x, alone=y) for x, y in ((False, False), (True, False), (False, True)))
+    assert notes_of([plain]) == [] and notes_of([lent, alone]) == [*Note]
+    assert gap_is_fitted([*Note]) and not gap_is_fitted([note.value for note in Note])
+
+
+def test_means_are_aligned_by_statistic() -> None:
+    other = replace(NULL, keys=NULL.keys[::2], mean=np.ones(COUNT // 2))
+    assert aligned_mean(other, NULL).tolist() == [1.0, 0.0] * (COUNT // 2)
