@@ -27,8 +27,9 @@ from spikecam_env.gap.baseline.label_audit import Contradiction, audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing, with_all
 from spikecam_env.gap.baseline.null_model import model_null, unit_under
 from spikecam_env.gap.baseline.off_nominal import Off, off_nominal
-from spikecam_env.gap.candidates.table import chosen, is_pattern, testable
+from spikecam_env.gap.candidates.table import candidate, chosen, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.fit.problem import Problem, values_to_fit
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import KNOWN, Shown, observed, shown
 from spikecam_env.gap.report.evidence import evidence_of
@@ -36,8 +37,9 @@ from spikecam_env.gap.report.words import sentence, unfinished
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.gap.screen.own_templates import own_templates
 from spikecam_env.gap.screen.templates import Templates, load
-from spikecam_env.gap.search.forward import Round, of_fit, search
-from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
+from spikecam_env.gap.search.forward import search
+from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import counted_anew, nominal_per_label, said_of
@@ -97,7 +99,7 @@ def diagnose(
     with timed("audit"):
         contradictions = upheld(case, assumed, audit(case))
         case = trimmed(case, contradictions)
-        case = replace(case, effort=Effort(effort * len(case.conditions), settled=bool(contradictions)))
+        case = replace(case, budget=Budget(effort * len(case.conditions), settled=bool(contradictions)))
     names, untestable = testable(names, case.conditions)
     lacking = missing(case, assumed, names)
     start = with_all(assumed, lacking)
@@ -108,11 +110,12 @@ def diagnose(
         before = model_null(replace(case, base=off.nominal), assumed, 2) if as_given else null
     values = values_of(case.bank, null.keys)
     rounds: list[Round] = []
-    if rings(null, of_fit(case, null, values)) or rings(null, values):
+    if rings(null, values_to_fit(case, null, values)) or rings(null, values):
         with timed("candidates"):
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
-            rounds = harmless(case, null, values, search(case, start, null, values, names, templates or load()))
+            problem = Problem.of(case, start, null, values)
+            rounds = harmless(case, null, values, search(problem, names, templates or load()))
     if rounds and not lacking:
         off = replace(
             off, parameters=off_nominal(case, patterned(assumed, rounds[-1].model), rounds[-1].base).parameters
@@ -137,8 +140,8 @@ def diagnose(
         gap=grounded(found.gap, floor_of_halves(case, measured.recordings, null)) if found.gap else None,
         campaign=str(measured.folder),
         evidence=evidence,
-        data=(*found.data, *notes, *unfinished(case.effort)),
-        simulated=case.effort.simulated,
+        data=(*found.data, *notes, *unfinished(case.budget)),
+        simulated=case.budget.simulated,
         **asked,  # type: ignore[arg-type]
     )
     return replace(found, sentence=sentence(found))
@@ -188,7 +191,7 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
 
 def patterned(model: SensorModel, found: SensorModel) -> SensorModel:
     """The model with those effects of another that make pixels differ: what they explain, its own spreads do not."""
-    return reduce(SensorModel.with_effect, (e for e in found.effects if is_pattern(e.name)), model)
+    return reduce(SensorModel.with_effect, (e for e in found.effects if candidate(e.name).is_pattern), model)
 
 
 def in_order(other: Null, null: Null) -> Array:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.gap.twins.case import Case, rests_on, twins
+from spikecam_env.gap.twins.case import Case, refit_recordings, twins
 from spikecam_env.gap.twins.fresh_units import width
 from spikecam_env.gap.unit.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common, within
 from spikecam_env.robust import scatter
@@ -84,7 +84,7 @@ def with_all(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
 def is_noise(case: Case, model: SensorModel) -> bool:
     """Whether the refit's s^2 is more than refits of twins of a model without noise find: of alike pixels 3e-7, at some
     lights."""
-    made = twins(case, model, within(model, case.base), range(QUIET), sorted(rests_on(case)))
+    made = twins(case, model, within(model, case.base), range(QUIET), sorted(refit_recordings(case)))
     shown = np.array([t.base.white for t in made if t.base is not None])
     return bool(case.base.white > shown.mean() + CLEAR * shown.std(ddof=1))
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.campaign.reading import Campaign
-from spikecam_env.gap.candidates.table import candidate, chosen, is_pattern
-from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, residual
+from spikecam_env.gap.candidates.table import candidate, chosen
+from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual
 from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.maps.bank import Maps, bank, dark_of, of_use, read_maps, unit_levels, unit_maps
 from spikecam_env.gap.maps.search import SHARES, SPREADS, UNITS, State, Tried, free_of, search, within
@@ -39,7 +39,7 @@ def diagnose_maps(
     """Find what fixed pattern a model lacks, from rates alone.  Arguments as `diagnose.diagnose`."""
     case = read_maps(campaign, seed, jobs)
     names = chosen(model, candidates, exclude)
-    tested = [n for n in names if is_pattern(n) and _visible(n, case)]
+    tested = [n for n in names if candidate(n).is_pattern and _visible(n, case)]
     values_by_key = case.bank
     given = within(State(model, {}), case, values_by_key)
     banks = [bank(unit_maps(given.fitted, case, n)) for n in range(UNITS)]
@@ -68,7 +68,7 @@ def concluded(
     predicted = last.predicted if last else null.mean
     square = [float(np.mean(((values - mean) / null.noise) ** 2)) for mean in (null.mean, predicted)]
     left = (square[1] - 1.0) / max(square[0] - 1.0, 1e-9)
-    significant = alarmed(null, rho)
+    significant = is_significant(null, rho)
     explained = not rounds or not significant or left < UNEXPLAINED
     parameters = off_usual(case, last.state) if last else {}
     effects = tuple(
@@ -106,7 +106,7 @@ def concluded(
 
 
 def _lack(name: str) -> str:
-    if not is_pattern(name):
+    if not candidate(name).is_pattern:
         return "spikes: rates say nothing of when they come"
     return "a dark map" if candidate(name).family == "dark" else "a map of a flat"
 

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import HEAVY, alarmed, misfit, residual
+from spikecam_env.gap.compare.distance import HEAVY, is_significant, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.maps.bank import Maps, bank, of_use, unit_maps
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.twins.fresh_units import SPREADS as OF_A_UNIT
-from spikecam_env.gap.twins.fresh_units import WITHIN
+from spikecam_env.gap.twins.fresh_units import SPREAD_LIMITS
+from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS as OF_A_UNIT
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
@@ -104,7 +104,7 @@ def within(state: State, case: Maps, measured: dict[Key, float]) -> State:
             ]
             off = [measured[k] - simulated[k] for k in keys if k in measured and k in simulated]
             if off and any(e.name in SPREADS[what] for e in state.model.effects):
-                factors[what] = float(np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *WITHIN))
+                factors[what] = float(np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *SPREAD_LIMITS))
         state = replace(state, factors=factors)
     return state
 
@@ -118,7 +118,7 @@ def search(
     left = list(names)
     while left and len(rounds) <= MOST:
         now = rounds[-1][0]
-        if not alarmed(null, now.rho):
+        if not is_significant(null, now.rho):
             break
         with ThreadPoolExecutor(case.jobs) as pool:
             tried = list(pool.map(lambda n, start=now.state: fitted(case, start, null, values, n), left))
@@ -143,7 +143,7 @@ def fitted(case: Maps, start: State, null: Null, values: Array, name: str) -> Tr
     damping, best, least = 0.02, state, np.inf
     for _ in range(STEPS):
         at = predict(state, case, null.keys, [0])
-        now = misfit(residual(null, values, predicted_by(null, at, 1))[use])
+        now = robust_squares(residual(null, values, predicted_by(null, at, 1))[use])
         if now > least:
             damping *= 8.0
         else:
@@ -163,7 +163,7 @@ def fitted(case: Maps, start: State, null: Null, values: Array, name: str) -> Tr
             break
     predicted = predict(best, case, null.keys, range(UNITS))
     rho = residual(null, values, predicted_by(null, predicted, UNITS))
-    return Tried(name, best, sd, predicted, rho, misfit(rho[use]))
+    return Tried(name, best, sd, predicted, rho, robust_squares(rho[use]))
 
 
 def free_of(name: str) -> tuple[str, ...]:

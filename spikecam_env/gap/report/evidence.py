@@ -23,7 +23,7 @@ from spikecam_env.gap.observe.conditions import Shown
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.twins.fresh_units import drawn
+from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, measured_base
 from spikecam_env.sensor import SensorModel
@@ -106,8 +106,8 @@ def evidence_of(
         before_base=measured_base(list(first), list(case.conditions)),
         after_base=measured_base(list(last), list(case.conditions)) if last else None,
         again=again,
-        drawn_before=None if case.scenes_only else drawn(before, case.base, case.shape, case.seed),
-        drawn_after=drawn(after, case.base, case.shape, case.seed) if after and not case.scenes_only else None,
+        drawn_before=None if case.scenes_only else drawn_response(before, case.base, case.shape, case.seed),
+        drawn_after=drawn_response(after, case.base, case.shape, case.seed) if after and not case.scenes_only else None,
     )
 
 

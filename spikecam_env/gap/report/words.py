@@ -8,7 +8,7 @@ import math
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Gap, NamedEffect
-from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import HELD_OUT_ALONE, LENT
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.effect_sheet import Sheet
@@ -89,7 +89,7 @@ def law(effect: str) -> str:
     return inspect.cleandoc(found.law) if found else ""
 
 
-def unfinished(effort: Effort) -> list[str]:
+def unfinished(effort: Budget) -> list[str]:
     """A note on what was not begun because enough had been simulated; none where nothing was left out."""
     left_out = _joined([human(what) for what in effort.left_out], "and")
     return [f"To save time, not looked for: {left_out}. A larger --effort does."] if left_out else []

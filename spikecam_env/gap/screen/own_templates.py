@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from spikecam_env.gap.baseline.null_model import unit_under
-from spikecam_env.gap.candidates.table import is_pattern
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.screen.templates import Templates, simulated, starts
 from spikecam_env.gap.twins.case import Case
@@ -20,7 +20,7 @@ from spikecam_env.sensor import SensorModel
 def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[str]) -> Templates:
     """Templates of the candidates in `names` on this very campaign, whose model predicts `null`."""
     unit = replace(case, base=unit_under(case, model))
-    todo = [(n, p) for n in names if not is_pattern(n) for p in starts(n)]
+    todo = [(n, p) for n in names if not candidate(n).is_pattern for p in starts(n)]
     with ThreadPoolExecutor(case.jobs) as pool:
         entries = tuple(pool.map(lambda what: simulated(unit, model, null, *what), todo))
     return Templates(

@@ -25,10 +25,10 @@ from tqdm import tqdm
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.campaign.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
-from spikecam_env.gap.candidates.table import CANDIDATES, NOISE_OF_A_RESET, candidate, is_pattern
+from spikecam_env.gap.candidates.table import CANDIDATES, NOISE_OF_A_RESET, candidate
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.fit.candidate import predict, with_pattern
-from spikecam_env.gap.fit.gauss_newton import settled_there
+from spikecam_env.gap.fit.gauss_newton import at_settled_unit
+from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, case_of, twins
 from spikecam_env.gap.twins.simulate import simulate
@@ -208,7 +208,7 @@ def severe(
 ) -> Template:
     """A candidate's template where the unit's own refit is led astray: its campaign as if it were a measurement."""
     there = with_effect(model, name, parameters)
-    if is_pattern(name):
+    if candidate(name).is_pattern:
         return Template(name, dict(parameters), _shift(case, model, null, name, parameters), times)
     seed = case.seed * 1000 + 7
     made = simulate(there, within(there, case.base), case.conditions, case.shape, seed)
@@ -231,10 +231,11 @@ def _shift(
     """(S,) change of the statistics, in noise, that a candidate makes: by units drawn, or by a twin whose unit has
     settled, since a refit takes up what bends rates, and saturation would show a unit too bright by as much."""
     there = with_effect(model, name, parameters)
-    if is_pattern(name):
-        made = with_pattern(case, there, null, null.prediction)
+    if candidate(name).is_pattern:
+        made = with_drawn_pattern(case, there, null, null.prediction)
     else:
-        made, _ = settled_there(partial(predict, case, null=null, count=1), null, there, within(there, case.base), [])
+        probe = partial(predict_by_twins, case, null=null, count=1)
+        made, _ = at_settled_unit(probe, null, there, within(there, case.base), [])
     return np.nan_to_num((made.mean - null.mean) / null.noise)
 
 

@@ -17,7 +17,7 @@ from spikecam_env.streams import pack_frames
 
 _BLOCK = 1024
 
-FIRST = 17
+FIRST_SEED = 17
 """Seed of a campaign's first twin; the others' follow."""
 
 
@@ -35,7 +35,7 @@ def simulate(
     """
     unit = unit_of(model, base, shape)
     return [
-        observe(expose(model, as_known(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
+        observe(expose(model, with_label_error(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
         for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
     ]
 
@@ -44,7 +44,9 @@ def expose(
     model: SensorModel, unit: Unit, condition: Shown, shape: tuple[int, int], seed: int, take: int
 ) -> NDArray[np.uint8]:
     """(F, P/8) bits of one recording in known light."""
-    sensor = SpikeSensor(at_any_phase(model, seed, take), shape, seed, engine="auto", take=take, unit=unit, threads=1)
+    sensor = SpikeSensor(
+        with_random_phases(model, seed, take), shape, seed, engine="auto", take=take, unit=unit, threads=1
+    )
     light = condition.light
     assert light is not None
     picture: Keyframes | NDArray[np.float32] = light.radiance[0] if not condition.moves else light
@@ -56,7 +58,7 @@ def expose(
     return np.concatenate(parts)
 
 
-def as_known(unit: Unit, seed: int, take: int) -> Unit:
+def with_label_error(unit: Unit, seed: int, take: int) -> Unit:
     """A unit of pixels that are all alike, in light and with a dark level no surer than they are known, drawn for one
     recording: light to LABELS, dark to half a grain.
 
@@ -71,14 +73,14 @@ def as_known(unit: Unit, seed: int, take: int) -> Unit:
     return replace(unit, gain=unit.gain * (1.0 + LABELS * rng.standard_normal()), dark=unit.dark + grains / GRAINS)
 
 
-def at_any_phase(model: SensorModel, seed: int, take: int) -> SensorModel:
+def with_random_phases(model: SensorModel, seed: int, take: int) -> SensorModel:
     """The model with its waves at phases drawn for one recording: nobody starts a recording by the mains.
 
     Those of successive seeds are spread over the wave, two on opposite sides and four at right angles: of so few that
     were drawn at random, all may be alike, and their scatter nothing.
     """
     rng = np.random.default_rng(take)
-    spread = int(f"{max(seed - FIRST, 0):064b}"[::-1], 2) / 2**64  # van der Corput's sequence
+    spread = int(f"{max(seed - FIRST_SEED, 0):064b}"[::-1], 2) / 2**64  # van der Corput's sequence
     for effect in model.effects:
         if "phase_cycles" in effect.parameters():
             phase = (float(rng.random()) + spread) % 1.0

@@ -19,16 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from spikecam_env.gap.candidates.strength import bounded, may_be_negative, with_effect
-from spikecam_env.gap.candidates.table import candidate, expected_events, is_pattern
-from spikecam_env.gap.compare.prediction import Null, Prediction, of_a_pair, pooled
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import candidate, expected_events
+from spikecam_env.gap.compare.prediction import Null, Prediction, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import is_clear
-from spikecam_env.gap.fit.candidate import WANDER, concerned, predict, twins_of, with_pattern
-from spikecam_env.gap.fit.gauss_newton import settled_there
+from spikecam_env.gap.fit.gauss_newton import at_settled_unit
+from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
+from spikecam_env.gap.fit.recordings import TWINS_OF_RANDOM_COURSE, recordings_affected, twins_of
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.twins.fresh_units import UNITS
+from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS
 from spikecam_env.gap.unit.indirect_inference import shifted
 from spikecam_env.gap.unit.refit import BaseFit, within
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -128,12 +129,12 @@ def bounds(
     """
     starts = [(e.name, p) for e in templates.weakest if e.name in names for p in _both_signs(e.name, e.parameters)]
     by_name = dict.fromkeys(name for name, _ in starts)
-    if not case.effort.allows("upper bounds", COST * len(case.conditions)):
+    if not case.budget.allows("upper bounds", COST * len(case.conditions)):
         return [], [(name, MORE_EFFORT) for name in by_name]
 
     def look(start: tuple[str, Parameters]) -> Look:
         name, parameters = start
-        return looked_at(_OfUnits(case, model, null, name) if is_pattern(name) else
+        return looked_at(_OfUnits(case, model, null, name) if candidate(name).is_pattern else
                          _OfTwins(case, model, null, measured, name), measured, parameters)  # fmt: skip
 
     with ThreadPoolExecutor(case.jobs) as pool:
@@ -146,7 +147,7 @@ def bounds(
 
 def _both_signs(name: str, parameters: Parameters) -> list[Parameters]:
     key = _key(name)
-    return [parameters, {**parameters, key: -parameters[key]}] if may_be_negative(name) else [parameters]
+    return [parameters, {**parameters, key: -parameters[key]}] if candidate(name).may_be_negative else [parameters]
 
 
 @dataclass(frozen=True)
@@ -266,21 +267,21 @@ class _OfTwins(_Probe):
 
     def __init__(self, case: Case, model: SensorModel, null: Null, measured: Array, name: str):
         super().__init__(case, model, null, name)
-        self.only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
+        self.only = recordings_affected(case, [name], null, measured, np.full(len(null.keys), np.inf))
         used = {case.conditions[i].name for i in self.only}
         self.there = np.array([k.group != "pattern" and k.recording in used for k in null.keys])
-        self.wanders = candidate(name).wanders
+        self.wanders = candidate(name).random_course
 
     def score(self, parameters: Parameters, count: int = 1) -> Score | None:
         """The score by the statistics that the effect clearly changes at some strength; None where it changes none."""
-        count = min(WANDER if self.wanders else count, len(self.null.draws) // 2)
+        count = min(TWINS_OF_RANDOM_COURSE if self.wanders else count, len(self.null.draws) // 2)
         there = with_effect(self.model, self.name, parameters)
         bare = within(there, within(self.model, self.case.base))
 
         def probe(model: SensorModel, unit: BaseFit) -> Prediction:
-            return predict(self.case, model, unit, self.null, count, self.only)
+            return predict_by_twins(self.case, model, unit, self.null, count, self.only)
 
-        made, unit = settled_there(probe, self.null, there, bare, [])
+        made, unit = at_settled_unit(probe, self.null, there, bare, [])
         found = (self._scatter if self.wanders else self._change)(made, parameters)
         return replace(found, bare=bare, unit=unit) if found else None
 
@@ -293,7 +294,7 @@ class _OfTwins(_Probe):
     def _change(self, made: Prediction, parameters: Parameters) -> Score | None:
         null, count = self.null, len(made.draws)
         change = np.where(self.there, np.nan_to_num(made.mean - null.mean), 0.0)
-        own2 = (of_a_pair(null.keys) * null.noise) ** 2 / count
+        own2 = (pair_noise_share(null.keys) * null.noise) ** 2 / count
         change = np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0)
         without = {d.number: d.values for d in null.draws}
         each = np.nan_to_num([d.values - without[d.number] for d in made.draws])
@@ -317,10 +318,10 @@ class _OfTwins(_Probe):
         assert score.bare is not None and score.unit is not None
         key, events = _key(self.name), self.events(parameters)
         times = abs(parameters[key] / score.parameters[key]) ** _power(self.name)
-        count = min(WANDER if self.wanders else TESTED, len(score.without))
+        count = min(TWINS_OF_RANDOM_COURSE if self.wanders else TESTED, len(score.without))
         null = replace(self.null, draws=self.null.draws[:count])
         unit = shifted(score.bare, score.unit, min(times, 1.0))
-        made = predict(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
+        made = predict_by_twins(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
         scores, without = (np.array([score.of(d.values) for d in draws]) for draws in (made.draws, null.draws))
         if self.wanders:
             sd = float(scores.std(ddof=1)) * np.sqrt(1 + 1 / count)
@@ -354,11 +355,11 @@ class _OfUnits(_Probe):
         units, events = self._units(with_effect(self.model, self.name, parameters)), self.events(parameters)
         scores = np.array([score.of(v) for v in units])
         more = float(scores.mean()) - score.middle
-        sd = float(np.sqrt(self.variance(score, scores, more, events) * (1 + 1 / UNITS) + score.error**2))
-        return Tried(more, sd, float(stats.t.ppf(CERTAIN, UNITS - 1)), events)
+        sd = float(np.sqrt(self.variance(score, scores, more, events) * (1 + 1 / DRAWN_UNITS) + score.error**2))
+        return Tried(more, sd, float(stats.t.ppf(CERTAIN, DRAWN_UNITS - 1)), events)
 
     def _units(self, model: SensorModel) -> Array:
-        units = with_pattern(self.case, model, self.null, self.null.prediction).units
+        units = with_drawn_pattern(self.case, model, self.null, self.null.prediction).units
         assert units is not None
         return units
 

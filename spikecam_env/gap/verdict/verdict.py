@@ -14,11 +14,12 @@ from spikecam_env.gap.baseline.label_audit import Contradiction
 from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.baseline.off_nominal import Off, with_strengths
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
+from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.result import Diagnosis, Estimate, Gap, NamedEffect, Ranked, Statistic
-from spikecam_env.gap.search.forward import BESIDE, SECOND, Round
+from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
+from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.notes import HELD_OUT_ALONE, LENT
 from spikecam_env.gap.verdict.structure import structure
@@ -41,10 +42,10 @@ def explains(null: Null, before: Array, rho: Array, predicted: Prediction) -> bo
     """Whether residuals `rho` of a prediction are chance; or, beside those of the model as given, little and quiet, and
     none that was not there, which would contradict what was added."""
     by_chance = float(np.sum(null.weight * np.ones(len(rho))))
-    left = (misfit(rho, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
+    left = (robust_squares(rho, null.weight) - by_chance) / max(robust_squares(before, null.weight) - by_chance, 1.0)
     quiet = np.abs(rho).max() < QUIET * np.abs(before).max()
-    contradicted = alarmed(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0), predicted)
-    return not alarmed(null, rho, predicted) or bool(left < UNEXPLAINED and quiet and not contradicted)
+    contradicted = is_significant(null, np.where(np.abs(rho) > np.abs(before), rho, 0.0), predicted)
+    return not is_significant(null, rho, predicted) or bool(left < UNEXPLAINED and quiet and not contradicted)
 
 
 def harmless(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
@@ -79,7 +80,7 @@ def concluded(
         replace(named(f, r, removed_instead(case, null, values, given, r)), where=there, when=then) for f, r in found
     )
     rivals = next(((f.name, *r.rivals) for f, r in found if r.rivals), ())
-    explained, left_open = explains(null, before, rho, last), SECOND in case.effort.left_out
+    explained, left_open = explains(null, before, rho, last), SECOND in case.budget.left_out
     chance = not found and bool(adjusted(deviates(null, values)).min() > SURE)
     if explained or chance or not rounds:
         effects = (*(named_missing(m) for m in lacking), *effects)
@@ -121,7 +122,7 @@ def concluded(
 
 def enough(case: Case) -> int:
     """Effort with which another effect would have been looked for beside those found, in tens."""
-    return 10 * math.ceil((case.effort.simulated / len(case.conditions) + BESIDE + 1) / 10)
+    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + CAMPAIGNS_PER_EFFECT + 1) / 10)
 
 
 def accepted(rounds: Sequence[Round]) -> list[tuple[Fit, Round]]:
@@ -140,8 +141,8 @@ def removed_instead(case: Case, null: Null, values: Array, given: Array, turn: R
 
 def told_of(found: Sequence[tuple[Fit, Round]]) -> list[str]:
     """What to know of how it was found."""
-    lent = [LENT] if any(r.lent for _, r in found) else []
-    return lent + ([HELD_OUT_ALONE] if any(r.alone for _, r in found) else [])
+    lent = [LENT] if any(r.used_held_out for _, r in found) else []
+    return lent + ([HELD_OUT_ALONE] if any(r.motion_alone for _, r in found) else [])
 
 
 def named_missing(found: Missing) -> NamedEffect:

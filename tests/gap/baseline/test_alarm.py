@@ -8,7 +8,7 @@ from small import null, recorded
 
 from spikecam_env.gap.baseline.alarm import lent, rings
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.search.forward import of_fit
+from spikecam_env.gap.fit.problem import values_to_fit
 
 
 def test_steady_light_held_out_is_not_lent_since_the_unit_would_be_another():
@@ -28,4 +28,4 @@ def test_the_alarm_hears_only_what_it_is_given():
     values = values_of(case.bank, there.keys)
     assert not rings(there, values)
     values[~case.to_fit(there.keys)] += 20 * there.noise[~case.to_fit(there.keys)]
-    assert rings(there, values) and not rings(there, of_fit(case, there, values))
+    assert rings(there, values) and not rings(there, values_to_fit(case, there, values))

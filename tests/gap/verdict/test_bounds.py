@@ -18,7 +18,7 @@ from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.report.words import at_most, bounded_parameter
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import load
-from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.verdict.bounds import EVENTS, Score, Tried, _OfTwins, bounds, first_tried
 from spikecam_env.sensor import SpikeSensor
@@ -93,10 +93,10 @@ def test_what_these_recordings_would_not_show_at_its_strongest_has_no_bound():
 
 
 def test_without_effort_there_is_no_bound_and_that_is_said():
-    case = replace(recorded(), effort=Effort(10, [9]))
+    case = replace(recorded(), budget=Budget(10, [9]))
     found, open_ = bounds(case, MODEL, None, None, ["dead_time", "vignetting"], load())
     assert found == [] and dict(open_).keys() == {"dead_time", "vignetting"}
-    assert all("--effort" in needs for _, needs in open_) and case.effort.left_out == ["upper bounds"]
+    assert all("--effort" in needs for _, needs in open_) and case.budget.left_out == ["upper bounds"]
 
 
 def test_a_strength_of_which_few_events_are_expected_is_never_refuted():
