@@ -99,7 +99,7 @@ def diagnose(
     with timed("audit"):
         contradictions = upheld(case, assumed, audit(case))
         case = trimmed(case, contradictions)
-        case = replace(case, budget=Budget(effort * len(case.conditions), settled=bool(contradictions)))
+        case = replace(case, budget=Budget(effort * len(case.conditions), verdict_known=bool(contradictions)))
     names, untestable = testable(names, case.conditions)
     lacking = missing(case, assumed, names)
     start = with_all(assumed, lacking)

@@ -38,5 +38,5 @@ def amplified(name: str, parameters: Mapping[str, float], size: float) -> tuple[
     strength = candidate(name).strength
     linear = candidate(name).is_linear and parameters[strength] != 0
     times = float(np.clip(TARGET_SIZE / max(size, 1e-9), 1.0, FURTHEST)) if linear else 1.0
-    louder = bounded(name, {**parameters, strength: parameters[strength] * times})
-    return louder, louder[strength] / parameters[strength] if times > 1.0 else 1.0
+    stronger = bounded(name, {**parameters, strength: parameters[strength] * times})
+    return stronger, stronger[strength] / parameters[strength] if times > 1.0 else 1.0

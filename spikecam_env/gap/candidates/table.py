@@ -31,7 +31,8 @@ class Candidate:
     share: the parameter that is a share of what can be counted, and of what: pixels, spikes, or frames of pixels.
     shape_step: step of a shape's logarithm to take a derivative by: a time constant needs a long one, to show above
     what twins scatter; a level of light from which something begins leads elsewhere by it.
-    needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
+    needs: says what recordings are lacking to see it, or None.
+    experiment: what would distinguish it from others that do the same.
     """
 
     name: str
@@ -128,7 +129,7 @@ def _even(shown: Sequence[Shown]) -> str | None:
 
 
 _FIELD = "flats at several levels beside a picture with bright and dark rows"
-_SECOND = "flats at a second V_d"
+_SECOND_V_D = "flats at a second V_d"
 
 _ALL = (
     Candidate("dead_time", "saturation", ("tau_us",), needs=_levels),
@@ -158,8 +159,8 @@ _ALL = (
     Candidate("threshold_flicker_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
     Candidate("frame_threshold_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
     Candidate("excess_threshold_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
-    Candidate("reset_noise", "noise", ("sigma_mV",), square=True, needs=_steady, experiment=_SECOND),
-    Candidate("shot_noise", "noise", ("quanta",), needs=_steady, experiment=_SECOND),
+    Candidate("reset_noise", "noise", ("sigma_mV",), square=True, needs=_steady, experiment=_SECOND_V_D),
+    Candidate("shot_noise", "noise", ("quanta",), needs=_steady, experiment=_SECOND_V_D),
     Candidate(
         "random_telegraph_noise",
         "dark",
@@ -181,8 +182,8 @@ _ALL = (
     ),
     Candidate("dead_pixels", "defects", ("fraction",), share=("fraction", "pixels"), needs=_even),
     Candidate("conversion_gain_spread", "pattern", ("sigma",), needs=_even),
-    Candidate("capacitor_spread", "pattern", ("sigma_fF",), needs=_even, experiment=_SECOND),
-    Candidate("bias_voltage_spread", "pattern", ("sigma_V",), needs=_even, experiment=_SECOND),
+    Candidate("capacitor_spread", "pattern", ("sigma_fF",), needs=_even, experiment=_SECOND_V_D),
+    Candidate("bias_voltage_spread", "pattern", ("sigma_V",), needs=_even, experiment=_SECOND_V_D),
     Candidate("row_fixed_pattern", "pattern", ("sigma_mV",), needs=_even),
     Candidate("column_fixed_pattern", "pattern", ("sigma_mV",), needs=_even),
     Candidate("vignetting", "optics", ("falloff",), needs=_even),
@@ -253,10 +254,10 @@ def expected_events(
     share = candidate(name).share
     if share is None:
         return math.inf
-    told = [o for c, o in zip(shown, seen, strict=True) if c.use == "fit" and not c.moves]
-    pixels = max((o.times.count.size for o in told), default=0)
-    spikes = float(sum(o.times.count.sum() for o in told))
-    of = {"pixels": pixels, "spikes": spikes, "frames": sum(pixels * o.frames for o in told) - spikes}
+    steady = [o for c, o in zip(shown, seen, strict=True) if c.use == "fit" and not c.moves]
+    pixels = max((o.times.count.size for o in steady), default=0)
+    spikes = float(sum(o.times.count.sum() for o in steady))
+    of = {"pixels": pixels, "spikes": spikes, "frames": sum(pixels * o.frames for o in steady) - spikes}
     return parameters[share[0]] * of[share[1]]
 
 

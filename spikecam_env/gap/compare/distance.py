@@ -33,7 +33,8 @@ def deviates(null: Null, values: Array) -> Array:
 
 def normal_deviates(null: Null, t: Array, predicted: Prediction | None = None) -> Array:
     """(S,) normal deviates of distances in noise, of a prediction's or of the null's: the noise was learnt from few
-    twins, and is the surer the more of it is floor.  What drawn units show is no less likely than their number says."""
+    twins, and has more freedom where part of it is floor.  What drawn units show is no less likely than their number
+    says."""
     known, freedom = null.sd**2 * (1.0 + 1.0 / null.twins), null.freedom
     if predicted is not None:
         known, freedom = predicted.spread**2 + predicted.error**2, freedom_of(null, predicted)
@@ -59,7 +60,7 @@ def freedom_of(null: Null, predicted: Prediction) -> Array:
     """(S,) degrees of freedom of a prediction's spread (Welch and Satterthwaite): what is the null's has its own, what
     an effect's twins scatter beyond has those of few twins, `halved`, or of the drawn units.
 
-    How much they scatter beyond, all statistics of a group say: one that happened to scatter little is no surer.
+    How much they scatter beyond, all statistics of a group say: one that happened to scatter little has no more.
     """
     beyond = np.maximum(predicted.spread / np.maximum(null.sd, 1e-300), 1.0) ** 2 - 1.0
     groups = np.unique([k.group for k in null.keys], return_inverse=True)[1]
@@ -100,13 +101,13 @@ def residual(null: Null, measured: Array, predicted: Prediction) -> Array:
 
 
 def residual_and_misfit(null: Null, measured: Array, predicted: Prediction) -> tuple[Array, float]:
-    """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squares of what is left, and the price of
-    noise wider than the null's, without which a prediction would win by being vague.  What was not measured (NaN, held
-    out) counts for nothing."""
+    """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squares of what is left, and the logarithm
+    of the variance over the null's, without which a prediction would win by being vague.  What was not measured (NaN,
+    held out) counts for nothing."""
     rho = residual(null, measured, predicted)
     wider = (total_variance(null, predicted) - predicted.error**2) / (null.sd**2 + null.floor**2)
-    price = np.where(np.isfinite(measured), null.weight * np.log(wider), 0.0)
-    return rho, robust_squares(rho, null.weight) + float(price.sum())
+    log_variance = np.where(np.isfinite(measured), null.weight * np.log(wider), 0.0)
+    return rho, robust_squares(rho, null.weight) + float(log_variance.sum())
 
 
 def robust_squares(rho: Array, weight: Array | float = 1.0) -> float:

@@ -20,7 +20,7 @@ from spikecam_env.gap.statistics import Key, alike
 Array = NDArray[np.float64]
 
 FEWEST_FREEDOM = 4
-"""Degrees of freedom of a scatter that says how alike variances are."""
+"""Degrees of freedom of a scatter from which the spread of variances within a kind is estimated, at least."""
 
 MOST_FREEDOM = 2000.0
 """Degrees of freedom of a variance at most."""
@@ -29,8 +29,8 @@ MOST_FREEDOM = 2000.0
 def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Array, Array]:
     """((S,) variances, (S,) degrees of freedom) from (S,) sample variances with `freedom` each.
 
-    A statistic's kind is the same one of all recordings; how alike a kind's variances are is told by all kinds that
-    share a floor (`alike`), or, where that says more, how alike they are but for what a recording has in common: some
+    A statistic's kind is the same one of all recordings; how closely a kind's variances agree is estimated from all
+    kinds that share a floor (`alike`), or, where that says more, but for what a recording has in common: some
     have more spikes to count than others.  What never varied, or is of one recording alone, stays as it is.
     """
     out, degrees = variances.copy(), np.full(len(keys), float(freedom))
@@ -44,9 +44,9 @@ def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Ar
     for of in families.values():
         kinds, recordings = one_of_each([keys[i].name for i in of]), one_of_each([keys[i].recording for i in of])
         found = [shrunk(logs[of], like, chance) for like in (kinds, np.hstack([kinds, recordings]))]
-        joint, doubt = min(found, key=lambda f: f[1])
-        if doubt < chance:
-            degrees[of] = freedom_of_variance(doubt)
+        joint, error = min(found, key=lambda f: f[1])
+        if error < chance:
+            degrees[of] = freedom_of_variance(error)
             out[of] = np.exp(joint + bias(degrees[of[0]]))
     return out, degrees
 
@@ -60,8 +60,8 @@ def shrunk(logs: Array, like: Array, chance: float) -> tuple[Array, float]:
     """((S,) logarithms drawn to what those like them say, the variance of their error): `like` (S, n) says how they
     are, chance is the variance of each by itself."""
     fitted = like @ np.linalg.lstsq(like, logs)[0]
-    told = int(np.linalg.matrix_rank(like))
-    known = len(logs) - told
+    parameters = int(np.linalg.matrix_rank(like))
+    known = len(logs) - parameters
     if known < FEWEST_FREEDOM:
         return logs, chance
     scatter = float(np.sum((logs - fitted) ** 2)) / known

@@ -58,7 +58,7 @@ class Null:
     `draws`, or of the pattern over as many drawn units.
 
     floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  freedom: (S,) degrees of freedom
-    of sd.  weight: (S,) how much each says of its own: what several recordings tell of one fixed pattern is told once.
+    of sd.  weight: (S,) how much each says of its own: several recordings show one fixed pattern, which counts once.
     """
 
     keys: tuple[Key, ...]
@@ -94,7 +94,7 @@ def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key], refits: S
 def paired(null: Null, made: Sequence[Draw]) -> Prediction:
     """What campaigns with an effect say, each less the null's of the same number: their noise cancels nearly.
 
-    What a draw lacks is the null's.  One pair has PAIR_NOISE of a campaign's noise; several tell it themselves.
+    What a draw lacks is the null's.  One pair has PAIR_NOISE of a campaign's noise; several give it by their scatter.
     """
     without = {d.number: d for d in null.draws}
     made = [
@@ -170,7 +170,7 @@ def half_pooled(null: Null, variances: Array) -> Array:
 
 
 def from_drawn_units(null: Null, predicted: Prediction) -> NDArray[np.bool_]:
-    """(S,) which statistics drawn units tell."""
+    """(S,) which statistics are known from drawn units."""
     if predicted.units is None:
         return np.zeros(len(null.keys), np.bool_)
     return np.asarray(np.isfinite(predicted.units).all(axis=0), np.bool_)

@@ -22,17 +22,19 @@ from spikecam_env.gap.compare.prediction import (
 Array = NDArray[np.float64]
 
 ERROR_DAMPING = 5e-4
-"""Damping of what errors are told from: a step may be held back, an error must not be.  What it holds back is open."""
+"""Damping of the normal matrix that errors follow from: a step may be held back, an error must not be.  What it holds
+back is open."""
 
 TWINS_FOR_COVARIANCE = 4
-"""Twins of an effect that tell by how much its own chance leads parameters astray."""
+"""Twins of an effect from which the covariance of a step by its own chance is estimated."""
 
 MEDIAN_SQUARE = 0.455
 """Of the square of a normal deviate."""
 
 
 def likeliest(null: Null, measured: Array, one: Prediction) -> tuple[float, float]:
-    """(factor, sd of its logarithm) that suits a prediction best which mostly scatters: by the misfit and its price."""
+    """(factor, sd of its logarithm) that suits a prediction best which mostly scatters: by the misfit, with its
+    term for the spread."""
     factors = np.geomspace(0.01, 100.0, 200)
     left = np.array([residual_and_misfit(null, measured, with_change_scaled(null, one, f))[1] for f in factors])
     near = np.log(factors[left < left.min() + 1.0])
@@ -44,20 +46,20 @@ def step_of(
     measured: Array,
     predicted: Prediction,
     jacobian: Array,
-    doubt: Array | float = 0.0,
+    noise: Array | float = 0.0,
     before: Array | float = 1.0,
 ) -> tuple[Array, Array]:
-    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n), known to `doubt`.
+    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n).
 
-    before: (n,) standard deviation of what nothing tells.
+    noise: (S, n) of the jacobian.  before: (n,) prior standard deviation, of what the statistics leave open.
 
-    What is far off is judged by how far off most is that moves: it would be outliers all, and hardly be heard.
+    Residuals are taken over the median of those that move: far from the solution all would be outliers of small weight.
 
-    Statistics are not independent: the covariance is of how far the null's own draws would have led the step astray,
+    Statistics are not independent: the covariance is of where the null's own draws would have led the step,
     and, where there are TWINS_FOR_COVARIANCE of the effect, its own (other pixels have its traps), with the floors and
     TOLERANCE of the effect, all of one sign, on top; of the fixed pattern, of drawn units: all recordings show one.
-    Where two parameters do nearly the same, what twins scattered would seem to tell them apart: as many squares of it
-    as can be expected in the normal matrix are no knowledge (errors in variables).
+    Where two parameters do nearly the same, noise of the jacobian would seem to separate them: the squares of it
+    that are expected in the normal matrix are subtracted (errors in variables).
     """
     noise2 = total_variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
@@ -67,12 +69,12 @@ def step_of(
     normal = jacobian.T @ (w[:, None] * jacobian)
     scale = np.diag(normal) + 1e-12
     step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
-    values, basis = principal_directions(normal - chance_of_normal_matrix(w, jacobian, doubt), np.sqrt(scale))
+    values, basis = principal_directions(normal - chance_of_normal_matrix(w, jacobian, noise), np.sqrt(scale))
     back = np.linalg.inv(basis)
     solve = (back / values) @ back.T @ (jacobian.T * w)
     drawn = [d.values - null.mean for d in null.draws]
-    alike = solve * ~from_drawn_units(null, predicted)
-    chance = step_covariance(alike, drawn) if len(drawn) > 1 else (alike * null.sd**2) @ alike.T
+    of_twins = solve * ~from_drawn_units(null, predicted)
+    chance = step_covariance(of_twins, drawn) if len(drawn) > 1 else (of_twins * null.sd**2) @ of_twins.T
     off = solve @ law_error(null, predicted)
     total = (
         chance + own_step_covariance(null, predicted, solve) + (solve * null.floor**2) @ solve.T + np.outer(off, off)
@@ -84,10 +86,10 @@ def step_of(
     return np.asarray(step, np.float64), np.atleast_2d(total)
 
 
-def chance_of_normal_matrix(w: Array, jacobian: Array, doubt: Array | float) -> Array:
+def chance_of_normal_matrix(w: Array, jacobian: Array, noise: Array | float) -> Array:
     """(n, n) of a normal matrix with weights (S,), that the noise of its jacobian makes: each column is a twin less one
-    that they share.  doubt: (S, n) of both, with the sign of the step between them."""
-    there = doubt * (jacobian != 0)
+    that they share.  noise: (S, n) of both, with the sign of the step between them."""
+    there = noise * (jacobian != 0)
     shared = there.T @ (w[:, None] * there) / 2
     return np.asarray(shared + np.diag(np.diag(shared)))
 
@@ -111,9 +113,9 @@ def own_step_covariance(null: Null, predicted: Prediction, solve: Array) -> Arra
     draws = predicted.draws if len(predicted.draws) >= TWINS_FOR_COVARIANCE else ()
     change = np.array([d.values - without[d.number] for d in draws])
     shown = from_drawn_units(null, predicted)
-    told = np.any(np.nan_to_num(change) != 0, axis=0) & ~shown
-    total = np.asarray((solve * np.where(told | shown, 0.0, variances)) @ solve.T)
-    total = total + step_covariance(solve * told, change) if told.any() else total
+    simulated = np.any(np.nan_to_num(change) != 0, axis=0) & ~shown
+    total = np.asarray((solve * np.where(simulated | shown, 0.0, variances)) @ solve.T)
+    total = total + step_covariance(solve * simulated, change) if simulated.any() else total
     return total + step_covariance(solve * shown, predicted.units) if predicted.units is not None else total
 
 

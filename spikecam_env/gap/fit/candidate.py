@@ -128,7 +128,7 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
         predicted = replace(predicted, mean=predicted.mean + slope * np.log(moved) / power)
     else:
         predicted = with_change_scaled(null, predicted, moved)
-    rho, left = problem.judged(predicted)
+    rho, left = problem.residual_and_misfit(predicted)
     sds = {strength: abs(final[strength]) * (sd / max(abs(scale), 1e-9) / power)}
     there = with_effect(problem.model, name, final)
     return Fit(name, final, sds, predicted, shifted(bare, base, moved), rho, left, there)
@@ -185,7 +185,7 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
         if 0.5 < factor < 2.0:
             break
     predicted = with_change_scaled(problem.null, predicted, factor)
-    rho, left = problem.judged(predicted)
+    rho, left = problem.residual_and_misfit(predicted)
     sds = {strength: parameters[strength] * max(sd, np.sqrt(2.0 / len(only))) / power}
     return Fit(name, parameters, sds, predicted, base, rho, left, with_effect(problem.model, name, parameters))
 
@@ -202,7 +202,7 @@ def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit
                 tried = bounded(name, {**centre, key: centre[key] * factor})
                 there = with_effect(problem.model, name, tried)
                 predicted = problem.with_pattern(there, problem.null.prediction)
-                rho, left = problem.judged(predicted)
+                rho, left = problem.residual_and_misfit(predicted)
                 now = Fit(name, tried, {}, predicted, within(there, problem.case.base), rho, left, there)
                 best = now if best is None or now.misfit < best.misfit else best
     assert best is not None

@@ -51,7 +51,7 @@ def confirmed(problem: Problem, found: Fit, count: int = TWINS_TO_CONFIRM) -> Fi
 
 def with_prediction(problem: Problem, found: Fit, predicted: Prediction) -> Fit:
     """The fit by another prediction of it."""
-    rho, left = problem.judged(predicted)
+    rho, left = problem.residual_and_misfit(predicted)
     return replace(found, prediction=predicted, rho=rho, misfit=left)
 
 

@@ -78,9 +78,11 @@ class Descent:
 def descend(
     problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, free: Free, to_step: float = TO_STEP
 ) -> Descent:
-    """From a model and its unit down to the parameters `free` that suit what is seen best; where steps have come to
-    leave more, the best of where they led, of those alike the first, and no step further that promises little and goes
-    as far as one may.  to_step: misfit that a step has to promise, and the one before it to have removed.
+    """From a model and its unit down to the parameters `free` that suit what is seen best.
+
+    Where steps have come to leave more, the best of where they led, the first of several within TO_STEP; and no step
+    further that promises little and goes as far as one may.
+    to_step: misfit that a step has to promise, and the one before it to have removed.
     """
     null = problem.null
     at, base = at_settled_unit(probe, null, model, base, free)
@@ -151,7 +153,7 @@ def derivatives(
 def at_settled_unit(
     probe: Probe, null: Null, model: SensorModel, base: BaseFit, free: Free
 ) -> tuple[Prediction, BaseFit]:
-    """(what a model gives under a unit that has settled, that unit): probed once more where the unit was not still."""
+    """(what a model gives under a unit that has settled, that unit): probed once more where it had not."""
     made = probe(model, base)
     there = unit_after(model, base, null, made, free)
     return (made, base) if is_still(base, there) else (probe(model, there), there)

@@ -39,7 +39,7 @@ def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tupl
     Where the parameters that the recordings to fit give suit the held-out ones within their errors only, or others
     within these do, all recordings give them.  problem: before any was added.
     """
-    everywhere = problem.of_all_recordings
+    everywhere = problem.fitted_to_all
     refined, errors, own2 = _refined(problem, found, names)
     error = np.sqrt(refined.prediction.error**2 + own2 * np.isnan(problem.seen))
     open_ = replace(refined, prediction=replace(refined.prediction, error=error))
@@ -120,7 +120,7 @@ def _stepped(problem: Problem, best: Fit, free: Free, columns: Array, step: Arra
     """The fit moved by a last step (n,) of its own twins, which are more than the descent's: what one happened to
     scatter is in the parameters that it led to."""
     predicted = replace(best.prediction, mean=best.prediction.mean + columns @ step)
-    rho, left = problem.judged(predicted)
+    rho, left = problem.residual_and_misfit(predicted)
     if np.any(np.abs(step) > longest_of(free)) or left > best.misfit:
         return best
     model, base = moved(best.model, best.base, free, step)

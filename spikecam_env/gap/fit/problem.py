@@ -40,7 +40,7 @@ class Problem:
         return Problem(case, model, null, values_to_fit(case, null, values), values)
 
     @property
-    def of_all_recordings(self) -> Problem:
+    def fitted_to_all(self) -> Problem:
         """The same, to be fitted to all recordings."""
         return replace(self, seen=self.values)
 
@@ -48,13 +48,13 @@ class Problem:
         """What is left to explain of a model with effects already added, its unit and what it predicts."""
         return replace(self, case=replace(self.case, base=base), model=model, null=standing_on(self.null, predicted))
 
-    def judged(self, predicted: Prediction) -> tuple[Array, float]:
+    def residual_and_misfit(self, predicted: Prediction) -> tuple[Array, float]:
         """((S,) residual, misfit) of a prediction, by the recordings to fit."""
         return residual_and_misfit(self.null, self.seen, predicted)
 
     def misfit(self, predicted: Prediction | None = None) -> float:
         """Of a prediction, by the recordings to fit; of the model itself where None."""
-        return self.judged(predicted or self.null.prediction)[1]
+        return self.residual_and_misfit(predicted or self.null.prediction)[1]
 
     def is_explained(self, predicted: Prediction) -> bool:
         """Whether a prediction leaves nothing but chance of the recordings to fit."""

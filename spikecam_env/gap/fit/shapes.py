@@ -51,7 +51,7 @@ def with_fitted_shapes(problem: Problem, found: Fit) -> Fit:
     names = candidate(found.name).fitted
     free = [(found.name, key) for key in names]
     end = descend(problem, probe, found.model, found.base, free, TO_STEP_SHAPE)
-    rho, left = problem.judged(end.prediction)
+    rho, left = problem.residual_and_misfit(end.prediction)
     if left > found.misfit:
         return found
     values = next(e for e in end.model.effects if e.name == found.name).parameters()

@@ -58,7 +58,7 @@ def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
         if CLOSE_FACTOR[0] < factor < CLOSE_FACTOR[1]:
             break
     predicted = with_change_scaled(problem.null, predicted, factor**2)
-    rho, left = problem.judged(predicted)
+    rho, left = problem.residual_and_misfit(predicted)
     there = with_both(problem.model, tau_us, frame_rate_hz)
     beta = next(e for e in there.effects if e.name == PAIR[1]).parameters()
     return Fit(PAIR[1], {"beta": beta["beta"]}, {}, predicted, base, rho, left, there)

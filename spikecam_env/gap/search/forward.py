@@ -2,7 +2,7 @@
 
     [screen -> fit -> shape -> confirm -> add -> try neighbours -> refine all]*
 
-Held-out recordings take no part but in the choice between what others cannot tell apart, within errors in parameters
+Held-out recordings take no part but in the choice between what others cannot distinguish, within errors in parameters
 that others leave open, and in whether anything is left to look for: where they alone disagree, what moves among them is
 fitted from there on.
 """
@@ -44,7 +44,7 @@ from spikecam_env.gap.search.round import (
     is_small_share,
     is_visible,
 )
-from spikecam_env.gap.search.shortlist import fits_of, groups_that_stand_out, line_of, to_fit
+from spikecam_env.gap.search.shortlist import fits_of, groups_that_stand_out, line_of, starts_to_fit
 from spikecam_env.gap.unit.refit import within
 
 Array = NDArray[np.float64]
@@ -103,7 +103,7 @@ def search(problem: Problem, names: Sequence[str], templates: Templates) -> list
             prediction = with_dark_levels_open(problem, now, base, prediction)
         if is_small_share(turn, turn.fits[0].misfit, chance, len(rounds) > 1):
             break
-    rho, left_over = problem.judged(prediction)
+    rho, left_over = problem.residual_and_misfit(prediction)
     return try_cancelling_pair(problem, names, [*rounds, Round(now, base, prediction, rho, left_over)])
 
 
@@ -116,7 +116,7 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
     left = [n for n in names if n not in {e.name for e in turn.model.effects}]
     screened = screen(templates, here.case.conditions, null, seen, left, line_of(here.case))
     distance = np.nan_to_num((seen - null.mean) / null.noise)
-    starts = to_fit(screened, robust_squares(distance, null.weight), groups_that_stand_out(null, distance))
+    starts = starts_to_fit(screened, robust_squares(distance, null.weight), groups_that_stand_out(null, distance))
     confirm = partial(confirmed, here)
     fits, tries = fits_of(here, turn.misfit, starts)
     visible = [f for f in fits if is_visible(null, f)]

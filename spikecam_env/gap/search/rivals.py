@@ -1,4 +1,4 @@
-"""Whether a measurement tells one candidate from another.
+"""Whether a measurement distinguishes one candidate from another.
 
 Had the other been true, would the first have looked as much better as it does?  The noise of the null's own draws, on
 top of what the other predicts, makes campaigns in which it is true: they say what lead of the first over it is chance.
@@ -48,7 +48,8 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
 
 def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:
     """((S,) what `other` most likely gives, (S,) the variance of that): where twins of the two do not clearly differ,
-    both tell it.  Its own chance, taken for its law, would be held against it."""
+    both
+    say what it gives.  Its own chance, taken for its law, would be held against it."""
     apart, own2, others2 = best.mean - other.mean, own_variance(null, other), own_variance(null, best)
     both2 = np.maximum(own2 + others2, 1e-300)
     share = np.where(np.abs(apart) > APART * np.sqrt(both2), 0.0, own2 / both2)
@@ -57,7 +58,7 @@ def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array,
 
 def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
     """Misfit by which `best` is better than `other`, each at the strength that suits `seen`, in the noise of both: two
-    twins of each do not tell whose campaigns scatter more, and the price of noise would decide."""
+    twins of each do not show whose campaigns scatter more, and the log variance would decide."""
     both = [rescaled(null, seen, p) for p in (other, best)]
     spread = np.sqrt(np.mean([p.spread**2 for p in both], axis=0))
     left = [residual_and_misfit(null, seen, replace(p, spread=spread))[1] for p in both]

@@ -47,7 +47,7 @@ def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
     return [s for i, s in enumerate(screened) if s.name not in {before.name for before in screened[:i]}]
 
 
-def to_fit(shapes: Sequence[Screened], before: float, groups: Collection[str] = ()) -> list[Screened]:
+def starts_to_fit(shapes: Sequence[Screened], before: float, groups: Collection[str] = ()) -> list[Screened]:
     """The best by their templates, FEWEST_FITTED and those that explain half of what the best does; one that takes
     several twins a try is tried for that alone.  before: misfit of none.
 

@@ -45,7 +45,7 @@ class Case:
 
     @property
     def scenes_only(self) -> bool:
-        """Whether no light is known: response and dark level cannot be told from the scene."""
+        """Whether no light is known: response and dark level cannot be distinguished from the scene."""
         return not any(c.kind in KNOWN for c in self.conditions)
 
     def use(self, recording: str) -> str:

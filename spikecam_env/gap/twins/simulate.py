@@ -59,11 +59,11 @@ def expose(
 
 
 def with_label_error(unit: Unit, seed: int, take: int) -> Unit:
-    """A unit of pixels that are all alike, in light and with a dark level no surer than they are known, drawn for one
+    """A unit of identical pixels, in light and with a dark level drawn within what is known of them, for one
     recording: light to LABELS, dark to half a grain.
 
-    Where all pixels fire alike and without noise, the beat with the read-out's clock shows a hundred thousandth of the
-    rate: of the dark level what the sensor rounds, since it counts charge in whole grains, and of light what no label
+    Where all pixels fire at one rate and without noise, the beat with the read-out's clock shows 1e-5 of the rate:
+    of the dark level what the sensor rounds, since it counts charge in whole grains, and of light what no label
     says.  Drawn, it is no law.
     """
     if np.ptp(unit.gain) > 0:
@@ -77,7 +77,7 @@ def with_random_phases(model: SensorModel, seed: int, take: int) -> SensorModel:
     """The model with its waves at phases drawn for one recording: nobody starts a recording by the mains.
 
     Those of successive seeds are spread over the wave, two on opposite sides and four at right angles: of so few that
-    were drawn at random, all may be alike, and their scatter nothing.
+    were drawn at random, all may be the same, and their scatter nothing.
     """
     rng = np.random.default_rng(take)
     spread = int(f"{max(seed - FIRST_SEED, 0):064b}"[::-1], 2) / 2**64  # van der Corput's sequence

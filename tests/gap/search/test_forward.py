@@ -299,7 +299,7 @@ def test_beside_a_later_effect_a_runner_up_may_take_the_earlier_ones_place(monke
     }
 
     def confirm(problem, found):
-        rho, left = problem.judged(made[found.model])
+        rho, left = problem.residual_and_misfit(made[found.model])
         return replace(found, prediction=made[found.model], rho=rho, misfit=left)
 
     monkeypatch.setattr(neighbours, "confirmed", confirm)

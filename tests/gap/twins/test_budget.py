@@ -63,7 +63,7 @@ def test_what_a_verdict_can_hardly_do_without_may_take_more():
 
 
 def test_a_verdict_that_is_settled_can_do_without_all():
-    budget = Budget(20, [20], settled=True)
+    budget = Budget(20, [20], verdict_known=True)
     assert not budget.allows("a second effect", needed=True) and budget.left_out == ["a second effect"]
 
 
@@ -152,7 +152,7 @@ def test_what_was_found_stays_as_it_was_fitted_when_no_effort_is_left(spent: int
     monkeypatch.setattr(searching, "simulated_for", lambda *_: (list(range(5)), 1))
     model = SimpleNamespace(effects=(SimpleNamespace(name="blooming"),))
     best = SimpleNamespace(name="blooming", model=model, misfit=10.0)
-    case = SimpleNamespace(budget=Budget(60, [spent], settled=settled))
+    case = SimpleNamespace(budget=Budget(60, [spent], verdict_known=settled))
     assert joined(problem_of(case), [Found((best,))], 0.0) == [Found((best,))]
     assert case.budget.left_out == ["finer strengths"]
 
