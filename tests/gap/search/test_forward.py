@@ -418,3 +418,60 @@ def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int,
     monkeypatch.setattr(search, "CAMPAIGNS_PER_EFFECT", 17)
     search.search(Problem.of(case, MODEL, n, values), [], None)
     assert len(asked) == 1 + begun and case.budget.left_out == ([] if begun else ["a second effect"])
+
+
+@pytest.mark.parametrize("removed, tried", [(0.4, False), (0.6, True)])
+def test_a_runner_up_of_an_earlier_round_has_to_have_removed_half_of_what_its_effect_did(removed: float, tried: bool):
+    n, change, values, seen = campaign()
+    best = of_two(n, "crosstalk", change, seen)
+    first, other = (replace(best, name=name) for name in ("dead_time", "comparator_delay"))
+    fits = (replace(first, misfit=300.0), replace(other, misfit=500.0 - 200.0 * removed))
+    turn = Round(MODEL, unit(), n.prediction, values, 500.0, fits)
+    case = SimpleNamespace(budget=Budget(0))
+    try_in_place_of_earlier(Problem(case, MODEL, n, seen, values), best, turn)
+    assert bool(case.budget.left_out) is tried
+
+
+def test_four_runners_up_are_tried_in_place_of_an_earlier_effect_at_most(monkeypatch):
+    n, change, values, seen = campaign()
+    best = of_two(n, "crosstalk", change, seen)
+    names = (
+        "dead_time",
+        "comparator_delay",
+        "ir_drop",
+        "readout_skew",
+        "optical_blur",
+        "missed_spikes",
+        "afterpulsing",
+    )
+    turn = Round(MODEL, unit(), n.prediction, values, 500.0, tuple(replace(best, name=m, misfit=300.0) for m in names))
+    asked = []
+    monkeypatch.setattr(neighbours, "confirmed", lambda problem, found: found)
+    monkeypatch.setattr(neighbours, "resettled", lambda problem, found, model: replace(found, model=model))
+    monkeypatch.setattr(
+        neighbours, "fit", lambda problem, name, start: asked.append(name) or replace(best, name=name, misfit=1e4)
+    )
+    try_in_place_of_earlier(Problem(recorded(), MODEL, n, seen, values), best, turn)
+    assert len(asked) == 4
+
+
+def test_three_effects_are_looked_for_at_most(monkeypatch):
+    n, change, values, _ = campaign()
+    names = iter(("dead_time", "crosstalk", "readout_skew", "optical_blur"))
+    rounds = []
+
+    def candidates(*given):
+        turn = given[-1]
+        found = a_fit(n, next(names), change, values)
+        rounds.append(replace(turn, fits=(replace(found, misfit=turn.misfit - 100.0, model=turn.model),)))
+        return rounds[-1]
+
+    monkeypatch.setattr(search, "with_candidates", candidates)
+    monkeypatch.setattr(search, "has_candidate", lambda *_: True)
+    monkeypatch.setattr(search, "is_improvement", lambda *_: True)
+    monkeypatch.setattr(search, "is_significant", lambda *_: True)
+    monkeypatch.setattr(search, "is_small_share", lambda *_: False)
+    monkeypatch.setattr(search, "joined", lambda _problem, rounds, _chance: list(rounds))
+    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
+    case = OfAll(budget=Budget(), conditions=())
+    assert len(search.search(Problem.of(case, MODEL, n, values), [], None)) == 3 + 1
