@@ -3,7 +3,7 @@
     read -> audit -> refit -> twins -> alarm -> search -> gate -> verdict
 
 Each step is a function of its own, usable by itself.  Held-out recordings take no part in the search, but for what
-`search` says; the gate is on all, and the gap on them alone.
+`search.forward` says; the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from spikecam_env.gap.report.words import sentence, unfinished
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.gap.screen.own_templates import own_templates
 from spikecam_env.gap.screen.templates import Templates, load
-from spikecam_env.gap.search.forward import search
+from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
@@ -115,7 +115,7 @@ def diagnose(
             if case.scenes_only:
                 templates = templates or own_templates(case, start, null, names)
             problem = Problem.of(case, start, null, values)
-            rounds = harmless(case, null, values, search(problem, names, templates or load()))
+            rounds = harmless(case, null, values, forward_selection(problem, names, templates or load()))
     if rounds and not lacking:
         off = replace(
             off, parameters=off_nominal(case, patterned(assumed, rounds[-1].model), rounds[-1].base).parameters

@@ -30,7 +30,7 @@ from spikecam_env.gap.diagnose import in_order, read_case
 from spikecam_env.gap.fit.problem import Problem, values_to_fit
 from spikecam_env.gap.report import plots
 from spikecam_env.gap.screen.templates import load
-from spikecam_env.gap.search.forward import search
+from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.sensor import Effect, SensorModel
@@ -133,7 +133,7 @@ def ladder(
         left.pop(best)
     bar.close()
     if rings(null, values_to_fit(case, null, values)):
-        rounds = search(Problem.of(case, full, null, values), names, load())
+        rounds = forward_selection(Problem.of(case, full, null, values), names, load())
         for was, now in itertools.pairwise(rounds):
             if now.model is not was.model:
                 fit = was.fits[0]

@@ -63,7 +63,7 @@ CAMPAIGNS_PER_EFFECT = 16
 those before it."""
 
 
-def search(problem: Problem, names: Sequence[str], templates: Templates) -> list[Round]:
+def forward_selection(problem: Problem, names: Sequence[str], templates: Templates) -> list[Round]:
     """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps.
 
     problem: the model as given.  names: of the candidates.  Recordings held out decide between rivals, and give

@@ -41,7 +41,7 @@ def drawn_banks(
     fitted = model
     for _ in range(2):
         fitted = _rescaled(fitted, model, base, shape, seed)
-    return [_bank(fitted, base, shown, shape, seed + n) for n in range(count)]
+    return [_pattern_statistics(fitted, base, shown, shape, seed + n) for n in range(count)]
 
 
 def _rescaled(
@@ -88,7 +88,7 @@ def drawn_response(model: SensorModel, base: BaseFit, shape: tuple[int, int], se
     return gain, dark
 
 
-def _bank(
+def _pattern_statistics(
     model: SensorModel, base: BaseFit, shown: Sequence[Shown], shape: tuple[int, int], seed: int
 ) -> dict[Key, float]:
     gain, dark = drawn_response(model, base, shape, seed)

@@ -15,7 +15,7 @@ from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.streams import pack_frames
 
-_BLOCK = 1024
+_BLOCK_FRAMES = 1024
 
 FIRST_SEED = 17
 """Seed of a campaign's first twin; the others' follow."""
@@ -50,10 +50,10 @@ def expose(
     light = condition.light
     assert light is not None
     picture: Keyframes | NDArray[np.float32] = light.radiance[0] if not condition.moves else light
-    spikes = np.empty((min(_BLOCK, condition.frames), *shape), np.uint8)
+    spikes = np.empty((min(_BLOCK_FRAMES, condition.frames), *shape), np.uint8)
     parts = []
-    for first in range(0, condition.frames, _BLOCK):
-        frames = min(_BLOCK, condition.frames - first)
+    for first in range(0, condition.frames, _BLOCK_FRAMES):
+        frames = min(_BLOCK_FRAMES, condition.frames - first)
         parts.append(pack_frames(sensor.step(picture, frames, out=spikes[:frames])))
     return np.concatenate(parts)
 

@@ -10,7 +10,7 @@ from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import load
 from spikecam_env.gap.search.cancelling_pair import PAIR, fit_pair
-from spikecam_env.gap.search.forward import search
+from spikecam_env.gap.search.forward import forward_selection
 
 TAU_US = 2.0
 CANCELLING = (effect("dead_time", tau_us=TAU_US), effect("photo_response_nonlinearity", beta=-TAU_US / 25.0))
@@ -35,7 +35,7 @@ def test_search_finds_them_together():
     case = recorded(*CANCELLING)
     null = model_null(case, MODEL, TWINS)
     values = values_of(case.bank, null.keys)
-    rounds = search(Problem.of(case, MODEL, null, values), [*PAIR, "comparator_delay", "ir_drop"], load())
+    rounds = forward_selection(Problem.of(case, MODEL, null, values), [*PAIR, "comparator_delay", "ir_drop"], load())
     print([r.fits[0].name for r in rounds if r.fits], rounds[-1].model.effects[-2:])
     assert [r.fits[0].name for r in rounds[:-1]] == list(PAIR)
     there = {e.name: e.parameters() for e in rounds[-1].model.effects}
@@ -47,5 +47,5 @@ def test_one_bend_alone_is_found_alone():
     case = recorded(effect("photo_response_nonlinearity", beta=0.02))
     null = model_null(case, MODEL, TWINS)
     values = values_of(case.bank, null.keys)
-    rounds = search(Problem.of(case, MODEL, null, values), [*PAIR], load())
+    rounds = forward_selection(Problem.of(case, MODEL, null, values), [*PAIR], load())
     assert len([r for r in rounds if r.fits]) == 1 and rounds[0].fits[0].name in PAIR

@@ -393,7 +393,7 @@ def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, 
     monkeypatch.setattr(search, "with_candidates", lambda *given: replace(given[-1], fits=(found,)))
     monkeypatch.setattr(search, "joined", polished)
     monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
-    rounds = search.search(Problem.of(case, MODEL, n, values), [], None)
+    rounds = search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
     assert rounds[-1].model is (found.model if keeps else MODEL)
 
 
@@ -416,7 +416,7 @@ def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int,
     monkeypatch.setattr(search, "is_significant", lambda *_: True)
     monkeypatch.setattr(search, "is_small_share", lambda *_: False)
     monkeypatch.setattr(search, "CAMPAIGNS_PER_EFFECT", 17)
-    search.search(Problem.of(case, MODEL, n, values), [], None)
+    search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
     assert len(asked) == 1 + begun and case.budget.left_out == ([] if begun else ["a second effect"])
 
 
@@ -474,4 +474,4 @@ def test_three_effects_are_looked_for_at_most(monkeypatch):
     monkeypatch.setattr(search, "joined", lambda _problem, rounds, _chance: list(rounds))
     monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
     case = OfAll(budget=Budget(), conditions=())
-    assert len(search.search(Problem.of(case, MODEL, n, values), [], None)) == 3 + 1
+    assert len(search.forward_selection(Problem.of(case, MODEL, n, values), [], None)) == 3 + 1
