@@ -1,4 +1,4 @@
-"""Whether statistics go with the strength of an effect as far as `candidates.strength.AS_LOUD` takes them to.
+"""Whether statistics go with the strength of an effect as far as `candidates.strength.TARGET_SIZE` takes them to.
 
     python -m benchmarks.in_proportion [PRESET ...]      by default scsim and physical, whose noise is smaller
 

@@ -58,7 +58,7 @@ def share_beyond(t: Array, apart: Array) -> Array:
 
 def freedom_of(null: Null, predicted: Prediction) -> Array:
     """(S,) degrees of freedom of a prediction's spread (Welch and Satterthwaite): what is the null's has its own, what
-    an effect's twins scatter beyond has those of few twins, `halved`, or of the drawn units.
+    an effect's twins scatter beyond has those of few twins, `half_pooled`, or of the drawn units.
 
     How much they scatter beyond, all statistics of a group say: one that happened to scatter little has no more.
     """
