@@ -28,16 +28,16 @@ from spikecam_env.cli.table import table
 from spikecam_env.gap import Bars, Dark, Flat, Step
 from spikecam_env.gap.baseline.alarm import is_discrepant
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.candidates.strength import bounded, may_be_negative, with_effect
-from spikecam_env.gap.candidates.table import chosen, testable
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import candidate, chosen, testable
 from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.fit.problem import values_to_fit
 from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import Templates, shipped_templates
-from spikecam_env.gap.search.forward import of_fit
 from spikecam_env.gap.twins.case import Case, case_of
-from spikecam_env.gap.twins.simulate import at_any_phase
+from spikecam_env.gap.twins.simulate import with_random_phases
 from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
@@ -66,7 +66,7 @@ def recorded(model: SensorModel, camera: int) -> Case:
     conditions = planned_conditions(DESIGN, SHAPE, FRAMES)
     seen = []
     for take, c in enumerate(conditions):
-        sensor = SpikeSensor(at_any_phase(model, camera, take), SHAPE, seed=camera, take=take, threads=1)
+        sensor = SpikeSensor(with_random_phases(model, camera, take), SHAPE, seed=camera, take=take, threads=1)
         assert c.light is not None
         spikes = sensor.step(c.light if c.moves else c.light.radiance[0], FRAMES)
         seen.append(observe(pack_frames(spikes), SHAPE, film=c.moves))
@@ -89,11 +89,11 @@ def stated() -> list[Bound]:
 
 def trial(bound: Bound, number: int) -> Trial:
     """One campaign of a camera that has the effect at its bound; of either sign, in every second one the other."""
-    sign = -1 if number % 2 and may_be_negative(bound.name) else 1
+    sign = -1 if number % 2 and candidate(bound.name).may_be_negative else 1
     hidden = bounded(bound.name, {**bound.at, bound.parameter: sign * bound.below})
     case = recorded(with_effect(MODEL, bound.name, hidden), CAMERA + number)
     null, values = judged(case)
-    alarm = is_discrepant(null, values) or is_discrepant(null, of_fit(case, null, values))
+    alarm = is_discrepant(null, values) or is_discrepant(null, values_to_fit(case, null, values))
     found, _ = bounds(case, MODEL, null, values, [bound.name], _of_shape(bound))
     return Trial(bound.name, number, found[0].below if found else None, alarm)
 

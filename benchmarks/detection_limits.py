@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.acquisition.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
-from spikecam_env.gap.candidates.table import candidate, is_pattern
-from spikecam_env.gap.fit.candidate import with_pattern
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.fit.predict import with_drawn_pattern
 from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.statistics import Key
@@ -45,7 +45,7 @@ def measured() -> dict[str, float]:
         strength = abs(entry.parameters[CATALOGUE[entry.name].strength])
         by_name.setdefault(entry.name, []).append(strength * (CLEAR / peak) ** power)
     limits = {name: float(np.median(values)) for name, values in by_name.items() if name in HIDDEN}
-    limits |= of_pattern([name for name in limits if is_pattern(name)], limits)
+    limits |= of_pattern([name for name in limits if candidate(name).is_pattern], limits)
     return limits | {"excess_threshold_noise": of_a_reset()}
 
 
@@ -72,7 +72,7 @@ def of_pattern(names: list[str], near: dict[str, float]) -> dict[str, float]:
         key = CATALOGUE[name].strength
         for strength in near[name] * np.geomspace(0.02, 5.0, 60):
             tried = with_effect(model, name, bounded(name, {key: strength}))
-            shift = ((with_pattern(case, tried, null, null.prediction).mean - null.mean) / null.noise)[told]
+            shift = ((with_drawn_pattern(case, tried, null, null.prediction).mean - null.mean) / null.noise)[told]
             found[name] = float(strength)
             if np.abs(shift).max() > CLEAR:
                 break

@@ -1,4 +1,4 @@
-"""Whether statistics go with the strength of an effect as far as `candidates.strength.AS_LOUD` takes them to.
+"""Whether statistics go with the strength of an effect as far as `candidates.strength.TARGET_SIZE` takes them to.
 
     python -m benchmarks.in_proportion [PRESET ...]      by default scsim and physical, whose noise is smaller
 
@@ -14,10 +14,10 @@ import sys
 
 import numpy as np
 
-from spikecam_env.gap.candidates.strength import bounded, is_linear, with_effect
-from spikecam_env.gap.candidates.table import CANDIDATES, candidate, is_pattern
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import CANDIDATES, candidate
 from spikecam_env.gap.compare.prediction import TOLERANCE
-from spikecam_env.gap.fit.candidate import predict
+from spikecam_env.gap.fit.predict import predict_by_twins
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
 from spikecam_env.gap.unit.refit import constrained_refit
@@ -34,8 +34,12 @@ def report(preset: str) -> None:
     told = [case.use(k.recording) == "fit" for k in templates.keys]
     base = constrained_refit(model, case.base)
     has = {e.name for e in model.effects}
-    names = [n for n in CANDIDATES if candidate(n).power == 1.0 and not (candidate(n).wanders or is_pattern(n))]
-    for name in sorted((n for n in names if n not in has), key=lambda n: not is_linear(n)):
+    names = [
+        n
+        for n in CANDIDATES
+        if candidate(n).power == 1.0 and not (candidate(n).random_course or candidate(n).is_pattern)
+    ]
+    for name in sorted((n for n in names if n not in has), key=lambda n: not candidate(n).is_linear):
         entries = [e for e in templates.entries if e.name == name]
         if not entries:
             continue
@@ -45,7 +49,7 @@ def report(preset: str) -> None:
         change = []
         for strength in (one, MOST_EXTRAPOLATED * one):
             there = with_effect(model, name, bounded(name, {**entry.parameters, key: strength}))
-            made = predict(case, there, constrained_refit(there, base), null, TWINS)
+            made = predict_by_twins(case, there, constrained_refit(there, base), null, TWINS)
             change.append((made.mean - null.mean) / null.noise * one / strength)
         weak, scaled = change
         wrong = np.maximum(np.abs(scaled - weak) - TOLERANCE * np.abs(weak), 0.0)
@@ -54,7 +58,7 @@ def report(preset: str) -> None:
         print(
             f"{preset:8s} {name:28s} of the effect {np.corrcoef(weak, scaled)[0, 1]:.3f}   worst {wrong[at]:5.1f}: "
             f"{weak[at]:.1f} taken for {scaled[at]:.1f} ({k.group} {k.recording} {k.name})"
-            f"{'' if is_linear(name) else '   mixed'}",
+            f"{'' if candidate(name).is_linear else '   mixed'}",
             flush=True,
         )
 

@@ -1,4 +1,4 @@
-"""How much noise is left of two twins of the same draws, one with an effect and one without: `prediction.PAIRED`.
+"""How much noise is left of two twins of the same draws, one with an effect and one without: `prediction.PAIR_NOISE`.
 
     python -m benchmarks.paired_twins
 

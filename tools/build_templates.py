@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from spikecam_env.errors import unknown_name
 from spikecam_env.gap.candidates.strength import bounded, with_effect
-from spikecam_env.gap.candidates.table import is_pattern
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.fit.simulated_templates import simulated_shift, simulated_template, template_parameters
 from spikecam_env.gap.screen import templates as screened
@@ -70,7 +70,7 @@ def severe_template(
 ) -> Template:
     """A candidate's template where the unit's own refit is biased: its campaign as if it were a measurement."""
     there = with_effect(model, name, parameters)
-    if is_pattern(name):
+    if candidate(name).is_pattern:
         return Template(name, dict(parameters), simulated_shift(case, model, null, name, parameters), times)
     seed = case.seed * 1000 + 7
     made = simulate(there, constrained_refit(there, case.base), case.conditions, case.shape, seed)

@@ -26,6 +26,7 @@ from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
 from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.prediction import values_of
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
@@ -33,8 +34,9 @@ from spikecam_env.gap.report.evidence import evidence_for
 from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
 from spikecam_env.gap.screen.templates import Templates, shipped_templates
-from spikecam_env.gap.search.forward import Round, search
-from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
+from spikecam_env.gap.search.forward import forward_selection
+from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import in_nominal_units, label_unit_note, nominal_per_label
@@ -144,7 +146,7 @@ def of_spikes(
     if comparison.disagrees:
         with stages.timed("candidates"):
             templates = templates or templates_for(comparison)
-            rounds = search(case, comparison.model, null, values, comparison.names, templates)
+            rounds = forward_selection(Problem.of(case, comparison.model, null, values), comparison.names, templates)
             rounds = with_stand_ins(case, null, values, rounds)
     with stages.timed("verdict"):
         conclusion = conclude(comparison, rounds, floor_of_halves(case, measured.recordings, null))
@@ -157,8 +159,8 @@ def of_spikes(
             bounded, not_bounded = bounds(
                 case, comparison.model, null, values, comparison.names, templates or shipped_templates()
             )
-    notes += unfinished(case.effort)
-    return Findings(conclusion, evidence, tuple(bounded), tuple(not_bounded), tuple(notes), case.effort.simulated)
+    notes += unfinished(case.budget)
+    return Findings(conclusion, evidence, tuple(bounded), tuple(not_bounded), tuple(notes), case.budget.simulated)
 
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
@@ -200,7 +202,7 @@ def comparison_of(case: Case, tested: SensorModel, asked: Asked, stages: Stages)
     with stages.timed("audit"):
         contradictions = upheld(case, tested, audit(case))
         case = trimmed(case, contradictions)
-        case = replace(case, effort=Effort(asked.effort * len(case.conditions), settled=bool(contradictions)))
+        case = replace(case, budget=Budget(asked.effort * len(case.conditions), verdict_known=bool(contradictions)))
     names, not_testable = testable(asked.names, case.conditions)
     lacking = missing_effects(case, tested, names)
     model = with_missing(tested, lacking)

@@ -27,12 +27,13 @@ from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import read_case
+from spikecam_env.gap.fit.problem import Problem, values_to_fit
 from spikecam_env.gap.report import plots
 from spikecam_env.gap.report.quantities import quantity
 from spikecam_env.gap.report.words import human, parameter_unit
 from spikecam_env.gap.result import SIGNIFICANT
 from spikecam_env.gap.screen.templates import shipped_templates
-from spikecam_env.gap.search.forward import of_fit, search
+from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import label_unit_note
@@ -176,10 +177,12 @@ def climbed(judge: Judge, first: SensorModel, lacking: Sequence[Missing], progre
 def searched(judge: Judge, model: SensorModel, names: Sequence[str]) -> list[Rung]:
     """Rungs of effects that a search adds to a model, where that still differs from the recordings to fit."""
     case, null, values = judge.case, judge.null, judge.values
-    if not is_discrepant(null, of_fit(case, null, values)):
+    if not is_discrepant(null, values_to_fit(case, null, values)):
         return []
     rungs = []
-    for was, now in itertools.pairwise(search(case, model, null, values, names, shipped_templates())):
+    for was, now in itertools.pairwise(
+        forward_selection(Problem.of(case, model, null, values), names, shipped_templates())
+    ):
         if now.model is not was.model:
             fit = was.fits[0]
             effect = next(e for e in now.model.effects if e.name == fit.name)

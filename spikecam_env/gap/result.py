@@ -150,8 +150,8 @@ class Evidence:
     """What the report draws: conditions and observations of the measurement, and of one twin before and after.
 
     again: another twin of the model before, with another seed: what chance alone makes differ.
-    drawn_before, drawn_after: gain and dark (P,) of a fresh unit of each model (`fresh_units.drawn`): the fixed pattern
-    to expect, where twins have the measured one.  light: the name of the axis of light.
+    drawn_before, drawn_after: gain and dark (P,) of a fresh unit of each model (`fresh_units.drawn_response`): the
+    fixed pattern to expect, where twins have the measured one.  light: the name of the axis of light.
     """
 
     conditions: tuple[Condition, ...]

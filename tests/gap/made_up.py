@@ -10,7 +10,7 @@ import numpy as np
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
-from spikecam_env.gap.twins.fresh_units import drawn
+from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.unit.refit import free_refit
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
@@ -71,7 +71,7 @@ def evidence(effect: str | None, *, named: bool = True) -> Evidence:
     shown = conditions()
     streams = [recorded(effect, 0), recorded(None, 1), recorded(effect, 2) if named and effect else None]
     bases = [free_refit(list(s), list(shown)) if s else None for s in streams]
-    fresh = drawn(MODEL, bases[0], SHAPE, seed=11)  # type: ignore[arg-type]
+    fresh = drawn_response(MODEL, bases[0], SHAPE, seed=11)  # type: ignore[arg-type]
     return Evidence(
         shown, *streams, *bases, again=recorded(None, 3), drawn_before=fresh, drawn_after=fresh if streams[2] else None
     )  # type: ignore[arg-type]

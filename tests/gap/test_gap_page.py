@@ -29,8 +29,8 @@ def test_every_block_of_python_on_the_page_runs(tmp_path, monkeypatch):
     there = {"__name__": __name__}
     exec(effect, there)
     assert there["SlowShutter"]().tau_us == 500.0
-    known = eval("{" + line + "}", {**vars(candidates)})
-    assert known["slow_shutter"].fitted == ("tau_us",) and "slow_shutter" not in CATALOGUE
+    [known] = eval("[" + line + "]", {**vars(candidates)})
+    assert (known.name, known.fitted) == ("slow_shutter", ("tau_us",)) and "slow_shutter" not in CATALOGUE
 
 
 @pytest.mark.parametrize("name", ["diagnose", "ladder"])

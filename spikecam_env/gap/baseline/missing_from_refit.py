@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.twins.case import Case, rests_on, twins
+from spikecam_env.gap.twins.case import Case, refit_recordings, twins
 from spikecam_env.gap.twins.fresh_units import width
 from spikecam_env.gap.unit.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common_level, constrained_refit
 from spikecam_env.robust import scatter
@@ -117,7 +117,8 @@ def with_missing(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
 
 def is_noise(case: Case, model: SensorModel) -> bool:
     """Whether the refit's s^2 is above that of twins of a model without noise: of equal pixels 3e-7, at some lights."""
-    made = twins(case, model, constrained_refit(model, case.base), range(NOISELESS_TWINS), sorted(rests_on(case)))
+    base = constrained_refit(model, case.base)
+    made = twins(case, model, base, range(NOISELESS_TWINS), sorted(refit_recordings(case)))
     white = np.array([t.base.white for t in made if t.base is not None])
     return bool(case.base.white > white.mean() + NOISE_EXCESS * white.std(ddof=1))
 

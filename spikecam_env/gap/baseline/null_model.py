@@ -13,7 +13,7 @@ from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, twins
-from spikecam_env.gap.twins.fresh_units import UNITS, drawn_banks
+from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS, drawn_banks
 from spikecam_env.gap.unit.indirect_inference import inferred_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
@@ -25,7 +25,7 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
     """The prediction of `count` twins, and of twice as many for recordings in motion: each of their statistics is of
     one recording alone, so that no other one pools its variance (`pooled_variance`)."""
     base = unit_under(case, model)
-    drawn = drawn_banks(model, case.base, case.conditions, case.shape, UNITS, case.seed)
+    drawn = drawn_banks(model, case.base, case.conditions, case.shape, DRAWN_UNITS, case.seed)
     made = twins(case, model, base, range(count))
     banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]
     null = null_of(banks, list(case.bank), [t.base for t in made if t.base])
@@ -38,8 +38,8 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         null,
         mean=np.where(of_pattern, values.mean(axis=0), null.mean),
         sd=np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
-        freedom=np.where(of_pattern, UNITS - 1, null.freedom),
-        twins=np.where(of_pattern, UNITS, null.twins),
+        freedom=np.where(of_pattern, DRAWN_UNITS - 1, null.freedom),
+        twins=np.where(of_pattern, DRAWN_UNITS, null.twins),
         weight=np.where(of_pattern, 1.0 / recordings_per_statistic(null.keys, case.conditions), 1.0),
     )
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.twins.fresh_units import SPREADS, spread_factor, width
+from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS, spread_factor, width
 from spikecam_env.gap.unit.refit import NOISE, BaseFit
 from spikecam_env.gap.unit.usual import USUAL_NOISE, unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -53,7 +53,7 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
     if "dark_current" in has and unusual(level):
         ratios["dark_current"] = level
     for what, usual in (("gain", 1.0), ("dark", level)):
-        spreads = has.keys() & SPREADS[what].keys()
+        spreads = has.keys() & SPREAD_PARAMETERS[what].keys()
         values = getattr(base, what)
         if spreads and unusual(width(values[live]) / max(width(getattr(unit, what)), 1e-12)):
             factor = spread_factor(model, what, width(values[live]), shape, 0)

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from spikecam_env.gap.candidates.table import candidate, is_pattern
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import build
 
-AS_LOUD = 60.0
+TARGET_SIZE = 60.0
 """Noises that a weak effect is simulated to show at best, MOST_EXTRAPOLATED times as strong at most.  Scaled down, what
 twins scatter by chance is scaled with it: four times as strong is as good as sixteen times as many."""
 
@@ -33,23 +33,10 @@ def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
     return out
 
 
-def may_be_negative(name: str) -> bool:
-    strength = CATALOGUE[name].strength
-    bounds = CATALOGUE[name].__dataclass_fields__[strength].metadata["bounds"]
-    return bool(bounds and bounds[0] < 0)
-
-
-def is_linear(name: str) -> bool:
-    """Whether statistics go in proportion to an effect's strength for long: noise goes by its square, and its bands and
-    lateness are logarithms, which are not."""
-    what = candidate(name)
-    return what.power == 1.0 and not (what.mixed or what.wanders or is_pattern(name))
-
-
-def as_loud(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
-    """(parameters, times as much) of an effect that shows by `size` noises: a weak one is made to show by AS_LOUD."""
-    strength = candidate(name).fitted[0]
-    linear = is_linear(name) and parameters[strength] != 0
-    times = float(np.clip(AS_LOUD / max(size, 1e-9), 1.0, MOST_EXTRAPOLATED)) if linear else 1.0
-    louder = bounded(name, {**parameters, strength: parameters[strength] * times})
-    return louder, louder[strength] / parameters[strength] if times > 1.0 else 1.0
+def amplified(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
+    """(parameters, times as much) of an effect that shows by `size` noises: a weak one is amplified to TARGET_SIZE."""
+    strength = candidate(name).strength
+    linear = candidate(name).is_linear and parameters[strength] != 0
+    times = float(np.clip(TARGET_SIZE / max(size, 1e-9), 1.0, MOST_EXTRAPOLATED)) if linear else 1.0
+    stronger = bounded(name, {**parameters, strength: parameters[strength] * times})
+    return stronger, stronger[strength] / parameters[strength] if times > 1.0 else 1.0

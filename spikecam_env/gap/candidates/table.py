@@ -13,6 +13,9 @@ from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 
 Needs = Callable[[Sequence[Condition]], "str | None"]
 
+BENDING = ("saturation", "reset")
+"""Families of what bends the rate curve."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -22,15 +25,17 @@ class Candidate:
     shapes: values of other parameters to start from.  square: statistics go with the square of the strength.
     mixed: some statistics go with the strength, others with its square.
     only_contrast: it changes nothing in light that is steady and uniform.
-    wanders: its course in time is drawn anew every time, so that statistics scatter, each way alike.
+    random_course: its course in time is drawn anew every time, so that it changes no mean, but how statistics scatter.
     events: it is single events, few enough for one twin to have many more or less of them than another.
-    strikes: it is in a few pixels, others in every twin: one takes where they lie for a sign of it.
+    few_pixels: it is in a few pixels, others in every twin: one takes where they lie for a sign of it.
     share: the parameter that is a share of what can be counted, and of what: pixels, spikes, or frames of pixels.
-    nudge: step of a shape's logarithm to take a derivative by: a time constant needs a long one, to show above what
-    twins scatter; a level of light from which something begins leads elsewhere by it.
-    needs: says what recordings are lacking to see it, or None.  experiment: what would tell it from its twins.
+    shape_step: step of a shape's logarithm to take a derivative by: a time constant needs a long one, to show above
+    what twins scatter; a level of light from which something begins leads elsewhere by it.
+    needs: says what recordings are lacking to see it, or None.
+    experiment: what would distinguish it from others that do the same.
     """
 
+    name: str
     family: str
     fitted: tuple[str, ...]
     shapes: dict[str, tuple[float, ...]] = field(default_factory=dict)
@@ -38,17 +43,55 @@ class Candidate:
     mixed: bool = False
     needs: Needs = lambda shown: None
     only_contrast: bool = False
-    wanders: bool = False
+    random_course: bool = False
     events: bool = False
-    strikes: bool = False
+    few_pixels: bool = False
     share: tuple[str, str] | None = None
-    nudge: float = -0.5
+    shape_step: float = -0.5
     experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
+
+    @property
+    def strength(self) -> str:
+        """The parameter that is its strength."""
+        return self.fitted[0]
 
     @property
     def power(self) -> float:
         """Of the strength, that statistics are in proportion to: events are counted, on a scale of roots."""
         return 2.0 if self.square else 0.5 if self.events else 1.0
+
+    @property
+    def is_pattern(self) -> bool:
+        """Whether it changes nothing but the fixed pattern, so that drawing units is simulating it."""
+        effect: type[Effect] = CATALOGUE[self.name]
+        return effect.is_fixed() and not effect.overrides("image") and self.name not in NOISE_OF_A_RESET
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether statistics go in proportion to its strength for long: noise goes by its square, and its bands and
+        lateness are logarithms, which are not."""
+        return self.power == 1.0 and not (self.mixed or self.random_course or self.is_pattern)
+
+    @property
+    def of_motion(self) -> bool:
+        """Whether it shows by contrast or change alone, so that how depends on the very picture."""
+        return self.needs in (_moving, _edges, _bright)
+
+    @property
+    def may_be_negative(self) -> bool:
+        """Whether its strength may be."""
+        bounds = CATALOGUE[self.name].__dataclass_fields__[CATALOGUE[self.name].strength].metadata["bounds"]
+        return bool(bounds and bounds[0] < 0)
+
+    @property
+    def has_shapes(self) -> bool:
+        """Whether more is fitted of it, by simulation, than its strength."""
+        return len(self.fitted) > 1 and not self.is_pattern and not self.random_course
+
+    @property
+    def bends_response(self) -> bool:
+        """Whether it bends the rate curve: beside one that does, others that do fit in its error."""
+        return self.family in BENDING
 
 
 def _moving(shown: Sequence[Condition]) -> str | None:
@@ -88,69 +131,76 @@ def _even(shown: Sequence[Condition]) -> str | None:
 
 
 _FIELD = "flats at several levels beside a picture with bright and dark rows"
-_SECOND = "flats at a second V_d"
+_SECOND_V_D = "flats at a second V_d"
 
-CANDIDATES: dict[str, Candidate] = {
-    "dead_time": Candidate("saturation", ("tau_us",), needs=_levels),
-    "comparator_delay": Candidate("saturation", ("delay_us",), needs=_levels),
-    "photo_response_nonlinearity": Candidate("saturation", ("beta",), needs=_levels),
-    "ir_drop": Candidate("saturation", ("droop",), needs=_levels, experiment=_FIELD),
-    "synchronous_reset": Candidate("reset", ("fraction",), needs=_steady),
-    "incomplete_reset": Candidate("reset", ("fraction", "tau_us"), {"tau_us": (50.0, 250.0, 1250.0)}, needs=_levels),
-    "photodiode_lag": Candidate(
-        "lag", ("fraction", "tau_us"), {"tau_us": (150.0, 600.0, 2500.0, 10000.0)}, needs=_moving, only_contrast=True
+_ALL = (
+    Candidate("dead_time", "saturation", ("tau_us",), needs=_levels),
+    Candidate("comparator_delay", "saturation", ("delay_us",), needs=_levels),
+    Candidate("photo_response_nonlinearity", "saturation", ("beta",), needs=_levels),
+    Candidate("ir_drop", "saturation", ("droop",), needs=_levels, experiment=_FIELD),
+    Candidate("synchronous_reset", "reset", ("fraction",), needs=_steady),
+    Candidate("incomplete_reset", "reset", ("fraction", "tau_us"), {"tau_us": (50.0, 250.0, 1250.0)}, needs=_levels),
+    Candidate(
+        "photodiode_lag",
+        "lag",
+        ("fraction", "tau_us"),
+        {"tau_us": (150.0, 600.0, 2500.0, 10000.0)},
+        needs=_moving,
+        only_contrast=True,
     ),
-    "light_flicker": Candidate(
-        "light", ("modulation",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
+    Candidate(
+        "light_flicker", "light", ("modulation",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
     ),
-    "lamp_drift": Candidate("light", ("sigma_per_root_s",), square=True, needs=_steady, wanders=True),
-    "supply_ripple": Candidate(
-        "common", ("ripple",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
+    Candidate("lamp_drift", "light", ("sigma_per_root_s",), square=True, needs=_steady, random_course=True),
+    Candidate(
+        "supply_ripple", "common", ("ripple",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
     ),
-    "common_threshold_noise": Candidate("common", ("sigma_mV",), square=True, needs=_steady),
-    "clock_jitter": Candidate("common", ("sigma_ns",), square=True, needs=_steady),
-    "row_temporal_noise": Candidate("common", ("sigma_mV",), square=True, needs=_steady),
-    "threshold_flicker_noise": Candidate("noise", ("sigma_mV",), square=True, needs=_steady),
-    "frame_threshold_noise": Candidate("noise", ("sigma_mV",), square=True, needs=_steady),
-    "excess_threshold_noise": Candidate("noise", ("sigma_mV",), square=True, needs=_steady),
-    "reset_noise": Candidate("noise", ("sigma_mV",), square=True, needs=_steady, experiment=_SECOND),
-    "shot_noise": Candidate("noise", ("quanta",), needs=_steady, experiment=_SECOND),
-    "random_telegraph_noise": Candidate(
+    Candidate("common_threshold_noise", "common", ("sigma_mV",), square=True, needs=_steady),
+    Candidate("clock_jitter", "common", ("sigma_ns",), square=True, needs=_steady),
+    Candidate("row_temporal_noise", "common", ("sigma_mV",), square=True, needs=_steady),
+    Candidate("threshold_flicker_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
+    Candidate("frame_threshold_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
+    Candidate("excess_threshold_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
+    Candidate("reset_noise", "noise", ("sigma_mV",), square=True, needs=_steady, experiment=_SECOND_V_D),
+    Candidate("shot_noise", "noise", ("quanta",), needs=_steady, experiment=_SECOND_V_D),
+    Candidate(
+        "random_telegraph_noise",
         "dark",
         ("amplitude_pA", "fraction", "dwell_ms"),
         {"dwell_ms": (0.5, 3.0, 20.0)},
         square=True,
-        strikes=True,
+        few_pixels=True,
         share=("fraction", "pixels"),
         needs=_steady,
     ),
-    "dark_current_drift": Candidate(
-        "dark", ("rise", "tau_ms"), {"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=_dark
+    Candidate(
+        "dark_current_drift", "dark", ("rise", "tau_ms"), {"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=_dark
     ),
-    "dark_current": Candidate("dark", ("mean_pA",), needs=_dark),
-    "dark_current_spread": Candidate("dark", ("sigma_pA",), needs=_dark),
-    "dark_current_tail": Candidate("dark", ("sigma",), needs=_dark),
-    "hot_pixels": Candidate(
-        "dark", ("fraction", "mean_pA"), {"mean_pA": (3.0,)}, share=("fraction", "pixels"), needs=_dark
+    Candidate("dark_current", "dark", ("mean_pA",), needs=_dark),
+    Candidate("dark_current_spread", "dark", ("sigma_pA",), needs=_dark),
+    Candidate("dark_current_tail", "dark", ("sigma",), needs=_dark),
+    Candidate(
+        "hot_pixels", "dark", ("fraction", "mean_pA"), {"mean_pA": (3.0,)}, share=("fraction", "pixels"), needs=_dark
     ),
-    "dead_pixels": Candidate("defects", ("fraction",), share=("fraction", "pixels"), needs=_even),
-    "conversion_gain_spread": Candidate("pattern", ("sigma",), needs=_even),
-    "capacitor_spread": Candidate("pattern", ("sigma_fF",), needs=_even, experiment=_SECOND),
-    "bias_voltage_spread": Candidate("pattern", ("sigma_V",), needs=_even, experiment=_SECOND),
-    "row_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_even),
-    "column_fixed_pattern": Candidate("pattern", ("sigma_mV",), needs=_even),
-    "vignetting": Candidate("optics", ("falloff",), needs=_even),
-    "optical_blur": Candidate("optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
-    "crosstalk": Candidate("coupling", ("kick",), mixed=True, needs=_steady),
-    "blooming": Candidate("coupling", ("share", "full"), {"full": (0.75, 0.85, 1.0)}, needs=_bright, nudge=-0.1),
-    "readout_skew": Candidate("readout", ("span",), needs=_moving, only_contrast=True),
-    "missed_spikes": Candidate(
-        "readout", ("probability",), share=("probability", "spikes"), needs=_steady, events=True
+    Candidate("dead_pixels", "defects", ("fraction",), share=("fraction", "pixels"), needs=_even),
+    Candidate("conversion_gain_spread", "pattern", ("sigma",), needs=_even),
+    Candidate("capacitor_spread", "pattern", ("sigma_fF",), needs=_even, experiment=_SECOND_V_D),
+    Candidate("bias_voltage_spread", "pattern", ("sigma_V",), needs=_even, experiment=_SECOND_V_D),
+    Candidate("row_fixed_pattern", "pattern", ("sigma_mV",), needs=_even),
+    Candidate("column_fixed_pattern", "pattern", ("sigma_mV",), needs=_even),
+    Candidate("vignetting", "optics", ("falloff",), needs=_even),
+    Candidate("optical_blur", "optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
+    Candidate("crosstalk", "coupling", ("kick",), mixed=True, needs=_steady),
+    Candidate("blooming", "coupling", ("share", "full"), {"full": (0.75, 0.85, 1.0)}, needs=_bright, shape_step=-0.1),
+    Candidate("readout_skew", "readout", ("span",), needs=_moving, only_contrast=True),
+    Candidate(
+        "missed_spikes", "readout", ("probability",), share=("probability", "spikes"), needs=_steady, events=True
     ),
-    "spurious_spikes": Candidate(
-        "readout", ("probability",), share=("probability", "frames"), needs=_steady, events=True
+    Candidate(
+        "spurious_spikes", "readout", ("probability",), share=("probability", "frames"), needs=_steady, events=True
     ),
-    "afterpulsing": Candidate(
+    Candidate(
+        "afterpulsing",
         "readout",
         ("probability",),
         {"delay_frames": (1, 2, 3, 4, 6)},
@@ -158,7 +208,9 @@ CANDIDATES: dict[str, Candidate] = {
         needs=_steady,
         events=True,
     ),
-}
+)
+
+CANDIDATES: dict[str, Candidate] = {c.name: c for c in _ALL}
 
 NOISE_OF_A_RESET = ("reset_noise", "excess_threshold_noise", "shot_noise")
 """White noise of a spike: one number, s^2, whatever it is called; a second V_d splits it."""
@@ -166,7 +218,34 @@ NOISE_OF_A_RESET = ("reset_noise", "excess_threshold_noise", "shot_noise")
 
 def candidate(name: str) -> Candidate:
     """What is known of an effect; one of a user's own is fitted by its strength alone."""
-    return CANDIDATES.get(name) or Candidate("other", (CATALOGUE[name].strength,))
+    return CANDIDATES.get(name) or Candidate(name, "other", (CATALOGUE[name].strength,))
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Several effects at once, asked for what all or any of them are."""
+
+    names: tuple[str, ...]
+
+    @property
+    def each(self) -> tuple[Candidate, ...]:
+        """What is known of each."""
+        return tuple(candidate(name) for name in self.names)
+
+    @property
+    def any_pattern(self) -> bool:
+        """Whether drawn units are to say what one of them does."""
+        return any(c.is_pattern for c in self.each)
+
+    @property
+    def all_pattern(self) -> bool:
+        """Whether none of them changes anything but the fixed pattern."""
+        return all(c.is_pattern for c in self.each)
+
+    @property
+    def only_contrast(self) -> bool:
+        """Whether none of them changes anything in light that is steady and uniform."""
+        return all(c.only_contrast for c in self.each)
 
 
 def expected_events(
@@ -177,22 +256,11 @@ def expected_events(
     share = candidate(name).share
     if share is None:
         return math.inf
-    told = [o for c, o in zip(shown, seen, strict=True) if c.use == "fit" and not c.moves]
-    pixels = max((o.times.count.size for o in told), default=0)
-    spikes = float(sum(o.times.count.sum() for o in told))
-    of = {"pixels": pixels, "spikes": spikes, "frames": sum(pixels * o.frames for o in told) - spikes}
+    steady = [o for c, o in zip(shown, seen, strict=True) if c.use == "fit" and not c.moves]
+    pixels = max((o.times.count.size for o in steady), default=0)
+    spikes = float(sum(o.times.count.sum() for o in steady))
+    of = {"pixels": pixels, "spikes": spikes, "frames": sum(pixels * o.frames for o in steady) - spikes}
     return parameters[share[0]] * of[share[1]]
-
-
-def is_pattern(name: str) -> bool:
-    """Whether an effect changes nothing but the fixed pattern, so that drawing units is simulating it."""
-    effect: type[Effect] = CATALOGUE[name]
-    return effect.is_fixed() and not effect.overrides("image") and name not in NOISE_OF_A_RESET
-
-
-def of_motion(name: str) -> bool:
-    """Whether an effect shows by contrast or change alone, so that how depends on the very picture."""
-    return candidate(name).needs in (_moving, _edges, _bright)
 
 
 def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str]) -> list[str]:

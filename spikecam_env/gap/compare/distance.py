@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from spikecam_env.gap.compare.prediction import Null, Prediction, variance
+from spikecam_env.gap.compare.prediction import Null, Prediction, total_variance
 from spikecam_env.gap.statistics import Key
 
 Array = NDArray[np.float64]
@@ -21,26 +21,27 @@ GATE = 0.005
 """Adjusted p-value of what a named effect leaves, below which something is left."""
 
 
-def size_of(null: Null, measured: Array, change: Array) -> float:
+def effect_size(null: Null, measured: Array, change: Array) -> float:
     """Noises by which a change of the statistics (S,) shows at best, on those that were measured."""
     return float(np.max(np.where(np.isfinite(measured), np.abs(change), 0.0) / null.noise))
 
 
 def deviates(null: Null, values: Array) -> Array:
     """(S,) normal deviates: Student's t of few twins, made normal; 0 where unknown."""
-    return normal(null, np.nan_to_num((values - null.mean) / null.noise))
+    return normal_deviates(null, np.nan_to_num((values - null.mean) / null.noise))
 
 
-def normal(null: Null, t: Array, predicted: Prediction | None = None) -> Array:
+def normal_deviates(null: Null, t: Array, predicted: Prediction | None = None) -> Array:
     """(S,) normal deviates of distances in noise, of a prediction's or of the null's: the noise was learnt from few
-    twins, and is the surer the more of it is floor.  What drawn units show is no less likely than their number says."""
+    twins, and has more freedom where part of it is floor.  What drawn units show is no less likely than their number
+    says."""
     known, freedom = null.sd**2 * (1.0 + 1.0 / null.twins), null.freedom
     if predicted is not None:
         known, freedom = predicted.spread**2 + predicted.error**2, freedom_of(null, predicted)
     freedom = freedom * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
     log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)
     if predicted is not None and predicted.units is not None:
-        apart = (predicted.units - predicted.mean) / np.sqrt(variance(null, predicted))
+        apart = (predicted.units - predicted.mean) / np.sqrt(total_variance(null, predicted))
         log_p = np.maximum(log_p, np.log(np.maximum(share_beyond(t, apart), 1e-300)))
     return np.sign(t) * -special.ndtri_exp(log_p)
 
@@ -57,9 +58,9 @@ def share_beyond(t: Array, apart: Array) -> Array:
 
 def freedom_of(null: Null, predicted: Prediction) -> Array:
     """(S,) degrees of freedom of a prediction's spread (Welch and Satterthwaite): what is the null's has its own, what
-    an effect's twins scatter beyond has those of few twins, `halved`, or of the drawn units.
+    an effect's twins scatter beyond has those of few twins, `half_pooled`, or of the drawn units.
 
-    How much they scatter beyond, all statistics of a group say: one that happened to scatter little is no surer.
+    How much they scatter beyond, all statistics of a group say: one that happened to scatter little has no more.
     """
     beyond = np.maximum(predicted.spread / np.maximum(null.sd, 1e-300), 1.0) ** 2 - 1.0
     groups = np.unique([k.group for k in null.keys], return_inverse=True)[1]
@@ -89,26 +90,26 @@ def adjusted(z: Array) -> Array:
     return out
 
 
-def alarmed(null: Null, rho: Array, predicted: Prediction | None = None) -> bool:
+def is_significant(null: Null, rho: Array, predicted: Prediction | None = None) -> bool:
     """Whether residuals, of a prediction or of the null's, say that something is left."""
-    return bool(adjusted(normal(null, rho, predicted)).min() < GATE)
+    return bool(adjusted(normal_deviates(null, rho, predicted)).min() < GATE)
 
 
 def residual(null: Null, measured: Array, predicted: Prediction) -> Array:
     """(S,) measured less predicted in noise."""
-    return np.nan_to_num((measured - predicted.mean) / np.sqrt(variance(null, predicted)))
+    return np.nan_to_num((measured - predicted.mean) / np.sqrt(total_variance(null, predicted)))
 
 
-def judged(null: Null, measured: Array, predicted: Prediction) -> tuple[Array, float]:
-    """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squares of what is left, and the price of
-    noise wider than the null's, without which a prediction would win by being vague.  What was not measured (NaN, held
-    out) counts for nothing."""
+def residual_and_misfit(null: Null, measured: Array, predicted: Prediction) -> tuple[Array, float]:
+    """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squares of what is left, and the logarithm
+    of the variance over the null's, without which a prediction would win by being vague.  What was not measured (NaN,
+    held out) counts for nothing."""
     rho = residual(null, measured, predicted)
-    wider = (variance(null, predicted) - predicted.error**2) / (null.sd**2 + null.floor**2)
-    price = np.where(np.isfinite(measured), null.weight * np.log(wider), 0.0)
-    return rho, misfit(rho, null.weight) + float(price.sum())
+    wider = (total_variance(null, predicted) - predicted.error**2) / (null.sd**2 + null.floor**2)
+    log_variance = np.where(np.isfinite(measured), null.weight * np.log(wider), 0.0)
+    return rho, robust_squares(rho, null.weight) + float(log_variance.sum())
 
 
-def misfit(rho: Array, weight: Array | float = 1.0) -> float:
+def robust_squares(rho: Array, weight: Array | float = 1.0) -> float:
     """Heavy-tailed sum of squares: of the order of the weights' sum for noise alone."""
     return float(np.sum(weight * (HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))

@@ -19,18 +19,18 @@ from spikecam_env.gap.statistics import Key, floor_family
 
 Array = NDArray[np.float64]
 
-FEWEST = 4
-"""Degrees of freedom of a scatter that says how alike variances are."""
+FEWEST_FREEDOM = 4
+"""Degrees of freedom of a scatter from which the spread of variances within a kind is estimated, at least."""
 
-SURE = 2000.0
+MOST_FREEDOM = 2000.0
 """Degrees of freedom of a variance at most."""
 
 
 def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Array, Array]:
     """((S,) variances, (S,) degrees of freedom) from (S,) sample variances with `freedom` each.
 
-    A statistic's kind is the same one of all recordings; how alike a kind's variances are is told by all kinds that
-    share a floor (`floor_family`), or, where that says more, how alike they are but for what a recording has in common:
+    A statistic's kind is the same one of all recordings; how closely a kind's variances agree is estimated from all
+    kinds that share a floor (`floor_family`), or, where that says more, but for what a recording has in common:
     some have more spikes to count than others.  What never varied, or is of one recording alone, stays as it is.
     """
     out, degrees = variances.copy(), np.full(len(keys), float(freedom))
@@ -43,10 +43,10 @@ def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Ar
     chance = float(special.polygamma(1, freedom / 2))
     for of in families.values():
         kinds, recordings = one_of_each([keys[i].name for i in of]), one_of_each([keys[i].recording for i in of])
-        found = [joined(logs[of], like, chance) for like in (kinds, np.hstack([kinds, recordings]))]
-        joint, doubt = min(found, key=lambda f: f[1])
-        if doubt < chance:
-            degrees[of] = worth(doubt)
+        found = [shrunk(logs[of], like, chance) for like in (kinds, np.hstack([kinds, recordings]))]
+        joint, error = min(found, key=lambda f: f[1])
+        if error < chance:
+            degrees[of] = freedom_of_variance(error)
             out[of] = np.exp(joint + bias(degrees[of[0]]))
     return out, degrees
 
@@ -56,13 +56,13 @@ def one_of_each(names: Sequence[str]) -> Array:
     return np.array([[name == other for other in dict.fromkeys(names)] for name in names], dtype=np.float64)
 
 
-def joined(logs: Array, like: Array, chance: float) -> tuple[Array, float]:
+def shrunk(logs: Array, like: Array, chance: float) -> tuple[Array, float]:
     """((S,) logarithms drawn to what those like them say, the variance of their error): `like` (S, n) says how they
     are, chance is the variance of each by itself."""
     fitted = like @ np.linalg.lstsq(like, logs)[0]
-    told = int(np.linalg.matrix_rank(like))
-    known = len(logs) - told
-    if known < FEWEST:
+    parameters = int(np.linalg.matrix_rank(like))
+    known = len(logs) - parameters
+    if known < FEWEST_FREEDOM:
         return logs, chance
     scatter = float(np.sum((logs - fitted) ** 2)) / known
     share = chance / max(scatter, chance)
@@ -74,8 +74,8 @@ def bias(freedom: float) -> float:
     return float(special.digamma(freedom / 2) - np.log(freedom / 2))
 
 
-def worth(variance: float) -> float:
-    """Degrees of freedom of a sample variance of which the logarithm has so much variance; SURE at most."""
-    if variance <= special.polygamma(1, SURE / 2):
-        return SURE
+def freedom_of_variance(variance: float) -> float:
+    """Degrees of freedom of a sample variance of which the logarithm has so much variance; MOST_FREEDOM at most."""
+    if variance <= special.polygamma(1, MOST_FREEDOM / 2):
+        return MOST_FREEDOM
     return 2.0 * float(np.exp(brentq(lambda x: np.log(special.polygamma(1, np.exp(x)) / variance), -20.0, 10.0)))

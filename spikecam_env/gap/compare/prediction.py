@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 TOLERANCE = 0.05
 """Share of an effect's own size by which its simulation may be off: laws are first order, and simulated with noise."""
 
-PAIRED = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6, "spectrum": 0.7,
-          "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
+PAIR_NOISE = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6,
+              "spectrum": 0.7, "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
 """Share of a campaign's noise that is left of a pair of twins of the same draws, with an effect and without, by group
 (`python -m benchmarks.paired_twins`, the noisiest effect); 1 for the others."""
 
@@ -58,7 +58,7 @@ class Null:
     `draws`, or of the pattern over as many drawn units.
 
     floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  freedom: (S,) degrees of freedom
-    of sd.  weight: (S,) how much each says of its own: what several recordings tell of one fixed pattern is told once.
+    of sd.  weight: (S,) how much each says of its own: several recordings show one fixed pattern, which counts once.
     """
 
     keys: tuple[Key, ...]
@@ -94,7 +94,7 @@ def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key], refits: S
 def paired(null: Null, made: Sequence[Draw]) -> Prediction:
     """What campaigns with an effect say, each less the null's of the same number: their noise cancels nearly.
 
-    What a draw lacks is the null's.  One pair has PAIRED of a campaign's noise; several tell it themselves.
+    What a draw lacks is the null's.  One pair has PAIR_NOISE of a campaign's noise; several give it by their scatter.
     """
     without = {d.number: d for d in null.draws}
     made = [
@@ -103,17 +103,17 @@ def paired(null: Null, made: Sequence[Draw]) -> Prediction:
     ]
     change = np.nan_to_num([d.values - without[d.number].values for d in made])
     if len(made) > 1:
-        error2, spread = halved(null, change.var(axis=0, ddof=1)) / len(made), spread_of(null, null.mean + change)
+        error2, spread = half_pooled(null, change.var(axis=0, ddof=1)) / len(made), spread_of(null, null.mean + change)
     else:
         counted = np.array([k.group == "intervals" for k in null.keys])  # roots of counts scatter by 1 of themselves
-        own = np.where(counted, 1.0, of_a_pair(null.keys) * null.sd)
+        own = np.where(counted, 1.0, pair_noise_share(null.keys) * null.sd)
         error2, spread = own**2 * (change[0] != 0), null.sd
     return Prediction(null.mean + change.mean(axis=0), np.sqrt(null.sd**2 / null.twins + error2), spread, tuple(made))
 
 
-def of_a_pair(keys: Sequence[Key]) -> Array:
-    """(S,) PAIRED of each statistic."""
-    return np.array([PAIRED.get(k.group, 1.0) for k in keys])
+def pair_noise_share(keys: Sequence[Key]) -> Array:
+    """(S,) PAIR_NOISE of each statistic."""
+    return np.array([PAIR_NOISE.get(k.group, 1.0) for k in keys])
 
 
 def own_variance(null: Null, predicted: Prediction) -> Array:
@@ -121,7 +121,7 @@ def own_variance(null: Null, predicted: Prediction) -> Array:
     return np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0)
 
 
-def scaled(null: Null, one: Prediction, factor: float) -> Prediction:
+def with_change_scaled(null: Null, one: Prediction, factor: float) -> Prediction:
     """A prediction whose change from the null is multiplied, and with it what it scatters more."""
     error2 = null.sd**2 / null.twins + own_variance(null, one) * factor**2
     spread2 = null.sd**2 + np.maximum(one.spread**2 - null.sd**2, 0.0) * abs(factor)
@@ -135,12 +135,12 @@ def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
     return np.array([bank.get(k, np.nan) for k in keys])
 
 
-def variance(null: Null, predicted: Prediction) -> Array:
+def total_variance(null: Null, predicted: Prediction) -> Array:
     """(S,) of measured less predicted; a prediction is good to TOLERANCE of its effect."""
-    return predicted.spread**2 + predicted.error**2 + null.floor**2 + law(null, predicted) ** 2
+    return predicted.spread**2 + predicted.error**2 + null.floor**2 + law_error(null, predicted) ** 2
 
 
-def law(null: Null, predicted: Prediction) -> Array:
+def law_error(null: Null, predicted: Prediction) -> Array:
     """(S,) by how much a prediction's laws may be off."""
     return TOLERANCE * (predicted.mean - null.mean if predicted.own is None else predicted.own)
 
@@ -159,18 +159,18 @@ def spread_of(null: Null, values: Array) -> Array:
     """
     if len(values) < 2:
         return null.sd
-    return np.asarray(np.sqrt(np.maximum(null.sd**2, halved(null, values.var(axis=0, ddof=1)))))
+    return np.asarray(np.sqrt(np.maximum(null.sd**2, half_pooled(null, values.var(axis=0, ddof=1)))))
 
 
-def halved(null: Null, variances: Array) -> Array:
+def half_pooled(null: Null, variances: Array) -> Array:
     """(S,) variances from few twins: what they say of one statistic counts half, the other half is what they say of the
     same one over all recordings."""
     known = null.sd**2 + null.floor**2
     return 0.5 * variances + 0.5 * known * pooled(null.keys, variances) / pooled(null.keys, known)
 
 
-def patterned(null: Null, predicted: Prediction) -> NDArray[np.bool_]:
-    """(S,) which statistics drawn units tell."""
+def from_drawn_units(null: Null, predicted: Prediction) -> NDArray[np.bool_]:
+    """(S,) which statistics are known from drawn units."""
     if predicted.units is None:
         return np.zeros(len(null.keys), np.bool_)
     return np.asarray(np.isfinite(predicted.units).all(axis=0), np.bool_)

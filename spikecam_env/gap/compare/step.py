@@ -7,34 +7,36 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.distance import HEAVY, judged, misfit
+from spikecam_env.gap.compare.distance import HEAVY, residual_and_misfit, robust_squares
 from spikecam_env.gap.compare.prediction import (
     TOLERANCE,
     Null,
     Prediction,
-    law,
+    from_drawn_units,
+    law_error,
     own_variance,
-    patterned,
-    scaled,
-    variance,
+    total_variance,
+    with_change_scaled,
 )
 
 Array = NDArray[np.float64]
 
-OPEN = 5e-4
-"""Damping of what errors are told from: a step may be held back, an error must not be.  What it holds back is open."""
+ERROR_DAMPING = 5e-4
+"""Damping of the normal matrix that errors follow from: a step may be held back, an error must not be.  What it holds
+back is open."""
 
-ENOUGH = 4
-"""Twins of an effect that tell by how much its own chance leads parameters astray."""
+TWINS_FOR_COVARIANCE = 4
+"""Twins of an effect from which the covariance of a step by its own chance is estimated."""
 
-MEDIAN = 0.455
+MEDIAN_SQUARE = 0.455
 """Of the square of a normal deviate."""
 
 
 def likeliest(null: Null, measured: Array, one: Prediction) -> tuple[float, float]:
-    """(factor, sd of its logarithm) that suits a prediction best which mostly scatters: by the misfit and its price."""
+    """(factor, sd of its logarithm) that suits a prediction best which mostly scatters: by the misfit, with its
+    term for the spread."""
     factors = np.geomspace(0.01, 100.0, 200)
-    left = np.array([judged(null, measured, scaled(null, one, f))[1] for f in factors])
+    left = np.array([residual_and_misfit(null, measured, with_change_scaled(null, one, f))[1] for f in factors])
     near = np.log(factors[left < left.min() + 1.0])
     return float(factors[left.argmin()]), float(max(np.ptp(near), np.log(factors[1] / factors[0]))) / 2
 
@@ -44,75 +46,77 @@ def step_of(
     measured: Array,
     predicted: Prediction,
     jacobian: Array,
-    doubt: Array | float = 0.0,
+    noise: Array | float = 0.0,
     before: Array | float = 1.0,
 ) -> tuple[Array, Array]:
-    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n), known to `doubt`.
+    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n).
 
-    before: (n,) standard deviation of what nothing tells.
+    noise: (S, n) of the jacobian.  before: (n,) prior standard deviation, of what the statistics leave open.
 
-    What is far off is judged by how far off most is that moves: it would be outliers all, and hardly be heard.
+    Residuals are taken over the median of those that move: far from the solution all would be outliers of small weight.
 
-    Statistics are not independent: the covariance is of how far the null's own draws would have led the step astray,
-    and, where ENOUGH of them tell, those of the effect (other pixels have its traps), with the floors and TOLERANCE of
-    the effect, all of one sign, on top.  Of the fixed pattern, drawn units tell: all recordings show the same one.
-    Where two parameters do nearly the same, what twins scattered would seem to tell them apart: as many squares of it
-    as can be expected in the normal matrix are no knowledge (errors in variables).
+    Statistics are not independent: the covariance is of where the null's own draws would have led the step,
+    and, where there are TWINS_FOR_COVARIANCE of the effect, its own (other pixels have its traps), with the floors and
+    TOLERANCE of the effect, all of one sign, on top; of the fixed pattern, of drawn units: all recordings show one.
+    Where two parameters do nearly the same, noise of the jacobian would seem to separate them: the squares of it
+    that are expected in the normal matrix are subtracted (errors in variables).
     """
-    noise2 = variance(null, predicted)
+    noise2 = total_variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
     concerned = np.isfinite(measured) & np.any(jacobian != 0, axis=1)
-    usual = max(float(np.median((gap**2 / noise2)[concerned])) / MEDIAN, 1.0) if concerned.any() else 1.0
+    usual = max(float(np.median((gap**2 / noise2)[concerned])) / MEDIAN_SQUARE, 1.0) if concerned.any() else 1.0
     w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2 / usual) / noise2
     normal = jacobian.T @ (w[:, None] * jacobian)
     scale = np.diag(normal) + 1e-12
     step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
-    values, basis = along(normal - by_chance(w, jacobian, doubt), np.sqrt(scale))
+    values, basis = principal_directions(normal - chance_of_normal_matrix(w, jacobian, noise), np.sqrt(scale))
     back = np.linalg.inv(basis)
     solve = (back / values) @ back.T @ (jacobian.T * w)
     drawn = [d.values - null.mean for d in null.draws]
-    alike = solve * ~patterned(null, predicted)
-    chance = astray(alike, drawn) if len(drawn) > 1 else (alike * null.sd**2) @ alike.T
-    off = solve @ law(null, predicted)
-    total = chance + own_astray(null, predicted, solve) + (solve * null.floor**2) @ solve.T + np.outer(off, off)
+    of_twins = solve * ~from_drawn_units(null, predicted)
+    chance = step_covariance(of_twins, drawn) if len(drawn) > 1 else (of_twins * null.sd**2) @ of_twins.T
+    off = solve @ law_error(null, predicted)
+    total = (
+        chance + own_step_covariance(null, predicted, solve) + (solve * null.floor**2) @ solve.T + np.outer(off, off)
+    )
     prior = np.diag(np.square(before * np.ones(len(scale))))
-    held = (back * (OPEN / values)) @ basis
+    held = (back * (ERROR_DAMPING / values)) @ basis
     total = total + held @ prior @ held.T
     total = total - total @ np.linalg.solve(total + prior, total)
     return np.asarray(step, np.float64), np.atleast_2d(total)
 
 
-def by_chance(w: Array, jacobian: Array, doubt: Array | float) -> Array:
+def chance_of_normal_matrix(w: Array, jacobian: Array, noise: Array | float) -> Array:
     """(n, n) of a normal matrix with weights (S,), that the noise of its jacobian makes: each column is a twin less one
-    that they share.  doubt: (S, n) of both, with the sign of the step between them."""
-    there = doubt * (jacobian != 0)
+    that they share.  noise: (S, n) of both, with the sign of the step between them."""
+    there = noise * (jacobian != 0)
     shared = there.T @ (w[:, None] * there) / 2
     return np.asarray(shared + np.diag(np.diag(shared)))
 
 
-def along(normal: Array, scale: Array) -> tuple[Array, Array]:
-    """((n,) what is known, OPEN at least, (n, n) directions in units of 1 / `scale` (n,), one a row)."""
+def principal_directions(normal: Array, scale: Array) -> tuple[Array, Array]:
+    """((n,) what is known, ERROR_DAMPING at least, (n, n) directions in units of 1 / `scale` (n,), one a row)."""
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-    return np.maximum(values, 0.0) + OPEN, vectors.T * scale
+    return np.maximum(values, 0.0) + ERROR_DAMPING, vectors.T * scale
 
 
-def astray(solve: Array, draws: Sequence[Array] | Array) -> Array:
+def step_covariance(solve: Array, draws: Sequence[Array] | Array) -> Array:
     """(n, n) covariance of where campaigns such as these (S,), not their mean, lead a step (n,) = solve @ values."""
     return np.atleast_2d(np.cov((np.nan_to_num(draws) @ solve.T).T)) * (1 + 1 / len(draws))
 
 
-def own_astray(null: Null, predicted: Prediction, solve: Array) -> Array:
-    """(n, n) covariance of a step by the effect's own chance: as its draws tell where ENOUGH of them move a statistic,
-    as drawn units do where they show it, elsewhere as of independent ones."""
+def own_step_covariance(null: Null, predicted: Prediction, solve: Array) -> Array:
+    """(n, n) covariance of a step by the effect's own chance: of its draws where TWINS_FOR_COVARIANCE of them
+    move a statistic, of drawn units where they show it, elsewhere as of independent ones."""
     variances = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
     without = {d.number: d.values for d in null.draws}
-    draws = predicted.draws if len(predicted.draws) >= ENOUGH else ()
+    draws = predicted.draws if len(predicted.draws) >= TWINS_FOR_COVARIANCE else ()
     change = np.array([d.values - without[d.number] for d in draws])
-    shown = patterned(null, predicted)
-    told = np.any(np.nan_to_num(change) != 0, axis=0) & ~shown
-    total = np.asarray((solve * np.where(told | shown, 0.0, variances)) @ solve.T)
-    total = total + astray(solve * told, change) if told.any() else total
-    return total + astray(solve * shown, predicted.units) if predicted.units is not None else total
+    shown = from_drawn_units(null, predicted)
+    simulated = np.any(np.nan_to_num(change) != 0, axis=0) & ~shown
+    total = np.asarray((solve * np.where(simulated | shown, 0.0, variances)) @ solve.T)
+    total = total + step_covariance(solve * simulated, change) if simulated.any() else total
+    return total + step_covariance(solve * shown, predicted.units) if predicted.units is not None else total
 
 
 def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, step: float) -> Array:
@@ -161,7 +165,7 @@ def scale_of(
             total = float(np.sum(w * effect**2))
             scale = float(np.sum(w * effect * gap)) / max(total, 1e-300)
         noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
-        left = misfit((gap - scale * effect) / np.sqrt(noise2))
+        left = robust_squares((gap - scale * effect) / np.sqrt(noise2))
         best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))
     return best[1], best[2]
 

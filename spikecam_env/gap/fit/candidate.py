@@ -7,56 +7,47 @@ other parameters are of `shapes`.  The unit is refitted along the way, so that t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates.strength import AS_LOUD, as_loud, bounded, is_linear, may_be_negative, with_effect
-from spikecam_env.gap.candidates.table import candidate, is_pattern
-from spikecam_env.gap.compare.distance import judged, size_of
-from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, paired, scaled, values_of
+from spikecam_env.gap.candidates.strength import TARGET_SIZE, amplified, bounded, with_effect
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import effect_size
+from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
-from spikecam_env.gap.twins.case import Case, rests_on, twins
-from spikecam_env.gap.twins.fresh_units import UNITS, drawn_banks
-from spikecam_env.gap.unit.false_spikes import false_spikes_of
-from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED, extrapolated_unit, has_converged, inferred_unit
+from spikecam_env.gap.compare.thresholds import TO_CONTINUE
+from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.recordings import TWINS_OF_RANDOM_COURSE, twins_of
+from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED, extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
-from spikecam_env.gap.unit.traps import traps_of
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-HOPE = 5.0
-"""Misfit that a twin, scaled at best, has to remove for its fit to go on."""
-
-TURNS = 5
-"""Most twins that the fit of one candidate's strength takes."""
+MOST_TWINS = 5
+"""Twins that the fit of one candidate's strength takes at most."""
 
 VISIBLE = 4.0
 """Noises that a simulated effect has to show somewhere to be scaled by."""
 
-FAINT = 1e-3
-"""Least factor by which a strength is multiplied at once; and of one without hope."""
+LEAST_FACTOR = 1e-3
+"""Least factor by which a strength is multiplied at once; and of one whose fit does not go on."""
 
-WANDER, SEVERAL = 6, 3
-"""Twins of an effect that makes statistics scatter; and of one that is few events, or in few pixels, or that is
-`mixed`, and so cannot be simulated louder to stand above one twin's noise."""
+LEAST_LOG_STEP = 0.05
+"""Least step of a strength's logarithm between two twins for a slope."""
 
-APART = 0.05
-"""Least step of a logarithm between two twins for a slope."""
-
-
-MANY = 240
-"""The same where these do not show what was measured."""
+ROUND_OFF = (0.7, 1.4)
+"""Factors between which what is left of a strength is scaled, without another twin."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A candidate at its best.  parameters, sd: by name.  prediction: what it gives; base: its unit.
 
-    rho: (S,) what it leaves, in noise.  misfit: `distance.judged`.
+    rho: (S,) what it leaves, in noise.  misfit: `distance.residual_and_misfit`.
     """
 
     name: str
@@ -69,222 +60,138 @@ class Fit:
     model: SensorModel
 
 
-def predict(
-    case: Case, model: SensorModel, base: BaseFit, null: Null, count: int, only: Sequence[int] | None = None
-) -> Prediction:
-    """What a model with effects gives, from twins of the null's last `count` draws; what is not simulated (`only`:
-    recordings, by index) is as in `null`."""
-    numbers = [d.number for d in null.draws[-count:]]
-    made = twins(case, model, base, numbers, only, {d.number: d.refit for d in null.draws})
-    draws = [Draw(n, values_of(t.bank, null.keys), t.base) for n, t in zip(numbers, made, strict=True)]
-    predicted = paired(null, draws)
-    patterned = traps_of(model) or false_spikes_of(model)
-    return with_pattern(case, model, null, predicted) if patterned else predicted
-
-
-def twins_of(name: str) -> int:
-    """How many twins say what an effect does."""
-    what = candidate(name)
-    return SEVERAL if what.events or what.strikes or what.mixed else 1
-
-
-def as_seen(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> BaseFit:
-    """The unit moved so that with the effect it is refitted as the null's is without."""
-    [without] = [d.refit for d in null.draws if d.number == predicted.draws[-1].number]
-    there = predicted.draws[-1].refit
-    return inferred_unit(model, base, without, [there]) if without and there else base
-
-
-def with_pattern(case: Case, model: SensorModel, null: Null, predicted: Prediction, count: int = UNITS) -> Prediction:
-    """A prediction with its pattern statistics replaced by those of `count` units of the model."""
-    drawn = drawn_banks(model, case.base, case.conditions, case.shape, count, case.seed)
-    values = np.array([values_of(b, null.keys) for b in drawn])
-    known = np.isfinite(values).all(axis=0)
-    values = np.where(known, values, 0.0)
-    mean = np.where(known, values.mean(axis=0), predicted.mean)
-    spread = np.where(known, np.maximum(values.std(axis=0, ddof=1), null.sd), predicted.spread)
-    error = np.where(known, spread / np.sqrt(count), predicted.error)
-    return replace(predicted, mean=mean, error=error, spread=spread, units=np.where(known, values, np.nan))
-
-
 def fit(
-    case: Case,
-    model: SensorModel,
-    null: Null,
-    measured: Array,
-    name: str,
-    start: Mapping[str, float],
-    expected: Array | None = None,
-    white: float = 1.0,
+    problem: Problem, name: str, start: Mapping[str, float], expected: Array | None = None, white: float = 1.0
 ) -> Fit:
-    """Best fit of one candidate's strength (of a pattern, all its parameters) added to `model`, which predicts `null`.
+    """Best fit of one candidate's strength (of a pattern, all its parameters) added to the model.
 
     start: parameters near the best.  expected: (S,) change of the statistics to expect there, to leave out recordings
     that it does not concern.  white: s^2 of the unit there, over the refit's.
     """
-    if is_pattern(name):
-        return _fit_pattern(case, model, null, measured, name, start)
-    if candidate(name).wanders:
-        return _fit_wander(case, model, null, measured, name, dict(start))
-    return _fit_twins(case, model, null, measured, name, dict(start), expected, white)
+    if candidate(name).is_pattern:
+        return _fit_pattern(problem, name, start)
+    if candidate(name).random_course:
+        return _fit_random_course(problem, name, dict(start))
+    return _fit_twins(problem, name, dict(start), expected, white)
 
 
-def _fit_twins(
-    case: Case,
-    model: SensorModel,
-    null: Null,
-    measured: Array,
-    name: str,
-    parameters: dict[str, float],
-    expected: Array | None,
-    white: float,
-) -> Fit:
+def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expected: Array | None, white: float) -> Fit:
     """Twins at the start, made stronger until they show, once more where the unit settles far off, scaled until the
     strength is right to a third and the unit has settled; the last step is a scaling of what was simulated, without
     another twin."""
-    strength, power = candidate(name).fitted[0], candidate(name).power
-    everywhere = np.full(len(null.keys), np.inf)
-    expected = everywhere if expected is None else expected
-    parameters, louder = as_loud(name, bounded(name, parameters), size_of(null, measured, expected))
-    bare = constrained_refit(with_effect(model, name, parameters), constrained_refit(model, case.base))
-    base = replace(bare, white=white**louder * bare.white)
-    hopeless = judged(null, measured, null.prediction)[1] - HOPE
-    only = concerned(case, [name], null, measured, expected * louder)
+    what, null, seen = candidate(name), problem.null, problem.seen
+    strength, power = what.strength, what.power
+    expected = np.full(len(null.keys), np.inf) if expected is None else expected
+    parameters, times = amplified(name, bounded(name, parameters), effect_size(null, seen, expected))
+    start = constrained_refit(problem.model, problem.case.base)
+    bare = constrained_refit(with_effect(problem.model, name, parameters), start)
+    base = replace(bare, white=white**times * bare.white)
+    least = problem.misfit() - TO_CONTINUE
+    only = problem.affected([name], expected * times)
     last: tuple[float, Prediction] | None = None
     slope: Array | None = None
-    still = False
-    for turn in range(TURNS):
-        at_last = turn == TURNS - 1
-        tried = with_effect(model, name, parameters)
-        predicted = predict(case, tried, base, null, twins_of(name), only)
-        seen = size_of(null, measured, predicted.mean - null.mean)
-        stronger = parameters if at_last else until_seen(name, parameters, seen)
+    settled_once = False
+    for turn in range(MOST_TWINS):
+        at_last = turn == MOST_TWINS - 1
+        tried = with_effect(problem.model, name, parameters)
+        predicted = problem.predict(tried, base, twins_of(name), only)
+        size = effect_size(null, seen, predicted.mean - null.mean)
+        stronger = parameters if at_last else until_visible(name, parameters, size)
         if stronger != parameters:
             base = extrapolated_unit(bare, base, abs(stronger[strength] / parameters[strength]) ** power)
-            parameters, only = stronger, concerned(case, [name], null, measured, everywhere)
+            parameters, only = stronger, problem.affected([name])
             continue
-        assumed, base = base, as_seen(tried, base, null, predicted)
-        if not still and not at_last and not has_converged(assumed, base):
-            still = True
+        assumed, base = base, problem.settled_unit(tried, base, predicted)
+        if not settled_once and not at_last and not has_converged(assumed, base):
+            settled_once = True
             continue
-        scale, sd = scale_to(null, measured, predicted)
-        if judged(null, measured, scaled(null, predicted, scale))[1] > hopeless:
-            factor, near = FAINT, True
+        scale, sd = scale_to(null, seen, predicted)
+        if problem.misfit(with_change_scaled(null, predicted, scale)) > least:
+            factor, near = LEAST_FACTOR, True
             break
         now = parameters[strength], predicted
-        slope = slope_between(null, measured, last, now) if power == 2.0 else None
-        factor, last = factor_to(name, null, measured, predicted, scale, slope), now
-        weak = abs(scale) * seen < VISIBLE or (
-            is_linear(name) and 1 / MOST_EXTRAPOLATED < scale < 1 and scale * seen < AS_LOUD
+        slope = slope_between(problem, last, now) if power == 2.0 else None
+        factor, last = factor_to(problem, name, predicted, scale, slope), now
+        weak = abs(scale) * size < VISIBLE or (
+            what.is_linear and 1 / MOST_EXTRAPOLATED < scale < 1 and scale * size < TARGET_SIZE
         )
-        near = weak or 0.7 < factor < 1.4
+        near = weak or ROUND_OFF[0] < factor < ROUND_OFF[1]
         if at_last or (near and turn):
             break
         if weak:
             continue
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
         base = extrapolated_unit(bare, base, factor**power)
-        only = concerned(case, [name], null, measured, (predicted.mean - null.mean) * factor**power)
+        only = problem.affected([name], (predicted.mean - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
     if near and slope is not None:
         predicted = replace(predicted, mean=predicted.mean + slope * np.log(moved) / power)
     else:
-        predicted = scaled(null, predicted, moved)
-    rho, left = judged(null, measured, predicted)
+        predicted = with_change_scaled(null, predicted, moved)
+    rho, left = problem.residual_and_misfit(predicted)
     sds = {strength: abs(final[strength]) * (sd / max(abs(scale), 1e-9) / power)}
-    there = with_effect(model, name, final)
+    there = with_effect(problem.model, name, final)
     return Fit(name, final, sds, predicted, extrapolated_unit(bare, base, moved), rho, left, there)
 
 
-def until_seen(name: str, parameters: dict[str, float], seen: float) -> dict[str, float]:
+def until_visible(name: str, parameters: dict[str, float], size: float) -> dict[str, float]:
     """The parameters at a strength that shows by twice VISIBLE, or where its bounds end; as they are where it shows.
-    seen: noises that it shows by."""
-    if seen >= VISIBLE:
+    size: noises that it shows by."""
+    if size >= VISIBLE:
         return parameters
-    strength = candidate(name).fitted[0]
-    more = (2 * VISIBLE / max(seen, 0.2)) ** (1 / candidate(name).power)
+    strength = candidate(name).strength
+    more = (2 * VISIBLE / max(size, 0.2)) ** (1 / candidate(name).power)
     return bounded(name, {**parameters, strength: parameters[strength] * more})
 
 
-def factor_to(
-    name: str, null: Null, measured: Array, predicted: Prediction, scale: float, slope: Array | None
-) -> float:
+def factor_to(problem: Problem, name: str, predicted: Prediction, scale: float, slope: Array | None) -> float:
     """By how much to multiply a strength: along its slope where there is one, else by what scales its change best; a
     tenth where that is negative and the strength cannot be."""
     if slope is not None:
-        return float(np.exp(np.clip(step_of(null, measured, predicted, slope[:, None])[0][0], -1.0, 1.0)))
-    if scale < 0 and not may_be_negative(name):
+        step = step_of(problem.null, problem.seen, predicted, slope[:, None])[0]
+        return float(np.exp(np.clip(step[0], -1.0, 1.0)))
+    if scale < 0 and not candidate(name).may_be_negative:
         return 0.1
-    size = float(np.clip(abs(scale) ** (1 / candidate(name).power), FAINT, 1 / FAINT))
+    size = float(np.clip(abs(scale) ** (1 / candidate(name).power), LEAST_FACTOR, 1 / LEAST_FACTOR))
     return -size if scale < 0 else size
 
 
 def slope_between(
-    null: Null, measured: Array, one: tuple[float, Prediction] | None, other: tuple[float, Prediction]
+    problem: Problem, one: tuple[float, Prediction] | None, other: tuple[float, Prediction]
 ) -> Array | None:
     """(S,) change of the statistics for one more of a strength's logarithm, by twins at two of them; None where these
     are not two.  What goes with the square of a strength saturates where other noise is, or is a logarithm of both."""
-    if one is None or not one[0] * other[0] > 0 or abs(step := float(np.log(other[0] / one[0]))) < APART:
+    if one is None or not one[0] * other[0] > 0 or abs(step := float(np.log(other[0] / one[0]))) < LEAST_LOG_STEP:
         return None
+    null = problem.null
     both = (one[1].mean != null.mean) & (other[1].mean != null.mean)
-    slope = slope_of(null, measured, other[1], one[1], step) * both
+    slope = slope_of(null, problem.seen, other[1], one[1], step) * both
     return slope if slope.any() else None
 
 
-def _fit_wander(
-    case: Case, model: SensorModel, null: Null, measured: Array, name: str, parameters: dict[str, float]
-) -> Fit:
+def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]) -> Fit:
     """The strength under which what is seen is as likely as can be among twins that scatter.
 
     Statistics of one recording are of one course in time: its strength is known no better than from one number each.
     """
-    strength = candidate(name).fitted[0]
-    power = candidate(name).power
-    only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
+    strength, power = candidate(name).strength, candidate(name).power
+    only = problem.affected([name])
     for _ in range(2):
-        there = with_effect(model, name, bounded(name, parameters))
-        base = constrained_refit(there, case.base)
-        predicted = predict(case, there, base, null, WANDER, only)
-        factor, sd = likeliest(null, measured, predicted)
+        there = with_effect(problem.model, name, bounded(name, parameters))
+        base = constrained_refit(there, problem.case.base)
+        predicted = problem.predict(there, base, TWINS_OF_RANDOM_COURSE, only)
+        factor, sd = likeliest(problem.null, problem.seen, predicted)
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
         if 0.5 < factor < 2.0:
             break
-    predicted = scaled(null, predicted, factor)
-    rho, left = judged(null, measured, predicted)
+    predicted = with_change_scaled(problem.null, predicted, factor)
+    rho, left = problem.residual_and_misfit(predicted)
     sds = {strength: parameters[strength] * max(sd, np.sqrt(2.0 / len(only))) / power}
-    return Fit(name, parameters, sds, predicted, base, rho, left, with_effect(model, name, parameters))
+    return Fit(name, parameters, sds, predicted, base, rho, left, with_effect(problem.model, name, parameters))
 
 
-def concerned(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int]:
-    """Recordings of use fit on which effects show, or something has to be explained, by index; all where none does.
-
-    With those that the refit rests on: the refit takes up the effects' mean, and the others are judged by that refit.
-    Of effects that leave steady uniform light alone, only the others, where the refit does not rest on them.
-    """
-    seen = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean))) > 5 * null.noise
-    shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
-    fitted = {i for i, c in enumerate(case.conditions) if c.use == "fit"}
-    which = {i for i in fitted if case.conditions[i].name in shows} or fitted
-    uneven = {i for i in which if case.conditions[i].kind not in ("dark", "flat")}
-    if uneven and not uneven & rests_on(case) and all(candidate(name).only_contrast for name in names):
-        return sorted(uneven)
-    return sorted(which | rests_on(case))
-
-
-def with_held_out(case: Case, only: Sequence[int]) -> list[int]:
-    """With the recordings held out: those in motion, and all where there is a refit to judge the others by."""
-    held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
-    if any(case.conditions[i].kind == "picture" for i in held):
-        held |= rests_on(case)
-    if not rests_on(case) <= {*only, *held}:
-        held = {i for i in held if case.conditions[i].moves}
-    return sorted({*only, *held})
-
-
-def _fit_pattern(
-    case: Case, model: SensorModel, null: Null, measured: Array, name: str, start: Mapping[str, float]
-) -> Fit:
+def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
     """Coarse to fine search over the strength (and one more parameter), drawing units."""
     what = candidate(name)
     parameters = bounded(name, start)
@@ -294,10 +201,10 @@ def _fit_pattern(
             centre = best.parameters if best else parameters
             for factor in factors:
                 tried = bounded(name, {**centre, key: centre[key] * factor})
-                there = with_effect(model, name, tried)
-                predicted = with_pattern(case, there, null, null.prediction)
-                rho, left = judged(null, measured, predicted)
-                now = Fit(name, tried, {}, predicted, constrained_refit(there, case.base), rho, left, there)
+                there = with_effect(problem.model, name, tried)
+                predicted = problem.with_pattern(there, problem.null.prediction)
+                rho, left = problem.residual_and_misfit(predicted)
+                now = Fit(name, tried, {}, predicted, constrained_refit(there, problem.case.base), rho, left, there)
                 best = now if best is None or now.misfit < best.misfit else best
     assert best is not None
     return best

@@ -15,42 +15,44 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import Null, Prediction, own_variance
 from spikecam_env.gap.compare.step import change_of, step_of
-from spikecam_env.gap.fit.candidate import as_seen
+from spikecam_env.gap.compare.thresholds import BY_CHANCE, TO_STEP
+from spikecam_env.gap.fit.predict import settled_unit
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.unit.indirect_inference import has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-TURNS = 4
+MOST_STEPS = 4
+"""Steps of a descent at most."""
 
-SETTLED = 0.05
+SMALL_STEP = 0.05
 """Largest step of a logarithm that needs no other."""
 
-WORTH = 1.0
-"""Misfit that a step has to promise for another: of two parameters that make up for each other either may be open by
-far, and both together leave much."""
-
-FAR = 0.5
+LONG_STEP = 0.5
 """Step of a logarithm beyond which derivatives are taken anew."""
 
-CLEAR = 3.0
+SURPRISE = 3.0
 """Noises by which a step has to surprise for derivatives to be corrected by it."""
 
-LONGEST = 0.7
-"""Largest step of a logarithm at once; none is further than what is open of its parameter before (`spans`)."""
+LONGEST_STEP = 0.7
+"""Largest step of a logarithm at once; none is further than what is open of its parameter before (`prior_sd`)."""
 
-WORSE = 3.0
-"""Misfit by which a step may seem worse, by chance of the draws."""
-
-PROBED = 2
+PROBES = 2
 """Times that a model is probed: under the unit there was, and under the one that it then shows."""
 
 WHITE = ("the unit", "white")
 """The unit's own s^2, among parameters by effect and name, where an effect hides it."""
+
+WHITE_STEP = -0.2
+"""Step of the logarithm of WHITE to take a derivative by."""
+
+STRENGTH_STEP, STRENGTH_STEPS = 6.0, (0.25, 1.0)
+"""Noises by which a strength's step, to take a derivative by, is to show; and the steps of its logarithm within which
+that is."""
 
 Probe = Callable[[SensorModel, BaseFit], Prediction]
 """What a model and a unit give."""
@@ -62,64 +64,60 @@ Free = Sequence[tuple[str, str]]
 @dataclass(frozen=True)
 class Descent:
     """Where it ended.  prediction: of the twins there, the last step added in proportion.  columns: (S, n) derivatives;
-    doubt: (S, n) their noise.  covariance: (n, n) of the logarithms.
+    noise: (S, n) theirs.  covariance: (n, n) of the logarithms.
     """
 
     model: SensorModel
     base: BaseFit
     prediction: Prediction
     columns: Array
-    doubt: Array
+    noise: Array
     covariance: Array
 
 
 def descend(
-    probe: Probe,
-    null: Null,
-    measured: Array,
-    model: SensorModel,
-    base: BaseFit,
-    free: Free,
-    jobs: int = 1,
-    worth: float = WORTH,
+    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, free: Free, to_step: float = TO_STEP
 ) -> Descent:
-    """From a model and its unit down to the parameters `free` that suit (S,) `measured` best; where steps have come to
-    leave more, the best of where they led, of those alike the first, and no step further that promises little and goes
-    as far as one may.  jobs: threads.  worth: misfit that a step has to promise, and the one before it to have removed.
+    """From a model and its unit down to the parameters `free` that suit what is seen best.
+
+    Where steps have come to leave more, the best of where they led, the first of several within TO_STEP; and no step
+    further that promises little and goes as far as one may.
+    to_step: misfit that a step has to promise, and the one before it to have removed.
     """
-    at, base = settled_there(probe, null, model, base, free)
-    columns, doubt = derivatives(probe, null, measured, model, base, at, free, jobs)
-    before, longest = spans(free), longest_of(free)
+    null = problem.null
+    at, base = at_settled_unit(probe, null, model, base, free)
+    columns, noise = derivatives(problem, probe, model, base, at, free)
+    before, longest = prior_sd(free), longest_of(free)
     tried = []
-    for turn in range(TURNS):
-        step, covariance = step_of(null, measured, at, columns, doubt, before)
+    for turn in range(MOST_STEPS):
+        step, covariance = step_of(null, problem.seen, at, columns, noise, before)
         step = np.clip(step, -longest, longest)
-        left, promised = (judged(null, measured, p)[1] for p in (at, replace(at, mean=at.mean + columns @ step)))
-        tried.append((left, Descent(model, base, at, columns, doubt, covariance)))
-        model, base = moved(model, as_told(model, base, null, at, free), free, step)
-        little = left - promised < worth or (turn > 0 and 0 <= tried[-2][0] - left < worth)
-        if turn == TURNS - 1 or little or np.all(np.abs(step) < SETTLED):
+        left, promised = (problem.misfit(p) for p in (at, replace(at, mean=at.mean + columns @ step)))
+        tried.append((left, Descent(model, base, at, columns, noise, covariance)))
+        model, base = moved(model, unit_after(model, base, null, at, free), free, step)
+        little = left - promised < to_step or (turn > 0 and 0 <= tried[-2][0] - left < to_step)
+        if turn == MOST_STEPS - 1 or little or np.all(np.abs(step) < SMALL_STEP):
             break
-        after, base = settled_there(probe, null, model, base, free)
-        if np.abs(step).max() < FAR:
-            noise = np.sqrt(own_variance(null, at) + own_variance(null, after))
-            columns = broyden(columns, step, after.mean - at.mean, noise)
+        after, base = at_settled_unit(probe, null, model, base, free)
+        if np.abs(step).max() < LONG_STEP:
+            own = np.sqrt(own_variance(null, at) + own_variance(null, after))
+            columns = broyden(columns, step, after.mean - at.mean, own)
         else:
-            columns, doubt = derivatives(probe, null, measured, model, base, after, free, jobs)
+            columns, noise = derivatives(problem, probe, model, base, after, free)
         at = after
     least = min(t[0] for t in tried)
     guess = little and bool(np.any(np.abs(step) >= longest))
-    if guess or left > least + WORSE:
-        return next(where for there, where in tried if there < least + WORTH)
-    return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, doubt, covariance)
+    if guess or left > least + BY_CHANCE:
+        return next(where for there, where in tried if there < least + TO_STEP)
+    return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, noise, covariance)
 
 
 def broyden(columns: Array, step: Array, change: Array, noise: Array | float = 0.0) -> Array:
     """(S, n) derivatives that give the change (S,) that a step (n,) turned out to make, where there are any and it is
     clear of its noise (S,): that of a short step, as a slope, would look like knowledge of the parameters."""
     surprise = change - columns @ step
-    told = (columns != 0) & (np.abs(surprise) > CLEAR * noise)[:, None]
-    return np.asarray(columns + told * np.outer(surprise, step) / (step @ step))
+    corrected = (columns != 0) & (np.abs(surprise) > SURPRISE * noise)[:, None]
+    return np.asarray(columns + corrected * np.outer(surprise, step) / (step @ step))
 
 
 def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[SensorModel, BaseFit]:
@@ -134,64 +132,60 @@ def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[S
 
 
 def derivatives(
-    probe: Probe,
-    null: Null,
-    measured: Array,
-    model: SensorModel,
-    base: BaseFit,
-    at: Prediction,
-    free: Free,
-    jobs: int = 1,
+    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, at: Prediction, free: Free
 ) -> tuple[Array, Array]:
     """(S, n) change of the statistics for one more of each parameter's logarithm, and its noise; at: what the model
-    gives.  Each is taken under a unit that has settled: of one that has not, light that saturates tells more than there
+    gives.  Each is taken under a unit that has settled: of one that has not, light that saturates says more than there
     is.  What one parameter of an effect clearly moves says of its others that they do not, or how far."""
+    null = problem.null
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
-    nudges = np.array([nudge_of(name, key, peak) for name, key in free])
-    with ThreadPoolExecutor(jobs) as pool:
-        steps = [moved(model, base, [what], np.array([nudge])) for what, nudge in zip(free, nudges, strict=True)]
-        there = [made for made, _ in pool.map(lambda step: settled_there(probe, null, step[0], step[1], free), steps)]
-    changes, doubt, clear = (
-        np.stack(v, axis=1) for v in zip(*(change_of(null, measured, t, at) for t in there), strict=True)
+    sizes = np.array([derivative_step(name, key, peak) for name, key in free])
+    with ThreadPoolExecutor(problem.case.jobs) as pool:
+        steps = [moved(model, base, [what], np.array([size])) for what, size in zip(free, sizes, strict=True)]
+        there = [made for made, _ in pool.map(lambda step: at_settled_unit(probe, null, step[0], step[1], free), steps)]
+    changes, noise, clear = (
+        np.stack(v, axis=1) for v in zip(*(change_of(null, problem.seen, t, at) for t in there), strict=True)
     )
-    alike = np.array([[name == other for name, _ in free] for other, _ in free])
-    return np.where(clear @ alike, changes, 0.0) / nudges, doubt / nudges
+    same_effect = np.array([[name == other for name, _ in free] for other, _ in free])
+    return np.where(clear @ same_effect, changes, 0.0) / sizes, noise / sizes
 
 
-def settled_there(
+def at_settled_unit(
     probe: Probe, null: Null, model: SensorModel, base: BaseFit, free: Free
 ) -> tuple[Prediction, BaseFit]:
-    """(what a model gives under a unit that has settled, that unit): probed once more where the unit was not still."""
+    """(what a model gives under a unit that has settled, that unit): probed once more where it had not."""
     made = probe(model, base)
-    there = as_told(model, base, null, made, free)
+    there = unit_after(model, base, null, made, free)
     return (made, base) if has_converged(base, there) else (probe(model, there), there)
 
 
-def as_told(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:
-    """`candidate.as_seen`, but for an s^2 that is fitted."""
-    there = as_seen(model, constrained_refit(model, base), null, made)
+def unit_after(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:
+    """`predict.settled_unit`, but for an s^2 that is fitted."""
+    there = settled_unit(model, constrained_refit(model, base), null, made)
     return replace(there, white=base.white) if WHITE in free else there
 
 
-def spans(free: Free) -> Array:
+def prior_sd(free: Free) -> Array:
     """(n,) logarithms by which parameters may differ, standard deviations, before anything is measured: a factor of e,
     of a shape twice the step that its derivative takes."""
-    fitted = [name != WHITE[0] and key != candidate(name).fitted[0] for name, key in free]
-    return np.array([2 * abs(candidate(f[0]).nudge) if shape else 1.0 for f, shape in zip(free, fitted, strict=True)])
+    fitted = [name != WHITE[0] and key != candidate(name).strength for name, key in free]
+    return np.array(
+        [2 * abs(candidate(f[0]).shape_step) if shape else 1.0 for f, shape in zip(free, fitted, strict=True)]
+    )
 
 
 def longest_of(free: Free) -> Array:
     """(n,) largest step of each logarithm at once."""
-    return np.minimum(spans(free), LONGEST)
+    return np.minimum(prior_sd(free), LONGEST_STEP)
 
 
-def nudge_of(name: str, key: str, peak: float) -> float:
+def derivative_step(name: str, key: str, peak: float) -> float:
     """Step of a logarithm to take a derivative by, long enough to show above the twins' own noise.
 
     peak: noises by which the effect shows.
     """
     if (name, key) == WHITE:
-        return -0.2
-    if key != candidate(name).fitted[0]:
-        return candidate(name).nudge
-    return float(np.clip(6.0 / max(peak, 1e-9), 0.25, 1.0))
+        return WHITE_STEP
+    if key != candidate(name).strength:
+        return candidate(name).shape_step
+    return float(np.clip(STRENGTH_STEP / max(peak, 1e-9), *STRENGTH_STEPS))

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.null_model import unit_under
 from spikecam_env.gap.candidates.strength import bounded, with_effect
-from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET, candidate, is_pattern
+from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET, candidate
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.fit.candidate import predict, with_pattern
-from spikecam_env.gap.fit.gauss_newton import settled_there
+from spikecam_env.gap.fit.gauss_newton import at_settled_unit
+from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
 from spikecam_env.gap.screen.templates import Template, Templates
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import constrained_refit
@@ -35,7 +35,7 @@ PEAK = 40.0
 def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[str]) -> Templates:
     """Templates of the candidates in `names` on this very campaign, whose model predicts `null`."""
     unit = replace(case, base=unit_under(case, model))
-    todo = [(n, p) for n in names if not is_pattern(n) for p in template_parameters(n)]
+    todo = [(n, p) for n in names if not candidate(n).is_pattern for p in template_parameters(n)]
     with ThreadPoolExecutor(case.jobs) as pool:
         entries = tuple(pool.map(lambda what: simulated_template(unit, model, null, *what), todo))
     return Templates(
@@ -83,10 +83,10 @@ def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, param
     """(S,) change of the statistics, in noise, that a candidate makes: by units drawn, or by a twin of the unit that
     indirect inference gives: else a refit would take up a bend of the rates, and saturation show a unit too bright."""
     there = with_effect(model, name, parameters)
-    if is_pattern(name):
-        made = with_pattern(case, there, null, null.prediction)
+    if candidate(name).is_pattern:
+        made = with_drawn_pattern(case, there, null, null.prediction)
     else:
-        made, _ = settled_there(
-            partial(predict, case, null=null, count=1), null, there, constrained_refit(there, case.base), []
+        made, _ = at_settled_unit(
+            partial(predict_by_twins, case, null=null, count=1), null, there, constrained_refit(there, case.base), []
         )
     return np.nan_to_num((made.mean - null.mean) / null.noise)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, residual
+from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.maps.bank import MapCase, with_use
 from spikecam_env.gap.maps.search import FITTED_SPREADS, LINEAR_PARAMETERS, MapFit, PatternModel, fitted_parameters
@@ -50,7 +50,7 @@ def conclude_maps(
     predicted = last.predicted if last else null.mean
     square = [float(np.mean(((values - mean) / null.noise) ** 2)) for mean in (null.mean, predicted)]
     left = (square[1] - 1.0) / max(square[0] - 1.0, 1e-9)
-    significant = alarmed(null, rho)
+    significant = is_significant(null, rho)
     explained = not rounds or not significant or left < MOST_SQUARE_LEFT
     parameters = spreads_off(case, last.state) if last else {}
     effects = significant_effects(case, null, values, rounds)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from spikecam_env.campaign.reading import Campaign
-from spikecam_env.gap.candidates.table import candidate, is_pattern
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates
 from spikecam_env.gap.compare.prediction import null_of, values_of
 from spikecam_env.gap.maps.bank import MapCase, map_bank, read_maps, unit_maps
@@ -30,7 +30,7 @@ def diagnose_maps(
     names: of candidates.  seed, jobs: as in `diagnose.diagnose`.  Raises InputError where no rates are in known light.
     """
     case = read_maps(campaign, seed, jobs)
-    tested = [n for n in names if is_pattern(n) and shows_in_maps(n, case)]
+    tested = [n for n in names if candidate(n).is_pattern and shows_in_maps(n, case)]
     measured = case.statistics
     given = spreads_matched(PatternModel(model, {}), case, measured)
     banks = [map_bank(unit_maps(given.fitted, case, n)) for n in range(PREDICTED_UNITS)]
@@ -52,6 +52,6 @@ def shows_in_maps(name: str, case: MapCase) -> bool:
 
 def needs(name: str) -> str:
     """What would show a candidate that these maps do not."""
-    if not is_pattern(name):
+    if not candidate(name).is_pattern:
         return "spikes: rates say nothing of when they come"
     return "a dark map" if candidate(name).family == "dark" else "a map of a flat"

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import HEAVY, alarmed, misfit, residual
+from spikecam_env.gap.compare.distance import HEAVY, is_significant, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.maps.bank import MapCase, map_bank, unit_maps, with_use
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.twins.fresh_units import SPREADS as UNIT_SPREADS
-from spikecam_env.gap.twins.fresh_units import WITHIN
+from spikecam_env.gap.twins.fresh_units import SPREAD_LIMITS
+from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS as UNIT_SPREADS
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
@@ -109,7 +109,7 @@ def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Key, floa
             ]
             off = [measured[k] - simulated[k] for k in keys if k in measured and k in simulated]
             if off and any(e.name in FITTED_SPREADS[what] for e in state.model.effects):
-                factors[what] = float(np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *WITHIN))
+                factors[what] = float(np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *SPREAD_LIMITS))
         state = replace(state, factors=factors)
     return state
 
@@ -123,7 +123,7 @@ def search_maps(
     left = list(names)
     while left and len(rounds) <= MOST_MAP_EFFECTS:
         now = rounds[-1][0]
-        if not alarmed(null, now.rho):
+        if not is_significant(null, now.rho):
             break
         with ThreadPoolExecutor(case.jobs) as pool:
             tried = list(pool.map(lambda n, start=now.state: fit_candidate(case, start, null, values, n), left))
@@ -148,7 +148,7 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array,
     damping, best, least = FIRST_DAMPING, state, np.inf
     for _ in range(MAP_FIT_STEPS):
         at = unit_means(state, case, null.keys, [0])
-        now = misfit(residual(null, values, mean_prediction(null, at, 1))[use])
+        now = robust_squares(residual(null, values, mean_prediction(null, at, 1))[use])
         if now > least:
             damping *= 8.0
         else:
@@ -168,7 +168,7 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array,
             break
     predicted = unit_means(best, case, null.keys, range(PREDICTED_UNITS))
     rho = residual(null, values, mean_prediction(null, predicted, PREDICTED_UNITS))
-    return MapFit(name, best, sd, predicted, rho, misfit(rho[use]))
+    return MapFit(name, best, sd, predicted, rho, robust_squares(rho[use]))
 
 
 def fitted_parameters(name: str) -> tuple[str, ...]:

@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.result import LABELLED_LIGHT, NOMINAL_LIGHT, Conclusion, Evidence
-from spikecam_env.gap.search.forward import Round
+from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.twins.fresh_units import drawn
+from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit, free_refit
 from spikecam_env.gap.verdict.comparison import Comparison
@@ -53,7 +53,7 @@ def evidence_of(
         before_base=free_refit(list(first), list(case.conditions)),
         after_base=free_refit(list(last), list(case.conditions)) if last else None,
         again=again,
-        drawn_before=None if case.scenes_only else drawn(before, case.base, case.shape, case.seed),
-        drawn_after=drawn(after, case.base, case.shape, case.seed) if after and not case.scenes_only else None,
+        drawn_before=None if case.scenes_only else drawn_response(before, case.base, case.shape, case.seed),
+        drawn_after=drawn_response(after, case.base, case.shape, case.seed) if after and not case.scenes_only else None,
         light=NOMINAL_LIGHT if counted_anew else LABELLED_LIGHT,
     )

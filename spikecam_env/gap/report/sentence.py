@@ -7,7 +7,7 @@ import math
 from spikecam_env.gap.report.quantities import plain_sizes, quantity
 from spikecam_env.gap.report.words import human, listed, parameter_unit
 from spikecam_env.gap.result import CHANCE, Conclusion, Gap
-from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import gap_is_fitted
 from spikecam_env.sensor import CATALOGUE
 
@@ -108,7 +108,7 @@ HARDLY_A_GAP = 1.2
 """Times its floor up to which a gap is hardly one, and no share of it is stated to be removed."""
 
 
-def unfinished(effort: Effort) -> list[str]:
+def unfinished(effort: Budget) -> list[str]:
     """A note on what was not begun because enough had been simulated; none where nothing was left out."""
     left_out = listed([human(what) for what in effort.left_out], "and")
     return [f"To save time, not looked for: {left_out}. A larger --effort does."] if left_out else []

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
-from spikecam_env.gap.compare.distance import judged
-from spikecam_env.gap.compare.prediction import Null, scaled
+from spikecam_env.gap.compare.prediction import with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit.candidate import Fit, as_seen, concerned, predict
-from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import SensorModel
@@ -28,41 +27,47 @@ Array = NDArray[np.float64]
 
 PAIR = ("dead_time", "photo_response_nonlinearity")
 
-START_US, TURNS = 1.0, 4
-"""Dead time of the first twin, and how many there are at most."""
+START_US, MOST_TWINS_OF_BOTH = 1.0, 4
+"""Dead time [us] of the first twin, and how many there are at most."""
 
-FURTHEST = 4.0
+LARGEST_FACTOR = 4.0
 """Factor by which strengths are changed at once."""
 
+CLOSE_FACTOR = (0.8, 1.25)
+"""Factors between which what is left of the strengths is scaled, without another twin."""
 
-def opposed(case: Case, model: SensorModel, null: Null, seen: Array, names: Collection[str]) -> Fit | None:
-    """Both added to `model`, at the strength that suits (S,) `seen` best, as a fit of the second; None where only a
+
+def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
+    """Both added to the model, at the strength that suits what is seen best, as a fit of the second; None where only a
     wrong sign would do, or one of them is not among the candidates `names`."""
     if not set(PAIR) <= set(names):
         return None
-    only = concerned(case, PAIR, null, seen, np.full(len(null.keys), np.inf))
+    frame_rate_hz = problem.case.frame_rate_hz
+    only = problem.affected(PAIR)
     tau_us = START_US
-    bare = base = constrained_refit(both(case, model, tau_us), constrained_refit(model, case.base))
-    for _ in range(TURNS):
-        there = both(case, model, tau_us)
-        predicted = predict(case, there, base, null, 1, only)
-        base = as_seen(there, base, null, predicted)
-        square, _ = scale_to(null, seen, predicted)
+    bare = base = constrained_refit(
+        with_both(problem.model, tau_us, frame_rate_hz), constrained_refit(problem.model, problem.case.base)
+    )
+    for _ in range(MOST_TWINS_OF_BOTH):
+        there = with_both(problem.model, tau_us, frame_rate_hz)
+        predicted = problem.predict(there, base, 1, only)
+        base = problem.settled_unit(there, base, predicted)
+        square, _ = scale_to(problem.null, problem.seen, predicted)
         if square <= 0:
             return None
-        factor = float(np.clip(np.sqrt(square), 1 / FURTHEST, FURTHEST))
+        factor = float(np.clip(np.sqrt(square), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
         base, tau_us = extrapolated_unit(bare, base, factor**2), tau_us * factor
-        if 0.8 < factor < 1.25:
+        if CLOSE_FACTOR[0] < factor < CLOSE_FACTOR[1]:
             break
-    predicted = scaled(null, predicted, factor**2)
-    rho, left = judged(null, seen, predicted)
-    there = both(case, model, tau_us)
+    predicted = with_change_scaled(problem.null, predicted, factor**2)
+    rho, left = problem.residual_and_misfit(predicted)
+    there = with_both(problem.model, tau_us, frame_rate_hz)
     beta = next(e for e in there.effects if e.name == PAIR[1]).parameters()
     return Fit(PAIR[1], {"beta": beta["beta"]}, {}, predicted, base, rho, left, there)
 
 
-def both(case: Case, model: SensorModel, tau_us: float) -> SensorModel:
+def with_both(model: SensorModel, tau_us: float, frame_rate_hz: float) -> SensorModel:
     """The model with a dead time and the non-linearity that cancels it."""
-    beta = -tau_us * 1e-6 * case.frame_rate_hz
+    beta = -tau_us * 1e-6 * frame_rate_hz
     there = with_effect(model, PAIR[0], bounded(PAIR[0], {"tau_us": tau_us}))
     return with_effect(there, PAIR[1], bounded(PAIR[1], {"beta": beta}))

@@ -1,4 +1,4 @@
-"""Whether a measurement tells one candidate from another.
+"""Whether a measurement distinguishes one candidate from another.
 
 Had the other been true, would the first have looked as much better as it does?  The noise of the null's own draws, on
 top of what the other predicts, makes campaigns in which it is true: they say what lead of the first over it is chance.
@@ -13,22 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from spikecam_env.gap.compare.distance import judged
-from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, own_variance, scaled
+from spikecam_env.gap.compare.distance import residual_and_misfit
+from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, own_variance, with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
+from spikecam_env.gap.compare.thresholds import TO_PREFER
 
 Array = NDArray[np.float64]
 
-DOUBT = 0.01
+LEAST_CHANCE = 0.01
 """Chance of so large a lead below which a candidate is no rival."""
 
-LEAST = 6.0
-"""Lead that tells nothing, whatever the draws say: a likelihood ratio of 20."""
-
-CLOSE = 2 * LEAST
-"""Lead by which one may lose on some recordings to win on all: noise beside another effect is known from few twins."""
-
-CLEAR = 3.0
+APART = 3.0
 """Noises by which twins of two candidates have to differ for it to be their laws."""
 
 
@@ -36,39 +31,40 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
     """Whether `measured` may as well be of `other`; null: what both were added to.  draws: of the model as given, whose
     noise is made as large as that of `null`."""
     observed = lead(null, measured, best, other)
-    if observed < LEAST:
+    if observed < TO_PREFER:
         return True
     noise = np.array([d.values for d in draws])
     noise = noise - noise.mean(axis=0)
     scatter = noise.std(axis=0, ddof=1)
     noise *= np.maximum(null.sd / np.where(scatter > 0, scatter, np.inf), 1.0)
-    middle, own2 = likely(null, *(rescaled(null, measured, p) for p in (best, other)))
+    middle, own2 = most_likely(null, *(rescaled(null, measured, p) for p in (best, other)))
     noise += np.sqrt(own2) * np.random.default_rng(len(noise)).standard_normal(noise.shape)
     known = np.isfinite(measured)
     by_chance = [lead(null, np.where(known, middle + n, np.nan), best, other) for n in noise]
     above = observed - np.mean(by_chance)
     sd = np.std(by_chance, ddof=1) * np.sqrt(1 + 1 / len(noise))
-    return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > DOUBT)
+    return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > LEAST_CHANCE)
 
 
-def likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:
+def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:
     """((S,) what `other` most likely gives, (S,) the variance of that): where twins of the two do not clearly differ,
-    both tell it.  Its own chance, taken for its law, would be held against it."""
+    both
+    say what it gives.  Its own chance, taken for its law, would be held against it."""
     apart, own2, others2 = best.mean - other.mean, own_variance(null, other), own_variance(null, best)
     both2 = np.maximum(own2 + others2, 1e-300)
-    share = np.where(np.abs(apart) > CLEAR * np.sqrt(both2), 0.0, own2 / both2)
+    share = np.where(np.abs(apart) > APART * np.sqrt(both2), 0.0, own2 / both2)
     return other.mean + share * apart, (1.0 - share) * own2
 
 
 def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
     """Misfit by which `best` is better than `other`, each at the strength that suits `seen`, in the noise of both: two
-    twins of each do not tell whose campaigns scatter more, and the price of noise would decide."""
+    twins of each do not show whose campaigns scatter more, and the log variance would decide."""
     both = [rescaled(null, seen, p) for p in (other, best)]
     spread = np.sqrt(np.mean([p.spread**2 for p in both], axis=0))
-    left = [judged(null, seen, replace(p, spread=spread))[1] for p in both]
+    left = [residual_and_misfit(null, seen, replace(p, spread=spread))[1] for p in both]
     return left[0] - left[1]
 
 
 def rescaled(null: Null, seen: Array, predicted: Prediction) -> Prediction:
     """A prediction with its change from the null scaled to come nearest to what is seen."""
-    return scaled(null, predicted, scale_to(null, seen, predicted)[0])
+    return with_change_scaled(null, predicted, scale_to(null, seen, predicted)[0])

@@ -6,24 +6,24 @@ import math
 from dataclasses import dataclass, field
 
 CAMPAIGNS = 200.0
-"""Default: so many times the campaign's recordings, with the twins that tell its noise (about 15)."""
+"""Default: so many times the campaign's recordings, with the twins that its noise is known from (about 15)."""
 
-NEEDED = 1.3
+OVERRUN = 1.3
 """Times as much may be spent before what a verdict can hardly do without is not begun either."""
 
 
 @dataclass
-class Effort:
-    """most: recordings from which nothing more is begun that an answer can do without.
+class Budget:
+    """limit: recordings from which nothing more is begun that an answer can do without.
 
     spent: recordings that were simulated, a number a twin.  left_out: what was not begun.
-    settled: whether the verdict is there already, so that an answer can do without all.
+    verdict_known: whether the verdict is there already, so that an answer can do without all.
     """
 
-    most: float = math.inf
+    limit: float = math.inf
     spent: list[int] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
-    settled: bool = False
+    verdict_known: bool = False
 
     @property
     def simulated(self) -> int:
@@ -33,10 +33,10 @@ class Effort:
     def allows(self, what: str, recordings: int = 0, *, needed: bool = False) -> bool:
         """Whether `what`, which takes so many recordings at least, may be begun; noted where it may not.
 
-        needed: a verdict that is not settled can hardly do without it.
+        needed: an answer whose verdict is not known yet can hardly do without it.
         """
-        most = self.most * (NEEDED if needed and not self.settled else 1.0)
-        if self.simulated + recordings < most:
+        limit = self.limit * (OVERRUN if needed and not self.verdict_known else 1.0)
+        if self.simulated + recordings < limit:
             return True
         if what not in self.left_out:
             self.left_out.append(what)

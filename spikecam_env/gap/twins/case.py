@@ -14,8 +14,8 @@ from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.statistics import Key, pattern_bank, statistics_bank
 from spikecam_env.gap.statistics.film import Film, films
 from spikecam_env.gap.statistics.reading import Reading
-from spikecam_env.gap.twins.budget import Effort
-from spikecam_env.gap.twins.simulate import FIRST
+from spikecam_env.gap.twins.budget import Budget
+from spikecam_env.gap.twins.simulate import FIRST_SEED
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, free_refit
 from spikecam_env.sensor import SensorModel
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 class Case:
     """conditions, observations: of the measurement.  base: its free refit.  bank: its statistics.
 
-    effort: what was simulated for it, by all that was made of it.  nominal_per_label: nominal radiance of 1 of the
+    budget: what was simulated for it, by all that was made of it.  nominal_per_label: nominal radiance of 1 of the
     labels, by which the light of `conditions` was multiplied.
     """
 
@@ -40,12 +40,12 @@ class Case:
     seed: int
     jobs: int = 1
     frame_rate_hz: float = 40_000.0
-    effort: Effort = field(default_factory=Effort, compare=False)
+    budget: Budget = field(default_factory=Budget, compare=False)
     nominal_per_label: float = 1.0
 
     @property
     def scenes_only(self) -> bool:
-        """Whether no light is known: response and dark level cannot be told from the scene."""
+        """Whether no light is known: response and dark level cannot be distinguished from the scene."""
         return not any(c.kind in STEADY_KNOWN for c in self.conditions)
 
     def use(self, recording: str) -> str:
@@ -106,7 +106,7 @@ def twins(
     stands = refits or {}
 
     def made(n: int) -> Twin:
-        return _twin(case, model, base, case.seed * 1000 + FIRST + n, only, stands.get(n) or base)
+        return _twin(case, model, base, case.seed * 1000 + FIRST_SEED + n, only, stands.get(n) or base)
 
     with ThreadPoolExecutor(case.jobs) as pool:
         return list(pool.map(made, numbers))
@@ -114,15 +114,15 @@ def twins(
 
 def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None, refit: BaseFit) -> Twin:
     which = range(len(case.conditions)) if only is None else only
-    case.effort.spent.append(len(which))
+    case.budget.spent.append(len(which))
     conditions = [case.conditions[i] for i in which]
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)
-    own = free_refit(observations, conditions) if rests_on(case) <= set(which) else None
+    own = free_refit(observations, conditions) if refit_recordings(case) <= set(which) else None
     return Twin(statistics_bank(Reading(observations, conditions, own or refit, case.films)), own)
 
 
-def rests_on(case: Case) -> set[int]:
+def refit_recordings(case: Case) -> set[int]:
     """Recordings that the base refit rests on: of use fit and of known light, or where none is, of unknown scenes."""
     known = {i for i, c in enumerate(case.conditions) if c.kind in STEADY_KNOWN and c.use == "fit"}
     return known or {i for i, c in enumerate(case.conditions) if c.kind == "unknown"}

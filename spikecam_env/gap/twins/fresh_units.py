@@ -18,16 +18,16 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-UNITS = 24
+DRAWN_UNITS = 24
 """Units drawn for the pattern statistics of one model."""
 
-SPREADS = {
+SPREAD_PARAMETERS = {
     "gain": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
     "dark": {"dark_current_spread": "sigma_pA"},
 }
 """Parameters that make pixels differ, by effect and by what of a unit differs."""
 
-WITHIN = (0.6, 1.67)
+SPREAD_LIMITS = (0.6, 1.67)
 """Units' spreads lie within this of the model's; beyond, it is a gap."""
 
 
@@ -41,20 +41,22 @@ def drawn_banks(
     fitted = model
     for _ in range(2):
         fitted = _rescaled(fitted, model, base, shape, seed)
-    return [_bank(fitted, base, shown, shape, seed + n) for n in range(count)]
+    return [_pattern_statistics(fitted, base, shown, shape, seed + n) for n in range(count)]
 
 
 def _rescaled(
     model: SensorModel, nominal: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int
 ) -> SensorModel:
     out = model
-    for what, spreads in SPREADS.items():
+    for what, spreads in SPREAD_PARAMETERS.items():
         factor = spread_factor(model, what, width(getattr(base, what)[base.live]), shape, seed)
         for effect in model.effects:
             if effect.name in spreads:
                 key = spreads[effect.name]
                 first = next(e for e in nominal.effects if e.name == effect.name).parameters()[key]
-                value = float(np.clip(effect.parameters()[key] * factor, WITHIN[0] * first, WITHIN[1] * first))
+                value = float(
+                    np.clip(effect.parameters()[key] * factor, SPREAD_LIMITS[0] * first, SPREAD_LIMITS[1] * first)
+                )
                 out = out.with_effect(replace(effect, **{key: value}))
     return out
 
@@ -62,7 +64,7 @@ def _rescaled(
 def spread_factor(model: SensorModel, what: str, wanted: float, shape: tuple[int, int], seed: int) -> float:
     """By how much to multiply all spreads of `what` (gain or dark) that a model has, for a relative width `wanted`."""
     rest = model
-    for name in {e.name for e in model.effects} & SPREADS[what].keys():
+    for name in {e.name for e in model.effects} & SPREAD_PARAMETERS[what].keys():
         rest = rest.without(name)
     units = [m.draw_unit(shape, seed) for m in (model, rest)]
     whole, others = (width(getattr(unit, what)[responds(unit.gain)]) for unit in units)
@@ -76,7 +78,7 @@ def width(values: Array) -> float:
     return scatter(values) / middle if middle > 0 else 0.0
 
 
-def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:
+def drawn_response(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:
     """gain, dark (P,) of a fresh unit of the model, scaled to the measured unit's medians."""
     unit = model.draw_unit(shape, seed)
     live, alive = base.live & (base.gain > 0), responds(unit.gain)
@@ -86,10 +88,10 @@ def drawn(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) 
     return gain, dark
 
 
-def _bank(
+def _pattern_statistics(
     model: SensorModel, base: BaseFit, shown: Sequence[Condition], shape: tuple[int, int], seed: int
 ) -> dict[Key, float]:
-    gain, dark = drawn(model, base, shape, seed)
+    gain, dark = drawn_response(model, base, shape, seed)
     charge = drawn_traps(model, shape, seed)
     rng, phases, false = (np.random.default_rng([seed, n]) for n in (1, 2, 3))
     found = {}

@@ -16,9 +16,9 @@ from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.streams import pack_frames
 
-_BLOCK = 1024
+_BLOCK_FRAMES = 1024
 
-FIRST = 17
+FIRST_SEED = 17
 """Seed of a campaign's first twin; the others' follow."""
 
 
@@ -36,7 +36,7 @@ def simulate(
     """
     unit = unit_from_refit(model, base, shape)
     return [
-        observe(expose(model, as_known(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
+        observe(expose(model, with_label_error(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
         for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
     ]
 
@@ -45,24 +45,26 @@ def expose(
     model: SensorModel, unit: Unit, condition: Condition, shape: tuple[int, int], seed: int, take: int
 ) -> NDArray[np.uint8]:
     """(F, P/8) bits of one recording in known light."""
-    sensor = SpikeSensor(at_any_phase(model, seed, take), shape, seed, engine="auto", take=take, unit=unit, threads=1)
+    sensor = SpikeSensor(
+        with_random_phases(model, seed, take), shape, seed, engine="auto", take=take, unit=unit, threads=1
+    )
     light = condition.light
     assert light is not None
     picture: Keyframes | NDArray[np.float32] = light.radiance[0] if not condition.moves else light
-    spikes = np.empty((min(_BLOCK, condition.frames), *shape), np.uint8)
+    spikes = np.empty((min(_BLOCK_FRAMES, condition.frames), *shape), np.uint8)
     parts = []
-    for first in range(0, condition.frames, _BLOCK):
-        frames = min(_BLOCK, condition.frames - first)
+    for first in range(0, condition.frames, _BLOCK_FRAMES):
+        frames = min(_BLOCK_FRAMES, condition.frames - first)
         parts.append(pack_frames(sensor.step(picture, frames, out=spikes[:frames])))
     return np.concatenate(parts)
 
 
-def as_known(unit: Unit, seed: int, take: int) -> Unit:
-    """A unit of pixels that are all alike, in light and with a dark level no surer than they are known, drawn for one
+def with_label_error(unit: Unit, seed: int, take: int) -> Unit:
+    """A unit of identical pixels, in light and with a dark level drawn within what is known of them, for one
     recording: light to LABELS, dark to half a grain.
 
-    Where all pixels fire alike and without noise, the beat with the read-out's clock shows a hundred thousandth of the
-    rate: of the dark level what the sensor rounds, since it counts charge in whole grains, and of light what no label
+    Where all pixels fire at one rate and without noise, the beat with the read-out's clock shows 1e-5 of the rate:
+    of the dark level what the sensor rounds, since it counts charge in whole grains, and of light what no label
     says.  Drawn, it is no law.
     """
     if np.ptp(unit.gain) > 0:
@@ -72,14 +74,14 @@ def as_known(unit: Unit, seed: int, take: int) -> Unit:
     return replace(unit, gain=unit.gain * (1.0 + LABEL_ERROR * rng.standard_normal()), dark=unit.dark + grains / GRAINS)
 
 
-def at_any_phase(model: SensorModel, seed: int, take: int) -> SensorModel:
+def with_random_phases(model: SensorModel, seed: int, take: int) -> SensorModel:
     """The model with its waves at phases drawn for one recording: nobody starts a recording by the mains.
 
     Those of successive seeds are spread over the wave, two on opposite sides and four at right angles: of so few that
-    were drawn at random, all may be alike, and their scatter nothing.
+    were drawn at random, all may be the same, and their scatter nothing.
     """
     rng = np.random.default_rng(take)
-    spread = int(f"{max(seed - FIRST, 0):064b}"[::-1], 2) / 2**64  # van der Corput's sequence
+    spread = int(f"{max(seed - FIRST_SEED, 0):064b}"[::-1], 2) / 2**64  # van der Corput's sequence
     for effect in model.effects:
         if "phase_cycles" in effect.parameters():
             phase = (float(rng.random()) + spread) % 1.0

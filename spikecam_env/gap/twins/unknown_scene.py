@@ -25,14 +25,14 @@ from spikecam_env.sensor import Keyframes, SensorModel
 
 Array = NDArray[np.float64]
 
-FEWEST = 3
+FEWEST_SPIKES = 3
 """Spikes from which a pixel has a rate; others are given what two would."""
 
-EXACT = 3e-4
+RATE_TOLERANCE = 3e-4
 """Relative error of rates from which light is corrected."""
 
 _BINS = 12
-_TURNS = 6
+_MOST_CORRECTIONS = 6
 
 
 def simulate_seen(
@@ -64,21 +64,21 @@ def simulate_scene(
     model: SensorModel, base: BaseFit, scene: Condition, seen: Observation, shape: tuple[int, int], seed: int, take: int
 ) -> Observation:
     """One recording of an unknown scene, lit so that its pixels fire as in `seen`."""
-    wanted = likely_rates(seen, base.white, np.random.default_rng([seed, take]))
+    wanted = plausible_true_rates(seen, base.white, np.random.default_rng([seed, take]))
     light = np.maximum(wanted - base.dark, 0.0) / np.maximum(base.gain, 1e-9)
-    for turn in range(_TURNS):
+    for turn in range(_MOST_CORRECTIONS):
         lit = replace(scene, light=Keyframes(np.zeros(1), light.reshape(1, *shape).astype(np.float32)))
         [twin] = simulate(model, base, [lit], shape, seed, [take])
-        factor = missed_by(twin.rate, wanted)
-        if turn == _TURNS - 1 or np.abs(factor - 1.0).max() < EXACT:
+        factor = correction(twin.rate, wanted)
+        if turn == _MOST_CORRECTIONS - 1 or np.abs(factor - 1.0).max() < RATE_TOLERANCE:
             break
         light = light * factor
     return twin
 
 
-def likely_rates(seen: Observation, white: float, rng: np.random.Generator) -> Array:
+def plausible_true_rates(seen: Observation, white: float, rng: np.random.Generator) -> Array:
     """(P,) rates [thresholds/frame] that the pixels may have had."""
-    few = seen.times.count < FEWEST
+    few = seen.times.count < FEWEST_SPIKES
     known = replace(
         seen.times,
         count=np.where(few, 2, seen.times.count),
@@ -88,7 +88,7 @@ def likely_rates(seen: Observation, white: float, rng: np.random.Generator) -> A
     return np.asarray(plausible_rates(known, white, rng), np.float64)
 
 
-def missed_by(simulated: Array, wanted: Array) -> Array:
+def correction(simulated: Array, wanted: Array) -> Array:
     """(P,) factor by which light misses, a smooth function of the rate: means of pixels of about the same one."""
     edges = np.unique(np.quantile(wanted, np.linspace(0.0, 1.0, _BINS + 1)))
     if edges.size < 3 or simulated.sum() == 0:

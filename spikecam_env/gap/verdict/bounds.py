@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.null_model import unit_under
-from spikecam_env.gap.candidates.strength import bounded, may_be_negative
-from spikecam_env.gap.candidates.table import candidate, is_pattern
+from spikecam_env.gap.candidates.strength import bounded
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import Templates
@@ -72,12 +72,12 @@ def bounds(
         case = replace(case, base=unit_under(case, model))
     starts = [(e.name, p) for e in templates.weakest if e.name in names for p in _both_signs(e.name, e.parameters)]
     by_name = dict.fromkeys(name for name, _ in starts)
-    if not case.effort.allows("upper bounds", CAMPAIGNS_OF_BOUNDS * len(case.conditions)):
+    if not case.budget.allows("upper bounds", CAMPAIGNS_OF_BOUNDS * len(case.conditions)):
         return [], [(name, MORE_EFFORT) for name in by_name]
 
     def scored(start: tuple[str, Parameters]) -> ScoredShape:
         name, parameters = start
-        of_units = is_pattern(name)
+        of_units = candidate(name).is_pattern
         probe = UnitProbe(case, model, null, name) if of_units else TwinProbe(case, model, null, measured, name)
         return scored_shape(probe, measured, parameters)
 
@@ -91,7 +91,7 @@ def bounds(
 
 def _both_signs(name: str, parameters: Parameters) -> list[Parameters]:
     key = strength_of(name)
-    return [parameters, {**parameters, key: -parameters[key]}] if may_be_negative(name) else [parameters]
+    return [parameters, {**parameters, key: -parameters[key]}] if candidate(name).may_be_negative else [parameters]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.baseline.off_nominal import OffNominal
 from spikecam_env.gap.compare.distance import adjusted, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.search.forward import of_fit
+from spikecam_env.gap.fit.problem import values_to_fit
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.sensor import SensorModel
 
@@ -50,7 +50,7 @@ class Comparison:
     @property
     def disagrees(self) -> bool:
         """Whether the recordings to fit, or all together, are not what the null model gives."""
-        return is_discrepant(self.null, of_fit(self.case, self.null, self.values)) or is_discrepant(
+        return is_discrepant(self.null, values_to_fit(self.case, self.null, self.values)) or is_discrepant(
             self.null, self.values
         )
 

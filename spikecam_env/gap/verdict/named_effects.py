@@ -12,7 +12,7 @@ from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.result import MOST_CONFIDENCE, Estimate, NamedEffect, Ranked
-from spikecam_env.gap.search.forward import Round
+from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 
-from spikecam_env.gap.search.forward import Round
+from spikecam_env.gap.search.round import Round
 
 
 class Note(StrEnum):
@@ -26,8 +26,8 @@ class Note(StrEnum):
 
 def notes_of(rounds: Sequence[Round]) -> list[str]:
     """Notes on the rounds of a search whose effects were kept."""
-    from_held_out = [Note.PARAMETERS_FROM_HELD_OUT] if any(r.lent for r in rounds) else []
-    return [*from_held_out, *([Note.ONLY_HELD_OUT_DISAGREE] if any(r.alone for r in rounds) else [])]
+    from_held_out = [Note.PARAMETERS_FROM_HELD_OUT] if any(r.used_held_out for r in rounds) else []
+    return [*from_held_out, *([Note.ONLY_HELD_OUT_DISAGREE] if any(r.motion_alone for r in rounds) else [])]
 
 
 def gap_is_fitted(notes: Sequence[str]) -> bool:

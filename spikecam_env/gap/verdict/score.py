@@ -19,12 +19,13 @@ from scipy import stats
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import candidate, expected_events
-from spikecam_env.gap.compare.prediction import Null, Prediction, of_a_pair, pooled
+from spikecam_env.gap.compare.prediction import Null, Prediction, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import is_clear
-from spikecam_env.gap.fit.candidate import WANDER, concerned, predict, twins_of, with_pattern
-from spikecam_env.gap.fit.gauss_newton import settled_there
+from spikecam_env.gap.fit.gauss_newton import at_settled_unit
+from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
+from spikecam_env.gap.fit.recordings import TWINS_OF_RANDOM_COURSE, recordings_affected, twins_of
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.twins.fresh_units import UNITS
+from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -120,21 +121,21 @@ class TwinProbe(EffectProbe):
 
     def __init__(self, case: Case, model: SensorModel, null: Null, measured: Array, name: str):
         super().__init__(case, model, null, name)
-        self.only = concerned(case, [name], null, measured, np.full(len(null.keys), np.inf))
+        self.only = recordings_affected(case, [name], null, measured, np.full(len(null.keys), np.inf))
         used = {case.conditions[i].name for i in self.only}
         self.usable = np.array([k.group != "pattern" and k.recording in used for k in null.keys])
-        self.random_course = candidate(name).wanders
+        self.random_course = candidate(name).random_course
 
     def score(self, parameters: Parameters, count: int = 1) -> Score | None:
         """The score by the statistics that the effect clearly changes at some strength; None where it changes none."""
-        count = min(WANDER if self.random_course else count, len(self.null.draws) // 2)
+        count = min(TWINS_OF_RANDOM_COURSE if self.random_course else count, len(self.null.draws) // 2)
         strong = with_effect(self.model, self.name, parameters)
         bare = constrained_refit(strong, constrained_refit(self.model, self.case.base))
 
         def probe(model: SensorModel, unit: BaseFit) -> Prediction:
-            return predict(self.case, model, unit, self.null, count, self.only)
+            return predict_by_twins(self.case, model, unit, self.null, count, self.only)
 
-        made, unit = settled_there(probe, self.null, strong, bare, [])
+        made, unit = at_settled_unit(probe, self.null, strong, bare, [])
         found = (self._scatter_score if self.random_course else self._change_score)(made, parameters)
         return replace(found, bare=bare, unit=unit) if found else None
 
@@ -147,7 +148,7 @@ class TwinProbe(EffectProbe):
     def _change_score(self, made: Prediction, parameters: Parameters) -> Score | None:
         null, count = self.null, len(made.draws)
         change = np.where(self.usable, np.nan_to_num(made.mean - null.mean), 0.0)
-        own2 = (of_a_pair(null.keys) * null.noise) ** 2 / count
+        own2 = (pair_noise_share(null.keys) * null.noise) ** 2 / count
         change = np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0)
         without = {d.number: d.values for d in null.draws}
         each = np.nan_to_num([d.values - without[d.number] for d in made.draws])
@@ -171,10 +172,10 @@ class TwinProbe(EffectProbe):
         assert score.bare is not None and score.unit is not None
         key, events = strength_of(self.name), self.events(parameters)
         times = abs(parameters[key] / score.parameters[key]) ** power_of(self.name)
-        count = min(WANDER if self.random_course else TWINS_A_TEST, len(score.without))
+        count = min(TWINS_OF_RANDOM_COURSE if self.random_course else TWINS_A_TEST, len(score.without))
         null = replace(self.null, draws=self.null.draws[:count])
         unit = extrapolated_unit(score.bare, score.unit, min(times, 1.0))
-        made = predict(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
+        made = predict_by_twins(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
         scores, without = (np.array([score.of(d.values) for d in draws]) for draws in (made.draws, null.draws))
         if self.random_course:
             sd = float(scores.std(ddof=1)) * np.sqrt(1 + 1 / count)
@@ -210,11 +211,11 @@ class UnitProbe(EffectProbe):
         units, events = self._units(with_effect(self.model, self.name, parameters)), self.events(parameters)
         scores = np.array([score.of(v) for v in units])
         excess = float(scores.mean()) - score.mean
-        sd = float(np.sqrt(self.score_variance(score, scores, excess, events) * (1 + 1 / UNITS) + score.error**2))
-        return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, UNITS - 1)), events)
+        sd = float(np.sqrt(self.score_variance(score, scores, excess, events) * (1 + 1 / DRAWN_UNITS) + score.error**2))
+        return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, DRAWN_UNITS - 1)), events)
 
     def _units(self, model: SensorModel) -> Array:
-        units = with_pattern(self.case, model, self.null, self.null.prediction).units
+        units = with_drawn_pattern(self.case, model, self.null, self.null.prediction).units
         assert units is not None
         return units
 

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
-from spikecam_env.gap.candidates.table import candidate, is_pattern
-from spikecam_env.gap.compare.distance import adjusted, alarmed, deviates, misfit, residual
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.result import Conclusion, NamedEffect, Statistic
-from spikecam_env.gap.search.forward import BESIDE, SECOND, Round
+from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND, Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of, usable_floor
@@ -91,7 +91,7 @@ def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str,
 
 def with_patterns_of(model: SensorModel, found: SensorModel) -> SensorModel:
     """The model with those effects of another that make pixels differ: what they explain, its own spreads do not."""
-    return reduce(SensorModel.with_effect, (e for e in found.effects if is_pattern(e.name)), model)
+    return reduce(SensorModel.with_effect, (e for e in found.effects if candidate(e.name).is_pattern), model)
 
 
 def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> bool:
@@ -101,17 +101,17 @@ def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) ->
 
 def second_left_out(case: Case) -> bool:
     """Whether a second effect was not looked for, to save time."""
-    return SECOND in case.effort.left_out
+    return SECOND in case.budget.left_out
 
 
 def explains(null: Null, before: Array, left: Array, predicted: Prediction) -> bool:
     """Whether residuals (S,) `left` of a prediction are chance; or, beside (S,) those of the null model, few and small,
     and none that agreed before, which would contradict what was added."""
     by_chance = float(np.sum(null.weight * np.ones(len(left))))
-    share = (misfit(left, null.weight) - by_chance) / max(misfit(before, null.weight) - by_chance, 1.0)
+    share = (robust_squares(left, null.weight) - by_chance) / max(robust_squares(before, null.weight) - by_chance, 1.0)
     small = np.abs(left).max() < MOST_DEVIATE_LEFT * np.abs(before).max()
-    contradicted = alarmed(null, np.where(np.abs(left) > np.abs(before), left, 0.0), predicted)
-    return not alarmed(null, left, predicted) or bool(share < MOST_DEVIANCE_LEFT and small and not contradicted)
+    contradicted = is_significant(null, np.where(np.abs(left) > np.abs(before), left, 0.0), predicted)
+    return not is_significant(null, left, predicted) or bool(share < MOST_DEVIANCE_LEFT and small and not contradicted)
 
 
 def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
@@ -147,8 +147,8 @@ def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> dic
 
 
 def enough_effort(case: Case) -> int:
-    """Effort with which another effect would have been looked for beside those found, in tens."""
-    return 10 * math.ceil((case.effort.simulated / len(case.conditions) + BESIDE + 1) / 10)
+    """Budget with which another effect would have been looked for beside those found, in tens."""
+    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + CAMPAIGNS_PER_EFFECT + 1) / 10)
 
 
 def tied(found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:

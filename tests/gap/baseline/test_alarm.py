@@ -11,7 +11,7 @@ from small import null, recorded
 
 from spikecam_env.gap.baseline.alarm import is_discrepant, with_held_out_motion
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.search.forward import of_fit
+from spikecam_env.gap.fit.problem import values_to_fit
 from spikecam_env.gap.statistics import Key
 
 
@@ -32,7 +32,7 @@ def test_the_alarm_depends_on_the_statistics_that_it_is_given_alone():
     values = values_of(case.bank, there.keys)
     assert not is_discrepant(there, values)
     values[~case.to_fit(there.keys)] += 20 * there.noise[~case.to_fit(there.keys)]
-    assert is_discrepant(there, values) and not is_discrepant(there, of_fit(case, there, values))
+    assert is_discrepant(there, values) and not is_discrepant(there, values_to_fit(case, there, values))
 
 
 @pytest.mark.parametrize("p, alarm", [(0.012, True), (0.033, False)])

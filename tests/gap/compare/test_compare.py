@@ -12,25 +12,25 @@ from spikecam_env.gap.compare.distance import (
     GATE,
     HEAVY,
     adjusted,
-    alarmed,
     deviates,
     freedom_of,
-    misfit,
-    normal,
+    is_significant,
+    normal_deviates,
     of_all_recordings,
     residual,
+    robust_squares,
 )
 from spikecam_env.gap.compare.prediction import (
-    PAIRED,
+    PAIR_NOISE,
     TOLERANCE,
     Draw,
     Null,
     Prediction,
     null_of,
     paired,
-    scaled,
     spread_of,
     values_of,
+    with_change_scaled,
 )
 from spikecam_env.gap.compare.step import slope_of, step_of
 from spikecam_env.gap.statistics import Key, floor_of
@@ -88,8 +88,8 @@ def test_an_effect_that_scatters_is_not_held_against_its_own_few_twins(twins, re
         added = 10.0 + np.sqrt(8.0) * rng.standard_normal((twins + 1, 200))
         predicted = paired(null, [Draw(n, made[n] + added[n], None) for n in range(twins)])
         rho = residual(null, rng.standard_normal(200) + added[twins], replace(predicted, own=np.zeros(200)))
-        with_own += alarmed(null, rho, predicted)
-        as_the_nulls += alarmed(null, rho)
+        with_own += is_significant(null, rho, predicted)
+        as_the_nulls += is_significant(null, rho)
     share, allowed = with_own / 300, GATE + 4 * np.sqrt(GATE * (1 - GATE) / 300)
     print(f"{twins} twins, {recordings} recordings: {share:.3f}, allowed {allowed:.3f}; {as_the_nulls / 300:.3f}")
     assert share < allowed < as_the_nulls / 300
@@ -127,22 +127,24 @@ def test_what_drawn_units_show_is_no_less_likely_than_their_number_says():
     units[:4] = 10.0
     there = Prediction(np.zeros(3), np.zeros(3), np.ones(3), units=units)
     t = np.array([8.0, -8.0, 12.0])
-    z, before = normal(null, t, there), normal(null, t, replace(there, units=None))
+    z, before = normal_deviates(null, t, there), normal_deviates(null, t, replace(there, units=None))
     print(z, before)
     assert z[0] == pytest.approx(stats.norm.isf(5 / 41))
-    assert z[1:] == pytest.approx(np.array([-1, 1]) * np.abs(normal(null, t, replace(there, units=0 * units)))[1:])
+    assert z[1:] == pytest.approx(
+        np.array([-1, 1]) * np.abs(normal_deviates(null, t, replace(there, units=0 * units)))[1:]
+    )
 
 
 def test_noise_that_is_known_makes_a_normal_deviate():
     """All floor: Student's t has no say.  All learnt: |z| of Student's t of 11 at 5 is 3.6 or so."""
-    assert normal(made_up(sd=1e-9, floor=1.0), np.array([5.0]))[0] == pytest.approx(5.0, abs=0.01)
-    learnt = float(normal(made_up(), np.array([5.0]))[0])
+    assert normal_deviates(made_up(sd=1e-9, floor=1.0), np.array([5.0]))[0] == pytest.approx(5.0, abs=0.01)
+    learnt = float(normal_deviates(made_up(), np.array([5.0]))[0])
     assert learnt == pytest.approx(stats.norm.isf(stats.t.sf(5.0, 11)))
     assert learnt < 5.0
 
 
 def test_deviates_keep_their_sign_and_stay_finite():
-    z = normal(made_up(count=3), np.array([-1e9, 0.0, 1e9]))
+    z = normal_deviates(made_up(count=3), np.array([-1e9, 0.0, 1e9]))
     assert z[0] == -z[2] and np.isfinite(z).all() and abs(z[2]) > 20 and z[1] == 0.0
 
 
@@ -186,12 +188,12 @@ def test_residual_forgives_a_share_of_the_effects_own_size():
 def test_misfit_of_noise_alone_is_about_the_number_of_statistics():
     """E[9 log(1 + z^2 / 8)] = 0.98 of a statistic; 100 000 of them."""
     z = np.random.default_rng(0).standard_normal(100_000)
-    print(f"{misfit(z) / z.size:.3f}")
-    assert misfit(z) / z.size == pytest.approx(0.98, abs=0.03)
+    print(f"{robust_squares(z) / z.size:.3f}")
+    assert robust_squares(z) / z.size == pytest.approx(0.98, abs=0.03)
 
 
 def test_misfit_grows_with_the_logarithm_of_what_is_far_off():
-    far, further = misfit(np.array([1e3])), misfit(np.array([1e4]))
+    far, further = robust_squares(np.array([1e3])), robust_squares(np.array([1e4]))
     assert further - far == pytest.approx((HEAVY + 1) * np.log(100), rel=1e-3)
 
 
@@ -227,7 +229,7 @@ def test_the_noise_of_a_twin_cancels_against_the_nulls_of_the_same_draws():
     assert one.error**2 == pytest.approx(null.sd**2 / 12 + null.sd**2)
     rates = replace(null, keys=tuple(Key("rates", "r", str(i)) for i in range(40)))
     of_rates = paired(rates, made[:1])
-    assert of_rates.error**2 == pytest.approx(null.sd**2 / 12 + (PAIRED["rates"] * null.sd) ** 2)
+    assert of_rates.error**2 == pytest.approx(null.sd**2 / 12 + (PAIR_NOISE["rates"] * null.sd) ** 2)
 
 
 def test_what_was_not_simulated_is_the_nulls_and_is_known_as_well():
@@ -241,7 +243,7 @@ def test_what_was_not_simulated_is_the_nulls_and_is_known_as_well():
 def test_a_scaled_prediction_has_the_error_of_its_pairs_scaled_too():
     null = drawn()
     one = paired(null, [Draw(0, null.draws[0].values + 2.0, None)])
-    twice = scaled(null, one, 2.0)
+    twice = with_change_scaled(null, one, 2.0)
     assert twice.mean - null.mean == pytest.approx(4.0)
     assert twice.error**2 - null.sd**2 / 12 == pytest.approx(4 * null.sd**2)
 

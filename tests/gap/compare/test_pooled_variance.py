@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import polygamma
 
-from spikecam_env.gap.compare.pooled_variance import bias, moderated, worth
+from spikecam_env.gap.compare.pooled_variance import bias, freedom_of_variance, moderated
 from spikecam_env.gap.statistics import Key
 
 FREEDOM = 11
@@ -81,5 +81,5 @@ def test_what_stands_alone_or_never_varies_is_left():
 
 
 def test_degrees_of_freedom_of_a_variance():
-    assert worth(0.0) == 2000.0
-    assert worth(float(polygamma(1, 5.5))) == pytest.approx(11.0)
+    assert freedom_of_variance(0.0) == 2000.0
+    assert freedom_of_variance(float(polygamma(1, 5.5))) == pytest.approx(11.0)

@@ -10,14 +10,16 @@ from small import MODEL, effect, null, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.strength import with_effect
-from spikecam_env.gap.candidates.table import CANDIDATES, candidate, chosen, is_pattern
+from spikecam_env.gap.candidates.table import CANDIDATES, candidate, chosen
 from spikecam_env.gap.candidates.table import testable as split_testable
-from spikecam_env.gap.compare.distance import judged, misfit
+from spikecam_env.gap.compare.distance import residual_and_misfit, robust_squares
 from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.compare.step import scale_of
-from spikecam_env.gap.fit import candidate as fit_module
-from spikecam_env.gap.fit.candidate import concerned, fit, predict, slope_between, with_held_out
-from spikecam_env.gap.search.forward import standing_on
+from spikecam_env.gap.fit import problem as problem_module
+from spikecam_env.gap.fit.candidate import fit, slope_between
+from spikecam_env.gap.fit.predict import predict_by_twins
+from spikecam_env.gap.fit.problem import Problem, standing_on
+from spikecam_env.gap.fit.recordings import recordings_affected, with_held_out
 from spikecam_env.gap.twins.fresh_units import spread_factor
 from spikecam_env.gap.unit.indirect_inference import gain_change
 from spikecam_env.gap.unit.refit import constrained_refit
@@ -44,11 +46,13 @@ def test_the_slope_of_what_saturates_is_told_by_two_twins():
     one, other = (Prediction(n.mean + line(s), n.sd / np.sqrt(n.twins), n.sd) for s in (2.0, 2.4))
     lacks = np.arange(len(n.keys)) % 2 == 0
     one = replace(one, mean=np.where(lacks, n.mean, one.mean))
-    slope = slope_between(n, n.mean, (2.0, one), (2.4, other))
+    slope = slope_between(Problem(recorded(), MODEL, n, n.mean, n.mean), (2.0, one), (2.4, other))
     assert slope is not None and np.all(slope[lacks] == 0)
     assert slope[~lacks] / (40.0 * n.noise[~lacks]) == pytest.approx(2 * 2.2**2 / (1 + 2.2**2), rel=0.02)
-    assert slope_between(n, n.mean, (2.4, one), (2.4, other)) is None, "no two strengths"
-    assert slope_between(n, n.mean, None, (2.4, other)) is None, "no two twins"
+    assert slope_between(Problem(recorded(), MODEL, n, n.mean, n.mean), (2.4, one), (2.4, other)) is None, (
+        "no two strengths"
+    )
+    assert slope_between(Problem(recorded(), MODEL, n, n.mean, n.mean), None, (2.4, other)) is None, "no two twins"
 
 
 def test_an_effect_that_shows_nowhere_has_no_scale():
@@ -69,7 +73,9 @@ def test_an_effect_of_moving_light_concerns_the_moving_recordings_only():
     case = recorded()
     noise = null().noise
     change = np.array([20.0 * n if k.group == "step" else 0.0 for k, n in zip(null().keys, noise, strict=True)])
-    names = [case.conditions[i].name for i in concerned(case, ["photodiode_lag"], null(), null().mean, change)]
+    names = [
+        case.conditions[i].name for i in recordings_affected(case, ["photodiode_lag"], null(), null().mean, change)
+    ]
     assert names == ["step"]
 
 
@@ -77,7 +83,7 @@ def test_an_effect_that_changes_rates_is_never_simulated_without_what_the_refit_
     case = recorded()
     noise = null().noise
     change = np.array([20.0 * n if k.group == "step" else 0.0 for k, n in zip(null().keys, noise, strict=True)])
-    which = concerned(case, ["crosstalk"], null(), null().mean, change)
+    which = recordings_affected(case, ["crosstalk"], null(), null().mean, change)
     still = {i for i, c in enumerate(case.conditions) if c.kind in ("dark", "flat") and c.use == "fit"}
     assert still < set(which)
 
@@ -85,7 +91,9 @@ def test_an_effect_that_changes_rates_is_never_simulated_without_what_the_refit_
 def test_an_effect_on_one_flat_concerns_all_that_the_refit_rests_on():
     case = recorded()
     there = [(k.group, k.recording) == ("rates", "flat-0.65") for k in null().keys]
-    which = concerned(case, ["photodiode_lag"], null(), null().mean, np.where(there, 20.0 * null().noise, 0.0))
+    which = recordings_affected(
+        case, ["photodiode_lag"], null(), null().mean, np.where(there, 20.0 * null().noise, 0.0)
+    )
     still = {i for i, c in enumerate(case.conditions) if c.kind in ("dark", "flat") and c.use == "fit"}
     assert still <= set(which)
 
@@ -94,7 +102,7 @@ def test_held_out_recordings_take_no_part_in_a_fit_even_if_the_effect_shows_on_t
     case = recorded()
     held = {i for i, c in enumerate(case.conditions) if c.use == "holdout"}
     everywhere = np.full(len(null().keys), np.inf)
-    assert held and not held & set(concerned(case, ["crosstalk"], null(), null().mean, everywhere))
+    assert held and not held & set(recordings_affected(case, ["crosstalk"], null(), null().mean, everywhere))
 
 
 @pytest.mark.parametrize("start", [0.5, 2.0])
@@ -103,7 +111,9 @@ def test_fit_of_the_true_effect_finds_its_strength_from_half_or_twice_of_it(star
     true = effect("photodiode_lag", fraction=0.08, tau_us=1000.0)
     case = recorded(true)
     measured = values_of(case.bank, null().keys)
-    found = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08 * start, "tau_us": 1000.0})
+    found = fit(
+        Problem(case, MODEL, null(), measured, measured), "photodiode_lag", {"fraction": 0.08 * start, "tau_us": 1000.0}
+    )
     print(found.parameters, found.sd, f"misfit {found.misfit:.0f} of {len(measured)}")
     assert found.parameters["fraction"] == pytest.approx(0.08, rel=0.15)
     assert found.misfit < 1.5 * len(measured)
@@ -113,11 +123,13 @@ def test_fit_of_the_true_effect_finds_its_strength_from_half_or_twice_of_it(star
 def test_a_wrong_effect_leaves_more_than_the_right_one():
     case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
     measured = values_of(case.bank, null().keys)
-    right = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
-    wrong = fit(case, MODEL, null(), measured, "readout_skew", {"span": 0.5})
+    right = fit(
+        Problem(case, MODEL, null(), measured, measured), "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0}
+    )
+    wrong = fit(Problem(case, MODEL, null(), measured, measured), "readout_skew", {"span": 0.5})
     print(f"right {right.misfit:.0f}, wrong {wrong.misfit:.0f}")
     assert wrong.misfit > right.misfit + 40
-    assert right.misfit >= misfit(right.rho)
+    assert right.misfit >= robust_squares(right.rho)
 
 
 # ---- candidates
@@ -136,8 +148,12 @@ def test_an_effect_without_a_line_of_its_own_is_fitted_by_its_strength(monkeypat
 
 
 def test_pattern_effects_are_those_that_only_draw_units():
-    assert is_pattern("hot_pixels") and is_pattern("row_fixed_pattern") and not is_pattern("dead_time")
-    assert not is_pattern("optical_blur") and not is_pattern("reset_noise")
+    assert (
+        candidate("hot_pixels").is_pattern
+        and candidate("row_fixed_pattern").is_pattern
+        and not candidate("dead_time").is_pattern
+    )
+    assert not candidate("optical_blur").is_pattern and not candidate("reset_noise").is_pattern
 
 
 def test_what_the_model_has_is_no_candidate():
@@ -158,12 +174,13 @@ def test_what_needs_motion_is_not_testable_in_steady_light():
 def test_a_fit_without_hope_ends_with_its_first_twin(monkeypatch):
     """Skew where only the dark drifts: nothing to scale, so nothing to try again."""
     case, asked = recorded(effect("dark_current_drift", rise=0.3, tau_ms=50.0)), []
-    monkeypatch.setattr(fit_module, "predict", lambda *a, **k: asked.append(1) or predict(*a, **k))
-    measured = values_of(case.bank, null().keys)
-    found = fit(case, MODEL, null(), measured, "readout_skew", {"span": 1.0})
-    print(
-        f"{len(asked)} predictions, misfit {judged(null(), measured, null().prediction)[1]:.0f} to {found.misfit:.0f}"
+    monkeypatch.setattr(
+        problem_module, "predict_by_twins", lambda *a, **k: asked.append(1) or predict_by_twins(*a, **k)
     )
+    measured = values_of(case.bank, null().keys)
+    problem = Problem(case, MODEL, null(), measured, measured)
+    found = fit(problem, "readout_skew", {"span": 1.0})
+    print(f"{len(asked)} predictions, misfit {problem.misfit():.0f} to {found.misfit:.0f}")
     assert len(asked) == 1 and found.parameters["span"] < 0.1
 
 
@@ -182,10 +199,10 @@ def test_beside_a_bend_what_shows_by_motion_is_read_by_a_refit_with_that_bend():
     bent = with_effect(MODEL, "photo_response_nonlinearity", {"beta": 0.05})
     case = recorded(effect("photo_response_nonlinearity", beta=0.05))
     base = constrained_refit(bent, case.base)
-    here = standing_on(null(), predict(case, bent, base, null(), 2))
+    here = standing_on(null(), predict_by_twins(case, bent, base, null(), 2))
     skewed = with_effect(bent, "readout_skew", {"span": 0.5})
     moving = [i for i, c in enumerate(case.conditions) if c.moves]
-    whole, part = (predict(case, skewed, base, here, 1, only) for only in (None, moving))
+    whole, part = (predict_by_twins(case, skewed, base, here, 1, only) for only in (None, moving))
     off = (part.mean - whole.mean) / here.noise
     names = {case.conditions[i].name for i in moving}
     worst = float(np.abs(off[[k.recording in names for k in here.keys]]).max())
@@ -208,8 +225,8 @@ def test_a_weak_effect_on_rates_is_fitted_beside_light_that_saturates(seed):
     case = recorded(effect("crosstalk", kick=0.0025), seed=seed)
     without = model_null(case, MODEL, 12)
     measured = values_of(case.bank, without.keys)
-    found = fit(case, MODEL, without, measured, "crosstalk", {"kick": 0.002})
-    print(found.parameters, judged(without, measured, without.prediction)[1], found.misfit)
+    found = fit(Problem(case, MODEL, without, measured, measured), "crosstalk", {"kick": 0.002})
+    print(found.parameters, residual_and_misfit(without, measured, without.prediction)[1], found.misfit)
     assert found.parameters["kick"] == pytest.approx(0.0025, rel=0.2)
 
 

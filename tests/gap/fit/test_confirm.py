@@ -9,10 +9,13 @@ from small import MODEL, TWINS, effect, null, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.strength import with_effect
-from spikecam_env.gap.compare.distance import alarmed, judged, residual, size_of
+from spikecam_env.gap.compare.distance import effect_size, is_significant, residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.fit.candidate import MANY, Fit, fit, predict, with_pattern
-from spikecam_env.gap.fit.confirm import as_wide, confirmed, is_missed, made_loud, made_sure, of_any_dark, quietened
+from spikecam_env.gap.fit.candidate import Fit, fit
+from spikecam_env.gap.fit.confirm import amplified_fit, attenuated, confirmed, no_more_certain, with_dark_levels_open
+from spikecam_env.gap.fit.predict import MANY_UNITS, predict_by_twins, with_drawn_pattern
+from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.search.neighbours import is_missed, try_more_draws
 from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
 from spikecam_env.gap.unit.refit import constrained_refit
 
@@ -22,14 +25,14 @@ def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     case = recorded(effect("dead_time", tau_us=0.02))
     there = model_null(case, MODEL, TWINS)
     measured = values_of(case.bank, there.keys)
-    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.02})
-    size = size_of(there, measured, found.prediction.mean - there.mean)
-    loud, times = made_loud(case, MODEL, there, measured, found, "dead_time")
+    found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.02})
+    size = effect_size(there, measured, found.prediction.mean - there.mean)
+    loud, times = amplified_fit(Problem(case, MODEL, there, measured, measured), found, "dead_time")
     assert 1 < times <= MOST_EXTRAPOLATED and loud.parameters == found.parameters
     which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
-    many = predict(case, found.model, found.base, there, TWINS, which)
-    few = predict(case, found.model, found.base, there, 2, which)
-    louder = quietened(there, predict(case, loud.model, loud.base, there, 2, which), times)
+    many = predict_by_twins(case, found.model, found.base, there, TWINS, which)
+    few = predict_by_twins(case, found.model, found.base, there, 2, which)
+    louder = attenuated(there, predict_by_twins(case, loud.model, loud.base, there, 2, which), times)
     off = [float(np.sqrt(np.mean(((p.mean - many.mean) / there.noise) ** 2))) for p in (few, louder)]
     print(f"shows by {size:.1f}; two twins are {off[0]:.2f} noises off, {times:.2f} times as loud {off[1]:.2f}")
     assert off[1] < 0.7 * off[0]
@@ -43,8 +46,8 @@ def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_kno
     case, there = recorded(), null()
     loud = with_effect(MODEL, "common_threshold_noise", {"sigma_mV": 20.0})
     alike = constrained_refit(loud, replace(case.base, dark=np.full_like(case.base.dark, np.median(case.base.dark))))
-    made = predict(case, loud, alike, there, 2)
-    wider = of_any_dark(case, loud, alike, there, made)
+    made = predict_by_twins(case, loud, alike, there, 2)
+    wider = with_dark_levels_open(Problem(case, MODEL, there, there.mean, there.mean), loud, alike, made)
     more = dict(zip(there.keys, np.sqrt(wider.error**2 - made.error**2) / there.noise, strict=True))
     slopes = {k.recording: more[k] for k in there.keys if k.name == "slope"}
     print(slopes)
@@ -56,9 +59,9 @@ def test_two_twins_of_all_together_do_not_make_noise_seen_before_small():
     """A prediction of two twins that happen to agree, where many have scattered by ten noises."""
     case, there = recorded(effect("dead_time", tau_us=0.02)), null()
     measured = values_of(case.bank, there.keys)
-    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.02})
+    found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.02})
     noisy = replace(found.prediction, spread=10.0 * there.sd, error=5.0 * there.sd)
-    wide = as_wide(there, measured, found, noisy)
+    wide = no_more_certain(Problem(case, MODEL, there, measured, measured), found, noisy)
     np.testing.assert_array_equal(wide.prediction.mean, found.prediction.mean)
     assert np.all(wide.prediction.spread >= noisy.spread) and np.all(wide.prediction.error >= noisy.error)
     assert np.abs(wide.rho).max() < np.abs(found.rho).max()
@@ -68,14 +71,15 @@ def test_what_is_plainly_missed_need_not_be_simulated_without():
     """A dead time that is there, and one that another effect has come to stand for, so that both are too much."""
     case, there = recorded(effect("dead_time", tau_us=0.5)), null()
     measured = values_of(case.bank, there.keys)
-    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.5})
+    found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.5})
     change = found.prediction.mean - there.mean
     twice = replace(found.prediction, mean=found.prediction.mean + change)
-    both = replace(found, prediction=twice, misfit=judged(there, measured, twice)[1])
+    both = replace(found, prediction=twice, misfit=residual_and_misfit(there, measured, twice)[1])
     print(found.misfit, both.misfit)
-    assert is_missed(there, measured, found, change)
-    assert not is_missed(there, measured, found, 0.1 * change)
-    assert not is_missed(there, measured, both, change)
+    problem = Problem(case, MODEL, there, measured, measured)
+    assert is_missed(problem, found, change)
+    assert not is_missed(problem, found, 0.1 * change)
+    assert not is_missed(problem, both, change)
 
 
 def test_more_twins_say_whether_something_is_left_where_two_cannot():
@@ -83,14 +87,14 @@ def test_more_twins_say_whether_something_is_left_where_two_cannot():
     What suits well needs no more."""
     case, there = recorded(effect("dead_time", tau_us=0.5)), null()
     measured = values_of(case.bank, there.keys)
-    found = fit(case, MODEL, there, measured, "dead_time", {"tau_us": 0.5})
-    two = predict(case, found.model, found.base, there, 2)
+    found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.5})
+    two = predict_by_twins(case, found.model, found.base, there, 2)
     found = replace(found, prediction=replace(two, spread=4.0 * there.sd))
     suits = found.prediction.mean
-    assert made_sure(case, MODEL, there, suits, suits, found) is found
+    assert try_more_draws(Problem(case, MODEL, there, suits, suits), found) is found
     off = suits + np.where([k.group == "timing" for k in there.keys], 50.0 * there.sd, 0.0)
-    sure = made_sure(case, MODEL, there, off, off, found)
-    left = [alarmed(there, residual(there, off, f.prediction), f.prediction) for f in (found, sure)]
+    sure = try_more_draws(Problem(case, MODEL, there, off, off), found)
+    left = [is_significant(there, residual(there, off, f.prediction), f.prediction) for f in (found, sure)]
     print(left, len(sure.prediction.draws))
     assert left == [False, True]
     assert len(sure.prediction.draws) == TWINS and sure.model == found.model
@@ -105,15 +109,15 @@ def test_a_column_that_few_units_have_is_no_surprise_to_many():
     found = Fit(
         "column_fixed_pattern", {}, {}, there.prediction, constrained_refit(model, case.base), there.mean, 0.0, model
     )
-    found = confirmed(case, MODEL, there, values_of(case.bank, there.keys), found)
-    few, many = found.prediction, with_pattern(case, model, there, there.prediction, MANY)
+    found = confirmed(Problem.of(case, MODEL, there, values_of(case.bank, there.keys)), found)
+    few, many = found.prediction, with_drawn_pattern(case, model, there, there.prediction, MANY_UNITS)
     at = next(i for i, k in enumerate(there.keys) if k.name == "over 5" and k.recording == "flat-0.2")
     tops = [float(np.max(p.units[:, at])) for p in (few, many)]
     values = np.where(np.arange(len(there.keys)) == at, np.nextafter(tops[1], 0.0), few.mean)
-    sure = made_sure(case, MODEL, there, values, values, found)
+    sure = try_more_draws(Problem(case, MODEL, there, values, values), found)
     print(f"of {len(few.units)} units {tops[0]:.1f}, of {len(sure.prediction.units)} {tops[1]:.1f}")
     assert tops[1] > tops[0]
-    left = [alarmed(there, residual(there, values, f.prediction), f.prediction) for f in (found, sure)]
+    left = [is_significant(there, residual(there, values, f.prediction), f.prediction) for f in (found, sure)]
     assert left == [True, False]
     off = np.where(np.arange(len(values)) == at, 10 * tops[1], sure.prediction.mean)
-    assert alarmed(there, residual(there, off, sure.prediction), sure.prediction)
+    assert is_significant(there, residual(there, off, sure.prediction), sure.prediction)

@@ -1,4 +1,4 @@
-"""The last touch: all parameters refined together, and the unit with them."""
+"""The last step: all parameters refined together, and the unit with them."""
 
 from dataclasses import replace
 
@@ -8,11 +8,12 @@ from small import MODEL, effect, null, recorded, unit
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import Prediction, values_of
-from spikecam_env.gap.fit import joint as polish
-from spikecam_env.gap.fit.candidate import Fit, fit, predict
+from spikecam_env.gap.fit.candidate import Fit, fit
 from spikecam_env.gap.fit.gauss_newton import derivatives, moved
-from spikecam_env.gap.fit.joint import agree, polished
-from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.fit.joint import agree, refined_together
+from spikecam_env.gap.fit.predict import predict_by_twins
+from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.twins.budget import Budget
 
 NOTHING = Prediction(np.zeros(0), np.zeros(0), np.zeros(0))
 
@@ -24,8 +25,8 @@ def test_noise_of_the_unit_is_found_beside_common_noise(seed):
     case = recorded(effect(name, sigma_mV=3.0), seed=seed)
     values = values_of(case.bank, null().keys)
     seen = np.where([case.use(k.recording) == "fit" for k in null().keys], values, np.nan)
-    first = fit(case, MODEL, null(), seen, name, {"sigma_mV": 4.0})
-    best, errors, _ = polished(case, MODEL, null(), seen, values, first, [name])
+    first = fit(Problem(case, MODEL, null(), seen, seen), name, {"sigma_mV": 4.0})
+    best, errors, _ = refined_together(Problem(case, MODEL, null(), seen, values), first, [name])
     own, before = best.base.white / unit().white, first.base.white / unit().white
     print(best.parameters, errors, f"s^2 {before:.2f}, then {own:.2f} of the unit's")
     assert own == pytest.approx(1.0, abs=0.1) and abs(own - 1.0) < abs(before - 1.0)
@@ -35,14 +36,14 @@ def test_noise_of_the_unit_is_found_beside_common_noise(seed):
 def test_strengths_refined_alone_are_known_no_better_than_with_their_shapes(monkeypatch):
     """A fit that says its strength is open by half, and enough simulated to leave its time constant alone."""
     name = "photodiode_lag"
-    case = replace(recorded(effect(name, fraction=0.05, tau_us=600.0), seed=2), effort=Effort(0))
+    case = replace(recorded(effect(name, fraction=0.05, tau_us=600.0), seed=2), budget=Budget(0))
     values = values_of(case.bank, null().keys)
     seen = np.where([case.use(k.recording) == "fit" for k in null().keys], values, np.nan)
-    first = fit(case, MODEL, null(), seen, name, {"fraction": 0.05, "tau_us": 600.0})
+    first = fit(Problem(case, MODEL, null(), seen, seen), name, {"fraction": 0.05, "tau_us": 600.0})
     open_ = {"fraction": 0.025, "tau_us": 200.0}
-    monkeypatch.setattr(polish, "leaves_nothing", lambda *_: False)
-    best, errors, _ = polished(case, MODEL, null(), seen, values, replace(first, sd=open_), [name])
-    assert errors[name] == best.sd == open_ and case.effort.left_out == ["finer shapes of what was found"]
+    monkeypatch.setattr(Problem, "is_explained", lambda *_: False)
+    best, errors, _ = refined_together(Problem(case, MODEL, null(), seen, values), replace(first, sd=open_), [name])
+    assert errors[name] == best.sd == open_ and case.budget.left_out == ["finer shapes of what was found"]
 
 
 def test_derivatives_are_of_a_unit_that_has_settled():
@@ -50,14 +51,16 @@ def test_derivatives_are_of_a_unit_that_has_settled():
     case = recorded(effect("crosstalk", kick=0.0025), seed=4)
     without = model_null(case, MODEL, 12)
     measured = values_of(case.bank, without.keys)
-    found = fit(case, MODEL, without, measured, "crosstalk", {"kick": 0.0025})
+    found = fit(Problem(case, MODEL, without, measured, measured), "crosstalk", {"kick": 0.0025})
 
     def probe(model, base):
-        return predict(case, model, base, without, 3)
+        return predict_by_twins(case, model, base, without, 3)
 
     at = probe(found.model, found.base)
     free = [("crosstalk", "kick")]
-    columns, _ = derivatives(probe, without, measured, found.model, found.base, at, free)
+    columns, _ = derivatives(
+        Problem(case, MODEL, without, measured, measured), probe, found.model, found.base, at, free
+    )
     unsettled = (probe(*moved(found.model, found.base, free, np.array([0.5]))).mean - at.mean) / 0.5
     bars = np.array([k.recording == "bars" for k in without.keys])
     most, most_unsettled = (np.abs(c[bars] / without.noise[bars]).max() for c in (columns[:, 0], unsettled))

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded
 
-from spikecam_env.gap.compare.distance import judged
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.gauss_newton import broyden
-from spikecam_env.gap.fit.shapes import has_shapes, shaped, worth_shaping
+from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.shapes import with_fitted_shapes, with_shapes_to_fit
 from spikecam_env.gap.screen.screen import Screened
-from spikecam_env.gap.search.forward import other_ends
+from spikecam_env.gap.search.neighbours import try_other_starts
 
 
 @pytest.mark.parametrize("start", [0.4, 2.5])
@@ -20,8 +22,10 @@ def test_a_time_constant_is_found_from_a_start_far_off(start):
     """Lag of 8 % and 1 ms."""
     case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
     measured = values_of(case.bank, null().keys)
-    first = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0 * start})
-    found = shaped(case, MODEL, null(), measured, first)
+    first = fit(
+        Problem(case, MODEL, null(), measured, measured), "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0 * start}
+    )
+    found = with_fitted_shapes(Problem(case, MODEL, null(), measured, measured), first)
     print(found.parameters, found.sd, f"misfit {first.misfit:.0f}, then {found.misfit:.0f} of {len(measured)}")
     assert first.parameters["tau_us"] == 1000.0 * start
     assert found.parameters["tau_us"] == pytest.approx(1000.0, rel=0.2)
@@ -48,32 +52,34 @@ def test_a_short_step_whose_surprise_is_noise_corrects_nothing():
 def test_more_parameters_are_not_fitted_where_fewer_leave_nothing():
     case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
     measured = values_of(case.bank, null().keys)
-    lag = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
+    lag = fit(Problem(case, MODEL, null(), measured, measured), "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
     loud = np.where(np.arange(len(lag.rho)) == 0, 50.0, 0.0)
     enough = replace(lag, name="readout_skew", misfit=lag.misfit - 1.0, rho=0.0 * lag.rho)
-    assert has_shapes("photodiode_lag") and not has_shapes("readout_skew")
-    assert not has_shapes("hot_pixels"), "patterns are fitted whole"
-    before = lag.misfit + 100.0
-    assert worth_shaping(null(), before, [lag]) == [lag]
-    assert worth_shaping(null(), before, [lag, enough]) == []
-    assert worth_shaping(null(), before, [lag, replace(enough, rho=loud)]) == [lag], "something is left"
-    assert worth_shaping(null(), before, [lag, replace(enough, misfit=lag.misfit + 1.0)]) == [lag], "worse"
+    assert candidate("photodiode_lag").has_shapes and not candidate("readout_skew").has_shapes
+    assert not candidate("hot_pixels").has_shapes, "patterns are fitted whole"
+    before, problem = lag.misfit + 100.0, Problem(case, MODEL, null(), measured, measured)
+    assert with_shapes_to_fit(problem, before, [lag]) == [lag]
+    assert with_shapes_to_fit(problem, before, [lag, enough]) == []
+    assert with_shapes_to_fit(problem, before, [lag, replace(enough, rho=loud)]) == [lag], "something is left"
+    assert with_shapes_to_fit(problem, before, [lag, replace(enough, misfit=lag.misfit + 1.0)]) == [lag], "worse"
     poor = replace(lag, misfit=before - 10.0)
-    assert worth_shaping(null(), before, [poor, replace(enough, rho=loud)]) == [], "removes next to nothing"
+    assert with_shapes_to_fit(problem, before, [poor, replace(enough, rho=loud)]) == [], "removes next to nothing"
 
 
 def test_of_other_shapes_the_best_is_fitted_whole_where_it_removes_nearly_as_much():
     """Lag of 1 ms from 0.6 and from 8 ms, where its strength alone removes most of what it does at 1 ms, or some."""
     case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
     measured = values_of(case.bank, null().keys)
-    before = judged(null(), measured, null().prediction)[1]
-    best = fit(case, MODEL, null(), measured, "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
+    before = residual_and_misfit(null(), measured, null().prediction)[1]
+    best = fit(Problem(case, MODEL, null(), measured, measured), "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
     tried = [{"fraction": 0.08, "tau_us": tau_us} for tau_us in (600.0, 8000.0)]
     starts = [Screened("photodiode_lag", there, best.misfit, np.full(len(measured), np.inf)) for there in tried]
-    found = other_ends(case, MODEL, null(), measured, before, best, starts, {})
+    began = replace(starts[0], start=best.parameters)
+    problem = Problem(case, MODEL, null(), measured, measured)
+    found = try_other_starts(problem, best, before, [began, *starts], {began: best})
     print(f"{before:.0f}, of the best {best.misfit:.0f}", [(f.parameters, round(f.misfit)) for f in found])
     assert [f.parameters["tau_us"] for f in found] == [pytest.approx(1000.0, rel=0.2)]
-    spent = case.effort.simulated
-    tries = {starts[0]: replace(best, misfit=before)}
-    assert other_ends(case, MODEL, null(), measured, before, best, starts[:1], tries) == []
-    assert case.effort.simulated == spent, "what was fitted from there before is not fitted again"
+    spent = case.budget.simulated
+    tries = {began: best, starts[0]: replace(best, misfit=before)}
+    assert try_other_starts(problem, best, before, [began, starts[0]], tries) == []
+    assert case.budget.simulated == spent, "what was fitted from there before is not fitted again"

@@ -26,7 +26,7 @@ def searched(removed: dict[str, float], monkeypatch) -> tuple[list[list[MapFit]]
         return a_fit(name, 1000.0 - sum(removed[n] for n in added), added)
 
     monkeypatch.setattr(module, "fit_candidate", fit)
-    monkeypatch.setattr(module, "alarmed", lambda null, rho: True)
+    monkeypatch.setattr(module, "is_significant", lambda null, rho: True)
     return search_maps(CASE, PatternModel(None, {}), None, None, list(removed))
 
 

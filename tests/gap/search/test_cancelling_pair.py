@@ -6,11 +6,11 @@ import pytest
 from small import MODEL, TWINS, effect, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.compare.distance import judged
 from spikecam_env.gap.compare.prediction import values_of
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import shipped_templates
-from spikecam_env.gap.search.cancelling_pair import PAIR, opposed
-from spikecam_env.gap.search.forward import of_fit, search
+from spikecam_env.gap.search.cancelling_pair import PAIR, fit_pair
+from spikecam_env.gap.search.forward import forward_selection
 
 TAU_US = 2.0
 CANCELLING = (effect("dead_time", tau_us=TAU_US), effect("photo_response_nonlinearity", beta=-TAU_US / 25.0))
@@ -19,23 +19,25 @@ CANCELLING = (effect("dead_time", tau_us=TAU_US), effect("photo_response_nonline
 def test_one_twin_of_both_says_how_strong_they_are():
     case = recorded(*CANCELLING)
     null = model_null(case, MODEL, TWINS)
-    seen = of_fit(case, null, values_of(case.bank, null.keys))
-    found = opposed(case, MODEL, null, seen, PAIR)
+    problem = Problem.of(case, MODEL, null, values_of(case.bank, null.keys))
+    found = fit_pair(problem, PAIR)
     assert found is not None and {e.name for e in found.model.effects} >= set(PAIR)
     there = {e.name: e.parameters() for e in found.model.effects}
-    before = judged(null, seen, null.prediction)[1]
+    before = problem.misfit()
     print(f"{there['dead_time']}, {found.parameters}: misfit {before:.0f}, {found.misfit:.0f}")
     assert there["dead_time"]["tau_us"] == pytest.approx(TAU_US, rel=0.05)
     assert found.parameters["beta"] == pytest.approx(-TAU_US / 25.0, rel=0.05)
     assert found.misfit < before - 100
-    assert opposed(case, MODEL, null, seen, PAIR[:1]) is None
+    assert fit_pair(problem, PAIR[:1]) is None
 
 
 def test_search_finds_them_together():
     case = recorded(*CANCELLING)
     null = model_null(case, MODEL, TWINS)
     values = values_of(case.bank, null.keys)
-    rounds = search(case, MODEL, null, values, [*PAIR, "comparator_delay", "ir_drop"], shipped_templates())
+    rounds = forward_selection(
+        Problem.of(case, MODEL, null, values), [*PAIR, "comparator_delay", "ir_drop"], shipped_templates()
+    )
     print([r.fits[0].name for r in rounds if r.fits], rounds[-1].model.effects[-2:])
     assert [r.fits[0].name for r in rounds[:-1]] == list(PAIR)
     there = {e.name: e.parameters() for e in rounds[-1].model.effects}
@@ -47,5 +49,5 @@ def test_one_bend_alone_is_found_alone():
     case = recorded(effect("photo_response_nonlinearity", beta=0.02))
     null = model_null(case, MODEL, TWINS)
     values = values_of(case.bank, null.keys)
-    rounds = search(case, MODEL, null, values, [*PAIR], shipped_templates())
+    rounds = forward_selection(Problem.of(case, MODEL, null, values), [*PAIR], shipped_templates())
     assert len([r for r in rounds if r.fits]) == 1 and rounds[0].fits[0].name in PAIR

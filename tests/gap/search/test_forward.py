@@ -2,42 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from small import MODEL, effect, recorded, unit
 
-from spikecam_env.gap.compare.distance import judged
+from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
+from spikecam_env.gap.compare.thresholds import PER_PARAMETER, TO_ADD, TO_CONFIRM, TO_DISMISS, TO_JOIN, TO_PREFER
 from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import forward as search
-from spikecam_env.gap.search.forward import (
-    FREE,
-    GAIN,
-    HINT,
-    PROMISE,
-    Round,
-    chosen_of,
-    helped,
-    instead_of,
-    joined,
-    promises,
-    revisited,
-    settle,
-    shows,
-)
-from spikecam_env.gap.search.rivals import CLOSE, LEAST, is_rival, lead
+from spikecam_env.gap.search import neighbours
+from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
+from spikecam_env.gap.search.forward import joined
+from spikecam_env.gap.search.neighbours import runner_up, try_in_place_of_earlier
+from spikecam_env.gap.search.rivals import is_rival, lead
+from spikecam_env.gap.search.round import Round, has_candidate, is_improvement, is_visible
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.twins.budget import Budget
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.gap.verdict.verdict import explains, with_stand_ins
 
 COUNT, TWINS = 200, 12
 DEAD_TIME = effect("dead_time", tau_us=0.2)
 FIT = np.arange(COUNT) < 150
 """Statistics of the recordings to fit; the others are held out."""
+
+
+@dataclass(frozen=True)
+class OfAll:
+    """What of a case a search asks, where all statistics are to be fitted."""
+
+    budget: Budget
+    conditions: tuple[None, ...]
+    base: BaseFit = field(default_factory=unit)
+
+    def to_fit(self, keys):
+        return np.ones(len(keys), bool)
 
 
 def null() -> Null:
@@ -49,7 +54,7 @@ def null() -> Null:
 
 def a_fit(n: Null, name: str, change, seen) -> Fit:
     prediction = Prediction(n.mean + change, n.sd / np.sqrt(TWINS), n.sd)
-    rho, left = judged(n, seen, prediction)
+    rho, left = residual_and_misfit(n, seen, prediction)
     return Fit(name, {}, {}, prediction, unit(), rho, left, MODEL)
 
 
@@ -67,7 +72,7 @@ def test_recordings_held_out_decide_between_what_the_others_cannot_tell_apart():
     nudge = np.where(np.arange(COUNT) < 50, 0.1 * np.sign(values - n.mean - effect), 0.0)
     true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
     assert twin.misfit < true.misfit
-    fits, rivals = chosen_of(n, n, seen, values, [twin, true])
+    fits, rivals = chosen_of(Problem(recorded(), MODEL, n, seen, values), n.draws, [twin, true])
     assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
 
 
@@ -78,8 +83,8 @@ def test_what_loses_little_and_wins_all_recordings_is_chosen():
     true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
     loss = lead(n, seen, twin.prediction, true.prediction)
     print(f"loses {loss:.1f}")
-    assert LEAST < loss < CLOSE and not is_rival(n, n.draws, seen, twin.prediction, true.prediction)
-    fits, rivals = chosen_of(n, n, seen, values, [twin, true])
+    assert TO_PREFER < loss < TO_DISMISS and not is_rival(n, n.draws, seen, twin.prediction, true.prediction)
+    fits, rivals = chosen_of(Problem(recorded(), MODEL, n, seen, values), n.draws, [twin, true])
     assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
 
 
@@ -89,17 +94,17 @@ def test_a_later_effect_that_leaves_nothing_to_hear_has_but_to_leave_no_more():
     seen = seen + 4.0 * effect
     all_of_it, some = a_fit(n, "dead_time", 5.0 * effect, seen), a_fit(n, "dead_time", effect, seen)
     for found, silent in ((all_of_it, True), (some, False)):
-        assert helped(n, found.misfit + GAIN, found, later=False)
-        assert not helped(n, found.misfit + GAIN - 1.0, found, later=False)
-        assert helped(n, found.misfit + 1.0, found, later=True) is silent
-        assert not helped(n, found.misfit - 1.0, found, later=True)
-        assert helped(n, found.misfit + GAIN, found, later=True, hint=True) is silent
+        assert is_improvement(n, found.misfit + TO_ADD, found, later=False)
+        assert not is_improvement(n, found.misfit + TO_ADD - 1.0, found, later=False)
+        assert is_improvement(n, found.misfit + 1.0, found, later=True) is silent
+        assert not is_improvement(n, found.misfit - 1.0, found, later=True)
+        assert is_improvement(n, found.misfit + TO_ADD, found, later=True, weak=True) is silent
 
 
 def test_what_all_recordings_together_cannot_tell_apart_are_rivals():
     n, effect, values, seen = campaign()
     one, other = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", 1.002 * effect, seen)
-    assert chosen_of(n, n, seen, values, [one, other])[1]
+    assert chosen_of(Problem(recorded(), MODEL, n, seen, values), n.draws, [one, other])[1]
 
 
 @pytest.mark.parametrize(("better", "first"), [(0.0, "dead_time"), (20.0, "incomplete_reset")])
@@ -109,7 +114,7 @@ def test_a_parameter_more_has_to_explain_more(better, first):
     nudge = np.where((np.arange(COUNT) >= 50) & (np.arange(COUNT) < 60), better * n.sd, 0.0)
     simple = a_fit(n, "dead_time", effect, seen + nudge)
     richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
-    fits, rivals = chosen_of(n, n, seen + nudge, values + nudge, [richer, simple])
+    fits, rivals = chosen_of(Problem(recorded(), MODEL, n, seen + nudge, values + nudge), n.draws, [richer, simple])
     assert fits[0].name == first and rivals == ()
 
 
@@ -122,11 +127,18 @@ def test_what_has_a_parameter_more_is_a_rival_where_it_leaves_more_than_that_les
         simple = a_fit(n, "dead_time", effect, seen + nudge)
         richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
         ahead = lead(n, values + nudge, richer.prediction, simple.prediction)
-        if 0 < ahead < LEAST:
-            told.append((ahead, chosen_of(n, n, seen + nudge, values + nudge, [richer, simple])[1]))
+        if 0 < ahead < TO_PREFER:
+            told.append(
+                (
+                    ahead,
+                    chosen_of(Problem(recorded(), MODEL, n, seen + nudge, values + nudge), n.draws, [richer, simple])[
+                        1
+                    ],
+                )
+            )
     print([(round(ahead, 2), rivals) for ahead, rivals in told])
-    assert {rivals for ahead, rivals in told if ahead < FREE} == {()}
-    assert {rivals for ahead, rivals in told if ahead > FREE} == {("incomplete_reset",)}
+    assert {rivals for ahead, rivals in told if ahead < PER_PARAMETER} == {()}
+    assert {rivals for ahead, rivals in told if ahead > PER_PARAMETER} == {("incomplete_reset",)}
 
 
 def test_what_makes_campaigns_scatter_shows_though_their_mean_stays():
@@ -134,20 +146,22 @@ def test_what_makes_campaigns_scatter_shows_though_their_mean_stays():
     n, effect, _values, seen = campaign()
     still = a_fit(n, "hot_pixels", 0.0 * effect, seen)
     wide = replace(still, prediction=replace(still.prediction, spread=4.0 * n.sd))
-    assert shows(n, wide) and not shows(n, still)
+    assert is_visible(n, wide) and not is_visible(n, still)
 
 
 def test_recordings_held_out_have_no_say_where_the_others_tell():
     """The wrong one is perfect where it is not asked, and has nothing to offer where it is."""
     n, effect, values, seen = campaign()
     wrong = a_fit(n, "crosstalk", np.where(FIT, np.roll(effect * FIT, 60), values - n.mean), seen)
-    fits, rivals = chosen_of(n, n, seen, values, [a_fit(n, "dead_time", effect, seen), wrong])
+    fits, rivals = chosen_of(
+        Problem(recorded(), MODEL, n, seen, values), n.draws, [a_fit(n, "dead_time", effect, seen), wrong]
+    )
     assert fits[0].name == "dead_time" and rivals == ()
-    assert chosen_of(n, n, seen, values, []) == ([], ())
+    assert chosen_of(Problem(recorded(), MODEL, n, seen, values), n.draws, []) == ([], ())
 
 
 def test_fits_are_confirmed_until_one_stands_clear_above_the_best():
-    """Confirmation makes each 10 better; the third promises less than the best by more than that and PROMISE."""
+    """Confirmation makes each 10 better; the third promises less than the best by more than that and TO_CONFIRM."""
     n, effect, _values, seen = campaign()
     base = a_fit(n, "", effect, seen)
     asked = []
@@ -156,53 +170,55 @@ def test_fits_are_confirmed_until_one_stands_clear_above_the_best():
         asked.append(f.name)
         return replace(f, misfit=f.misfit - 10.0)
 
-    near, far = 100.0 + PROMISE - 1.0, 100.0 + PROMISE + 11.0
+    near, far = 100.0 + TO_CONFIRM - 1.0, 100.0 + TO_CONFIRM + 11.0
     fits = [replace(base, name=name, misfit=m) for name, m in (("a", 100.0), ("b", near), ("c", near), ("d", far))]
-    sure, rest = settle(fits, confirm)
+    sure, rest = confirmed_in_order(fits, confirm)
     assert asked == ["a", "b", "c"] and [f.name for f in sure] == ["a", "b", "c"] and [f.name for f in rest] == ["d"]
 
 
 def test_fits_that_promise_too_little_are_not_confirmed_unless_one_does_not():
-    """60 are enough.  Alone, 61 are not worth it; beside one confirmed at 55, those within PROMISE of it are."""
+    """60 are enough.  Alone, 61 are not worth it; beside one confirmed at 55, those within TO_CONFIRM of it are."""
     n, effect, _values, seen = campaign()
     base = a_fit(n, "", effect, seen)
-    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 61.0), ("b", 66.0), ("c", 55.0 + PROMISE))]
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 61.0), ("b", 66.0), ("c", 55.0 + TO_CONFIRM))]
     best = replace(base, name="best", misfit=55.0)
-    sure, rest = settle(fits, lambda f: f, enough=60.0)
+    sure, rest = confirmed_in_order(fits, lambda f: f, enough=60.0)
     assert sure == [] and [f.name for f in rest] == ["a", "b", "c"]
-    sure, rest = settle([best, *fits], lambda f: f, enough=60.0)
+    sure, rest = confirmed_in_order([best, *fits], lambda f: f, enough=60.0)
     assert [f.name for f in sure] == ["best", "a", "b"] and [f.name for f in rest] == ["c"]
     disappointing = replace(best, misfit=75.0)
-    sure, rest = settle([best, *fits], lambda f: disappointing, enough=60.0)
+    sure, rest = confirmed_in_order([best, *fits], lambda f: disappointing, enough=60.0)
     assert [f.name for f in sure] == ["best"] and [f.name for f in rest] == ["a", "b", "c"], "as will the others"
 
 
 def test_a_round_in_which_nothing_promises_enough_is_one_without_a_choice(monkeypatch):
     n, _effect, values, seen = campaign()
     poor = a_fit(n, "crosstalk", np.where(np.arange(COUNT) >= 150, 4.0, 0.0), seen)
-    rho, before = judged(n, seen, n.prediction)
+    rho, before = residual_and_misfit(n, seen, n.prediction)
     assert poor.misfit == pytest.approx(before)
     monkeypatch.setattr(search, "screen", lambda *_: [])
     monkeypatch.setattr(search, "fits_of", lambda *_: ([poor], {}))
     monkeypatch.setattr(search, "confirmed", lambda *_: pytest.fail("it was confirmed"))
     turn = Round(MODEL, unit(), n.prediction, rho, before)
-    after = search.compared(recorded(), n, n, seen, values, [], {}, turn)
+    problem = Problem(recorded(), MODEL, n, seen, values)
+    after = search.with_candidates(problem, problem, [], {}, turn)
     assert after.fits == (poor,) and after.rivals == ()
 
 
 def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
     """What came first may have taken the share of what comes later: how much both remove, only both together tell."""
     n, _effect, values, seen = campaign()
-    rho, before = judged(n, seen, n.prediction)
-    hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (GAIN + HINT) / 2)
+    rho, before = residual_and_misfit(n, seen, n.prediction)
+    hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (TO_ADD + TO_JOIN) / 2)
     asked = []
     monkeypatch.setattr(search, "screen", lambda *_: [])
     monkeypatch.setattr(search, "fits_of", lambda *_: ([hint], {Screened("crosstalk", {}, 0.0, rho): hint}))
-    monkeypatch.setattr(search, "confirmed", lambda _case, _model, _null, _seen, found: asked.append(found) or found)
+    monkeypatch.setattr(search, "confirmed", lambda _problem, found: asked.append(found) or found)
     first = Round(MODEL, unit(), n.prediction, rho, before)
-    search.compared(recorded(), n, n, seen, values, [], {}, first)
+    problem = Problem(recorded(), MODEL, n, seen, values)
+    search.with_candidates(problem, problem, [], {}, first)
     assert not asked
-    search.compared(recorded(), n, n, seen, values, [], {}, replace(first, least=HINT))
+    search.with_candidates(problem, problem, [], {}, replace(first, to_join=TO_JOIN))
     assert asked == [hint]
 
 
@@ -210,25 +226,26 @@ def test_a_later_effect_of_little_is_polished_together_with_the_first(monkeypatc
     n, change, values, seen = campaign()
     values, seen = values + 9 * change, seen + 9 * change
     little = of_two(n, "crosstalk", 0.02 * change, seen)
-    left = judged(n, seen, n.prediction)[1]
+    left = residual_and_misfit(n, seen, n.prediction)[1]
     first = Round(MODEL, unit(), n.prediction, seen, left + 500.0, (a_fit(n, "dead_time", 0.0 * change, seen),))
     asked = []
 
-    def polish(case, model, here, measured, everything, found, names):
+    def polish(problem, found, names):
         asked.append(list(names))
         return found, {}, False
 
-    monkeypatch.setattr(search, "polished", polish)
-    monkeypatch.setattr(search, "rejoined", lambda case, model, here, measured, best, earlier: best)
-    monkeypatch.setattr(search, "revisited", lambda case, model, here, measured, everything, best, turn: (best, turn))
-    joined(recorded(), MODEL, n, seen, values, [first, replace(first, misfit=left, fits=(little,))], 0.0)
+    for module in (search, neighbours):
+        monkeypatch.setattr(module, "refined_together", polish)
+    monkeypatch.setattr(search, "try_without_earlier", lambda problem, best, earlier: best)
+    monkeypatch.setattr(search, "try_in_place_of_earlier", lambda problem, best, turn: (best, turn))
+    joined(Problem(recorded(), MODEL, n, seen, values), [first, replace(first, misfit=left, fits=(little,))], 0.0)
     assert asked == [["dead_time", "crosstalk"]]
     asked.clear()
-    joined(recorded(), MODEL, n, seen, values, [replace(first, misfit=left, fits=(little,))], 0.0)
+    joined(Problem(recorded(), MODEL, n, seen, values), [replace(first, misfit=left, fits=(little,))], 0.0)
     assert asked == [], "alone it is a stand-in"
     bend = replace(little, name="comparator_delay")
     beside = replace(first, model=MODEL.with_effect(DEAD_TIME), misfit=left, fits=(bend,))
-    joined(recorded(), MODEL, n, seen, values, [first, beside], 0.0)
+    joined(Problem(recorded(), MODEL, n, seen, values), [first, beside], 0.0)
     assert asked == [], "and so is another bend"
 
 
@@ -236,18 +253,18 @@ def test_a_hint_of_another_bend_is_none():
     n, change, _, seen = campaign()
     hint = a_fit(n, "crosstalk", change, seen)
     beside = MODEL.with_effect(DEAD_TIME)
-    turn = Round(beside, unit(), n.prediction, seen, hint.misfit + (GAIN + HINT) / 2, (hint,), least=HINT)
+    turn = Round(beside, unit(), n.prediction, seen, hint.misfit + (TO_ADD + TO_JOIN) / 2, (hint,), to_join=TO_JOIN)
     bend = replace(turn, fits=(replace(hint, name="comparator_delay"),))
-    assert promises(turn, n) and not promises(bend, n)
-    assert promises(replace(bend, model=MODEL), n), "it is the first"
+    assert has_candidate(turn, n) and not has_candidate(bend, n)
+    assert has_candidate(replace(bend, model=MODEL), n), "it is the first"
 
 
 def test_one_confirmed_before_is_among_those_that_others_are_measured_by():
     n, effect, _values, seen = campaign()
     base = a_fit(n, "", effect, seen)
     known = replace(base, name="known", misfit=10.0)
-    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 10.0 + PROMISE), ("b", 11.0 + PROMISE))]
-    sure, rest = settle(fits, lambda f: f, known=[known])
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 10.0 + TO_CONFIRM), ("b", 11.0 + TO_CONFIRM))]
+    sure, rest = confirmed_in_order(fits, lambda f: f, known=[known])
     assert [f.name for f in sure] == ["known", "a"] and [f.name for f in rest] == ["b"]
 
 
@@ -281,25 +298,25 @@ def test_beside_a_later_effect_a_runner_up_may_take_the_earlier_ones_place(monke
         two.without("dead_time"): a_fit(n, "crosstalk", late, seen).prediction,
     }
 
-    def confirm(case, model, here, measured, found):
-        rho, left = judged(here, measured, made[found.model])
+    def confirm(problem, found):
+        rho, left = problem.residual_and_misfit(made[found.model])
         return replace(found, prediction=made[found.model], rho=rho, misfit=left)
 
-    monkeypatch.setattr(search, "confirmed", confirm)
-    monkeypatch.setattr(search, "resettled", lambda case, null, found, model: replace(found, model=model))
-    monkeypatch.setattr(
-        search, "fit", lambda case, model, here, measured, name, start: replace(best, name=name, model=right)
-    )
+    monkeypatch.setattr(neighbours, "confirmed", confirm)
+    monkeypatch.setattr(neighbours, "resettled", lambda problem, found, model: replace(found, model=model))
+    monkeypatch.setattr(neighbours, "fit", lambda problem, name, start: replace(best, name=name, model=right))
     best = replace(a_fit(n, "crosstalk", half + late, seen), model=two)
     first, other = (replace(best, name=name) for name in ("dead_time", "comparator_delay"))
     turn = Round(
         MODEL, unit(), n.prediction, values, 500.0, (replace(first, misfit=300.0), replace(other, misfit=340.0))
     )
-    now, then = revisited(recorded(), MODEL, n, seen, values, best, turn)
+    now, then = try_in_place_of_earlier(Problem(recorded(), MODEL, n, seen, values), best, turn)
     assert now.name == "crosstalk" and now.model == right
     assert [f.name for f in then.fits] == ["comparator_delay", "dead_time"] and then.rivals == ()
     far = replace(turn, fits=(replace(first, misfit=300.0), replace(other, misfit=480.0)))
-    assert revisited(recorded(), MODEL, n, seen, values, best, far) == (best, far), "it explained too little"
+    assert try_in_place_of_earlier(Problem(recorded(), MODEL, n, seen, values), best, far) == (best, far), (
+        "it explained too little"
+    )
 
 
 def of_two(n, name: str, change, seen) -> Fit:
@@ -320,19 +337,20 @@ def test_what_leaves_something_is_put_against_its_runner_up_when_all_is_polished
     polished = {"light_flicker": 0.5 * change, "supply_ripple": change}
     asked = []
 
-    def polish(case, model, here, measured, everything, found, names):
+    def polish(problem, found, names):
         asked.append(tuple(names))
         return of_two(n, found.name, polished[found.name], seen), {found.name: {"x": 0.1}}, False
 
-    monkeypatch.setattr(search, "polished", polish)
-    monkeypatch.setattr(search, "rejoined", lambda case, model, here, measured, best, earlier: best)
-    monkeypatch.setattr(search, "revisited", lambda case, model, here, measured, everything, best, turn: (best, turn))
-    *_, last = joined(recorded(), MODEL, n, seen, values, [first, second], 0.0)
+    for module in (search, neighbours):
+        monkeypatch.setattr(module, "refined_together", polish)
+    monkeypatch.setattr(search, "try_without_earlier", lambda problem, best, earlier: best)
+    monkeypatch.setattr(search, "try_in_place_of_earlier", lambda problem, best, turn: (best, turn))
+    *_, last = joined(Problem(recorded(), MODEL, n, seen, values), [first, second], 0.0)
     assert asked == [("dead_time", "light_flicker"), ("dead_time", "supply_ripple")]
     assert [f.name for f in last.fits] == ["supply_ripple", "light_flicker"] and last.rivals == ()
     polished["light_flicker"] = change
     asked.clear()
-    *_, last = joined(recorded(), MODEL, n, seen, values, [first, second], 0.0)
+    *_, last = joined(Problem(recorded(), MODEL, n, seen, values), [first, second], 0.0)
     assert len(asked) == 1 and last.fits[0].name == "light_flicker", "it leaves nothing"
 
 
@@ -342,10 +360,10 @@ def test_a_runner_up_that_explained_little_or_was_not_confirmed_is_not_tried_aga
     best, near, far = (replace(f, misfit=m) for f, m in ((best, 300.0), (near, 390.0), (far, 410.0)))
     turn = Round(MODEL, unit(), n.prediction, seen, 800.0, (best, far, near))
     names = ["dead_time", "light_flicker"]
-    assert [f.name for f in instead_of(turn, names)] == ["supply_ripple"]
+    assert [f.name for f in runner_up(turn, names)] == ["supply_ripple"]
     guess = replace(near, prediction=replace(near.prediction, draws=()))
-    assert instead_of(replace(turn, fits=(best, far, guess)), names) == []
-    assert instead_of(turn, ["lamp_drift", "light_flicker"]) == [], "what was found before is another one now"
+    assert runner_up(replace(turn, fits=(best, far, guess)), names) == []
+    assert runner_up(turn, ["lamp_drift", "light_flicker"]) == [], "what was found before is another one now"
 
 
 def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
@@ -365,17 +383,17 @@ def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
 def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, monkeypatch):
     n, effect, values, _ = campaign()
     found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
-    faded = replace(found, prediction=n.prediction, misfit=judged(n, values, n.prediction)[1])
-    case = SimpleNamespace(base=unit(), to_fit=lambda keys: np.ones(len(keys), bool), effort=Effort(), conditions=())
+    faded = replace(found, prediction=n.prediction, misfit=residual_and_misfit(n, values, n.prediction)[1])
+    case = OfAll(budget=Budget(), conditions=())
 
     def polished(*given):
-        *before, last = given[5]
+        *before, last = given[1]
         return [*before, replace(last, fits=(found if keeps else faded, *last.fits[1:]))]
 
-    monkeypatch.setattr(search, "compared", lambda *given: replace(given[-1], fits=(found,)))
+    monkeypatch.setattr(search, "with_candidates", lambda *given: replace(given[-1], fits=(found,)))
     monkeypatch.setattr(search, "joined", polished)
-    monkeypatch.setattr(search, "cancelling", lambda *_: [])
-    rounds = search.search(case, MODEL, n, values, [], None)
+    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
+    rounds = search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
     assert rounds[-1].model is (found.model if keeps else MODEL)
 
 
@@ -384,21 +402,76 @@ def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int,
     """Of sixty recordings, and three tenths more, it takes two campaigns of BESIDE."""
     n, effect, values, _ = campaign()
     found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
-    case = SimpleNamespace(
-        base=unit(), to_fit=lambda keys: np.ones(len(keys), bool), effort=Effort(60), conditions=(None, None)
-    )
+    case = OfAll(budget=Budget(60), conditions=(None, None))
     asked = []
 
     def compared(*given):
         asked.append(given[-1])
-        case.effort.spent.append(spent)
+        case.budget.spent.append(spent)
         return replace(given[-1], fits=(found,) if len(asked) == 1 else ())
 
-    monkeypatch.setattr(search, "compared", compared)
-    monkeypatch.setattr(search, "joined", lambda *given: given[5])
-    monkeypatch.setattr(search, "cancelling", lambda *_: [])
-    monkeypatch.setattr(search, "alarmed", lambda *_: True)
-    monkeypatch.setattr(search, "is_little", lambda *_: False)
-    monkeypatch.setattr(search, "BESIDE", 17)
-    search.search(case, MODEL, n, values, [], None)
-    assert len(asked) == 1 + begun and case.effort.left_out == ([] if begun else ["a second effect"])
+    monkeypatch.setattr(search, "with_candidates", compared)
+    monkeypatch.setattr(search, "joined", lambda *given: given[1])
+    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
+    monkeypatch.setattr(search, "is_significant", lambda *_: True)
+    monkeypatch.setattr(search, "is_small_share", lambda *_: False)
+    monkeypatch.setattr(search, "CAMPAIGNS_PER_EFFECT", 17)
+    search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    assert len(asked) == 1 + begun and case.budget.left_out == ([] if begun else ["a second effect"])
+
+
+@pytest.mark.parametrize("removed, tried", [(0.4, False), (0.6, True)])
+def test_a_runner_up_of_an_earlier_round_has_to_have_removed_half_of_what_its_effect_did(removed: float, tried: bool):
+    n, change, values, seen = campaign()
+    best = of_two(n, "crosstalk", change, seen)
+    first, other = (replace(best, name=name) for name in ("dead_time", "comparator_delay"))
+    fits = (replace(first, misfit=300.0), replace(other, misfit=500.0 - 200.0 * removed))
+    turn = Round(MODEL, unit(), n.prediction, values, 500.0, fits)
+    case = SimpleNamespace(budget=Budget(0))
+    try_in_place_of_earlier(Problem(case, MODEL, n, seen, values), best, turn)
+    assert bool(case.budget.left_out) is tried
+
+
+def test_four_runners_up_are_tried_in_place_of_an_earlier_effect_at_most(monkeypatch):
+    n, change, values, seen = campaign()
+    best = of_two(n, "crosstalk", change, seen)
+    names = (
+        "dead_time",
+        "comparator_delay",
+        "ir_drop",
+        "readout_skew",
+        "optical_blur",
+        "missed_spikes",
+        "afterpulsing",
+    )
+    turn = Round(MODEL, unit(), n.prediction, values, 500.0, tuple(replace(best, name=m, misfit=300.0) for m in names))
+    asked = []
+    monkeypatch.setattr(neighbours, "confirmed", lambda problem, found: found)
+    monkeypatch.setattr(neighbours, "resettled", lambda problem, found, model: replace(found, model=model))
+    monkeypatch.setattr(
+        neighbours, "fit", lambda problem, name, start: asked.append(name) or replace(best, name=name, misfit=1e4)
+    )
+    try_in_place_of_earlier(Problem(recorded(), MODEL, n, seen, values), best, turn)
+    assert len(asked) == 4
+
+
+def test_three_effects_are_looked_for_at_most(monkeypatch):
+    n, change, values, _ = campaign()
+    names = iter(("dead_time", "crosstalk", "readout_skew", "optical_blur"))
+    rounds = []
+
+    def candidates(*given):
+        turn = given[-1]
+        found = a_fit(n, next(names), change, values)
+        rounds.append(replace(turn, fits=(replace(found, misfit=turn.misfit - 100.0, model=turn.model),)))
+        return rounds[-1]
+
+    monkeypatch.setattr(search, "with_candidates", candidates)
+    monkeypatch.setattr(search, "has_candidate", lambda *_: True)
+    monkeypatch.setattr(search, "is_improvement", lambda *_: True)
+    monkeypatch.setattr(search, "is_significant", lambda *_: True)
+    monkeypatch.setattr(search, "is_small_share", lambda *_: False)
+    monkeypatch.setattr(search, "joined", lambda _problem, rounds, _chance: list(rounds))
+    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
+    case = OfAll(budget=Budget(), conditions=())
+    assert len(search.forward_selection(Problem.of(case, MODEL, n, values), [], None)) == 3 + 1

@@ -13,58 +13,59 @@ from small import effect, recorded
 
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.gap.baseline.off_nominal import OffNominal
-from spikecam_env.gap.compare.distance import judged, residual
+from spikecam_env.gap.compare.distance import residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.fit import joint as polish
 from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.search import forward as searching
-from spikecam_env.gap.search.forward import (
-    BESIDE,
-    SECOND,
-    Round,
-    cancelling,
-    joined,
-    may_be_rejoined,
-    may_be_shaped,
-    revisited,
-)
+from spikecam_env.gap.search import neighbours, shortlist
+from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND, joined
+from spikecam_env.gap.search.neighbours import may_try_without_earlier, try_cancelling_pair, try_in_place_of_earlier
+from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.search.shortlist import may_be_shaped
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.twins.budget import CAMPAIGNS, Effort
+from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.verdict import conclude
 
 
+def problem_of(case: SimpleNamespace) -> Problem:
+    """Of a case that has a budget alone."""
+    return Problem(case, None, None, None, None)  # type: ignore[arg-type]
+
+
 def test_nothing_is_left_out_while_there_is_less_than_the_most():
-    effort = Effort(20, [13, 6])
-    assert effort.allows("a third effect") and effort.simulated == 19
-    assert effort.left_out == [] and unfinished(effort) == []
+    budget = Budget(20, [13, 6])
+    assert budget.allows("a third effect") and budget.simulated == 19
+    assert budget.left_out == [] and unfinished(budget) == []
 
 
 def test_what_is_left_out_is_said_once():
-    effort = Effort(20, [13, 7])
-    assert not effort.allows("a third effect") and not effort.allows("a third effect")
-    assert not effort.allows("photodiode_lag of another shape")
-    assert unfinished(effort) == [
+    budget = Budget(20, [13, 7])
+    assert not budget.allows("a third effect") and not budget.allows("a third effect")
+    assert not budget.allows("photodiode_lag of another shape")
+    assert unfinished(budget) == [
         "To save time, not looked for: a third effect and photodiode lag of another shape. A larger --effort does."
     ]
 
 
 def test_what_takes_more_than_is_left_is_not_begun():
-    effort = Effort(20, [13])
-    assert effort.allows("photodiode_lag of another shape", 6) and effort.left_out == []
-    assert not effort.allows("photodiode_lag of another shape", 7)
-    assert effort.left_out == ["photodiode_lag of another shape"]
+    budget = Budget(20, [13])
+    assert budget.allows("photodiode_lag of another shape", 6) and budget.left_out == []
+    assert not budget.allows("photodiode_lag of another shape", 7)
+    assert budget.left_out == ["photodiode_lag of another shape"]
 
 
 def test_what_a_verdict_can_hardly_do_without_may_take_more():
-    effort = Effort(20, [13])
-    assert effort.allows("a second effect", 12, needed=True) and not effort.allows("a second effect", 13, needed=True)
+    budget = Budget(20, [13])
+    assert budget.allows("a second effect", 12, needed=True) and not budget.allows("a second effect", 13, needed=True)
 
 
 def test_a_verdict_that_is_settled_can_do_without_all():
-    effort = Effort(20, [20], settled=True)
-    assert not effort.allows("a second effect", needed=True) and effort.left_out == ["a second effect"]
+    budget = Budget(20, [20], verdict_known=True)
+    assert not budget.allows("a second effect", needed=True) and budget.left_out == ["a second effect"]
 
 
 @pytest.mark.parametrize(
@@ -81,61 +82,61 @@ def test_of_several_effects_strengths_alone_are_refined_when_enough_was_simulate
     most: int, names: list[str], silent: bool, shapes: bool, monkeypatch
 ):
     """Five recordings, three of these or four twins: the start and one for each parameter."""
-    monkeypatch.setattr(polish, "leaves_nothing", lambda *_: silent)
+    monkeypatch.setattr(Problem, "is_explained", lambda *_: silent)
     monkeypatch.setattr(polish, "simulated_for", lambda *_: (list(range(5)), 1))
-    case, found = SimpleNamespace(effort=Effort(most)), SimpleNamespace(prediction=None)
-    free = polish.to_refine(case, None, None, found, names)
-    assert (("photodiode_lag", "tau_us") in free) == shapes == (not case.effort.left_out)
+    case, found = SimpleNamespace(budget=Budget(most)), SimpleNamespace(prediction=None)
+    free = polish.to_refine(problem_of(case), found, names)
+    assert (("photodiode_lag", "tau_us") in free) == shapes == (not case.budget.left_out)
     assert {name for name, _ in free} == set(names)
 
 
 def test_what_was_not_refined_is_known_no_better_than_before():
-    assert polish.no_surer({"fraction": 0.1}, {"fraction": 0.3, "tau_us": 5.0}) == {"fraction": 0.3, "tau_us": 5.0}
-    assert polish.no_surer({"fraction": 0.4}, {"fraction": 0.3, "tau_us": 5.0}) == {"fraction": 0.4, "tau_us": 5.0}
-    assert polish.no_surer({"fraction": 0.1, "tau_us": 2.0}, {"fraction": 0.3}) == {"fraction": 0.1, "tau_us": 2.0}
+    assert polish.no_smaller({"fraction": 0.1}, {"fraction": 0.3, "tau_us": 5.0}) == {"fraction": 0.3, "tau_us": 5.0}
+    assert polish.no_smaller({"fraction": 0.4}, {"fraction": 0.3, "tau_us": 5.0}) == {"fraction": 0.4, "tau_us": 5.0}
+    assert polish.no_smaller({"fraction": 0.1, "tau_us": 2.0}, {"fraction": 0.3}) == {"fraction": 0.1, "tau_us": 2.0}
 
 
 def test_without_a_most_there_is_no_end():
-    assert Effort(math.inf, [10**9]).allows("a third effect")
+    assert Budget(math.inf, [10**9]).allows("a third effect")
 
 
 def test_runners_up_are_not_tried_anew_when_enough_was_simulated():
     fits = tuple(SimpleNamespace(name=name, misfit=misfit) for name, misfit in (("blooming", 10.0), ("ir_drop", 20.0)))
     turn = SimpleNamespace(misfit=100.0, fits=fits)
     best = SimpleNamespace(model=SimpleNamespace(effects=()))
-    case = SimpleNamespace(effort=Effort(0))
-    assert revisited(case, None, None, None, None, best, turn) == (best, turn)
-    assert case.effort.left_out == ["others in place of blooming"]
+    case = SimpleNamespace(budget=Budget(0))
+    assert try_in_place_of_earlier(problem_of(case), best, turn) == (best, turn)
+    assert case.budget.left_out == ["others in place of blooming"]
 
 
 def test_a_shape_is_fitted_up_to_three_tenths_more(monkeypatch):
     """Of two parameters, three predictions of five recordings, of twenty and three tenths more."""
-    monkeypatch.setattr(searching, "recordings_of", lambda *_: 5)
+    monkeypatch.setattr(shortlist, "recordings_of", lambda *_: 5)
     lag = SimpleNamespace(name="photodiode_lag")
-    spent, more = (SimpleNamespace(effort=Effort(20, [n])) for n in (10, 11))
-    assert may_be_shaped(spent, None, None, lag) and not may_be_shaped(more, None, None, lag)
-    assert more.effort.left_out == ["photodiode_lag of finer shape"]
+    spent, more = (SimpleNamespace(budget=Budget(20, [n])) for n in (10, 11))
+    assert may_be_shaped(problem_of(spent), lag) and not may_be_shaped(problem_of(more), lag)
+    assert more.budget.left_out == ["photodiode_lag of finer shape"]
 
 
 def test_two_effects_are_simulated_together_and_alone_while_effort_is_left():
     """Two by two twins of five recordings, of forty and three tenths more."""
-    left, spent = (SimpleNamespace(effort=Effort(40, [n]), conditions=range(5)) for n in (31, 32))
-    assert may_be_rejoined(left, 2) and left.effort.left_out == []
-    assert not may_be_rejoined(spent, 2)
-    assert spent.effort.left_out == ["whether all that was found is needed"]
+    left, spent = (SimpleNamespace(budget=Budget(40, [n]), conditions=range(5)) for n in (31, 32))
+    assert may_try_without_earlier(problem_of(left), 2) and left.budget.left_out == []
+    assert not may_try_without_earlier(problem_of(spent), 2)
+    assert spent.budget.left_out == ["whether all that was found is needed"]
 
 
 @pytest.mark.parametrize("spent", [51, 52])
 def test_bends_that_cancel_are_looked_for_while_effort_is_left(spent: int, monkeypatch):
     """Of forty recordings and three tenths more."""
     asked = []
-    monkeypatch.setattr(searching, "alarmed", lambda *_: True)
-    monkeypatch.setattr(searching, "residual", lambda *_: None)
-    monkeypatch.setattr(searching, "opposed", lambda *_: asked.append("twins"))
-    case = SimpleNamespace(effort=Effort(40, [spent]))
+    monkeypatch.setattr(neighbours, "is_significant", lambda *_: True)
+    monkeypatch.setattr(neighbours, "residual", lambda *_: None)
+    monkeypatch.setattr(neighbours, "fit_pair", lambda *_: asked.append("twins"))
+    case = SimpleNamespace(budget=Budget(40, [spent]))
     turn = SimpleNamespace(fits=(SimpleNamespace(name="dead_time"),), prediction=None)
-    assert cancelling(case, None, None, None, None, (), [turn]) == []
-    assert (asked == ["twins"]) == (spent < 52) == (case.effort.left_out == [])
+    assert try_cancelling_pair(problem_of(case), (), [turn]) == [turn]
+    assert (asked == ["twins"]) == (spent < 52) == (case.budget.left_out == [])
 
 
 @dataclass(frozen=True)
@@ -148,13 +149,13 @@ class Found:
 @pytest.mark.parametrize("spent, settled", [(38, False), (30, True)])
 def test_what_was_found_stays_as_it_was_fitted_when_no_effort_is_left(spent: int, settled: bool, monkeypatch):
     """Two predictions of five recordings, each made twice, and four twins more: forty, of sixty and three tenths."""
-    monkeypatch.setattr(searching, "is_little", lambda *_: False)
+    monkeypatch.setattr(searching, "is_small_share", lambda *_: False)
     monkeypatch.setattr(searching, "simulated_for", lambda *_: (list(range(5)), 1))
     model = SimpleNamespace(effects=(SimpleNamespace(name="blooming"),))
     best = SimpleNamespace(name="blooming", model=model, misfit=10.0)
-    case = SimpleNamespace(effort=Effort(60, [spent], settled=settled))
-    assert joined(case, None, None, None, None, [Found((best,))], 0.0) == [Found((best,))]
-    assert case.effort.left_out == ["finer strengths"]
+    case = SimpleNamespace(budget=Budget(60, [spent], verdict_known=settled))
+    assert joined(problem_of(case), [Found((best,))], 0.0) == [Found((best,))]
+    assert case.budget.left_out == ["finer strengths"]
 
 
 def test_what_is_not_simulated_together_is_judged_by_the_model_given(monkeypatch):
@@ -168,11 +169,11 @@ def test_what_is_not_simulated_together_is_judged_by_the_model_given(monkeypatch
     turn = Round(SimpleNamespace(effects=model.effects[:1]), None, null.prediction, np.zeros(3), 50.0, (last,))
     first = Found((SimpleNamespace(name="lamp_drift"),))
     seen = np.array([0.5, 1.0, 2.0])
-    case = SimpleNamespace(effort=Effort(0), conditions=range(5))
-    _, joint = joined(case, None, null, seen, seen, [first, turn], 0.0)
-    rho, misfit = judged(null, seen, both)
+    case = SimpleNamespace(budget=Budget(0), conditions=range(5))
+    _, joint = joined(Problem(case, None, null, seen, seen), [first, turn], 0.0)
+    rho, misfit = residual_and_misfit(null, seen, both)
     assert joint.fits[0].misfit == misfit > 0 and np.array_equal(joint.fits[0].rho, rho)
-    assert case.effort.left_out == ["whether all that was found is needed", "finer strengths"]
+    assert case.budget.left_out == ["whether all that was found is needed", "finer strengths"]
 
 
 def test_the_command_asks_for_what_the_function_does():
@@ -184,7 +185,7 @@ def test_nothing_is_named_where_a_second_effect_was_not_looked_for(left_out: lis
     """A dead time leaves so little that it may be named, once a second effect was looked for beside it."""
     found = effect("dead_time", tau_us=0.5)
     null, model = small.null(), small.MODEL.with_effect(found)
-    case = replace(recorded(found), effort=Effort(400, [300], left_out))
+    case = replace(recorded(found), budget=Budget(400, [300], left_out))
     values = values_of(case.bank, null.keys)
     close = Prediction(values, null.noise, null.sd, null.draws)
     fit = Fit("dead_time", {"tau_us": 0.5}, {"tau_us": 0.01}, close, case.base, np.zeros(len(values)), 1.0, model)
@@ -197,10 +198,10 @@ def test_nothing_is_named_where_a_second_effect_was_not_looked_for(left_out: lis
     if verdict == "unknown":
         asked = said.unknown["effort"]
         assert said.unknown["not_looked_for"] == SECOND and said.unknown["best_candidate"] == "dead_time"
-        assert len(case.conditions) * asked > 300 + BESIDE * len(case.conditions) and asked % 10 == 0
+        assert len(case.conditions) * asked > 300 + CAMPAIGNS_PER_EFFECT * len(case.conditions) and asked % 10 == 0
         assert f"--effort {asked}" in sentence(said, "scsim") and "dead time comes nearest" in sentence(said, "scsim")
 
 
 def test_the_most_by_default_is_enough_to_look_for_a_second_effect():
     """Of thirteen recordings: after the twins of the noise, a first effect and all its shapes."""
-    assert Effort(CAMPAIGNS * 13, [100 * 13]).allows(SECOND, BESIDE * 13, needed=True)
+    assert Budget(CAMPAIGNS * 13, [100 * 13]).allows(SECOND, CAMPAIGNS_PER_EFFECT * 13, needed=True)

@@ -10,7 +10,7 @@ from small import MODEL, SHAPE, unit
 
 from spikecam_env.gap.observe.conditions import LABEL_ERROR, Condition
 from spikecam_env.gap.twins import simulate as twin
-from spikecam_env.gap.twins.simulate import FIRST, as_known, at_any_phase
+from spikecam_env.gap.twins.simulate import FIRST_SEED, with_label_error, with_random_phases
 from spikecam_env.gap.unit.conversion import unit_from_refit
 from spikecam_env.sensor import Keyframes, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
@@ -26,20 +26,26 @@ def phase(model: SensorModel) -> float:
 
 
 def test_a_wave_starts_at_another_phase_in_every_recording_and_at_the_same_again():
-    phases = {phase(at_any_phase(FLICKERING, seed, take)) for seed in range(FIRST, FIRST + 3) for take in range(4)}
+    phases = {
+        phase(with_random_phases(FLICKERING, seed, take))
+        for seed in range(FIRST_SEED, FIRST_SEED + 3)
+        for take in range(4)
+    }
     assert len(phases) == 12
-    assert phase(at_any_phase(FLICKERING, 1, 2)) == phase(at_any_phase(FLICKERING, 1, 2))
+    assert phase(with_random_phases(FLICKERING, 1, 2)) == phase(with_random_phases(FLICKERING, 1, 2))
 
 
 def test_of_four_twins_a_wave_has_no_mean_and_its_whole_scatter():
     """Numbers 8 to 11 of twelve, as a diagnosis takes them: four at right angles, the last two opposite."""
-    turn = 2 * np.pi * np.array([phase(at_any_phase(FLICKERING, 3000 + FIRST + n, 2)) for n in (8, 9, 10, 11)])
+    turn = (
+        2 * np.pi * np.array([phase(with_random_phases(FLICKERING, 3000 + FIRST_SEED + n, 2)) for n in (8, 9, 10, 11)])
+    )
     assert abs(np.cos(turn).mean()) < 1e-2 and np.cos(turn).var() == pytest.approx(0.5, rel=1e-2)
     assert np.cos(turn[2:]).sum() == pytest.approx(0.0, abs=1e-2)
 
 
 def test_a_model_without_waves_is_left_alone():
-    assert at_any_phase(PLAIN, 0, 0) == PLAIN
+    assert with_random_phases(PLAIN, 0, 0) == PLAIN
 
 
 def test_alike_pixels_are_known_no_better_than_labels_say_and_the_sensor_counts():
@@ -47,15 +53,15 @@ def test_alike_pixels_are_known_no_better_than_labels_say_and_the_sensor_counts(
     as given."""
     every = np.ones(SHAPE[0] * SHAPE[1])
     alike = replace(unit_from_refit(MODEL, unit(), SHAPE), gain=0.8 * every, dark=3e-4 * every)
-    drawn = [as_known(alike, 17, take) for take in range(200)]
+    drawn = [with_label_error(alike, 17, take) for take in range(200)]
     moved = np.array([(d.dark - alike.dark) * GRAINS for d in drawn])
     assert np.ptp(moved, axis=1).max() < 1e-6 and np.abs(moved).max() <= 0.5 and len(np.unique(moved[:, 0])) == 200
     brighter = np.array([d.gain / alike.gain - 1.0 for d in drawn])
     assert np.ptp(brighter, axis=1).max() < 1e-12 and brighter[:, 0].std() == pytest.approx(LABEL_ERROR, rel=0.2)
-    assert np.array_equal(as_known(alike, 17, 3).gain, drawn[3].gain)
+    assert np.array_equal(with_label_error(alike, 17, 3).gain, drawn[3].gain)
     spread = replace(alike, gain=np.linspace(0.7, 0.9, alike.gain.size))
-    assert as_known(spread, 17, 0) is spread
-    assert not as_known(replace(alike, dark=np.zeros(alike.gain.size)), 17, 0).dark.any()
+    assert with_label_error(spread, 17, 0) is spread
+    assert not with_label_error(replace(alike, dark=np.zeros(alike.gain.size)), 17, 0).dark.any()
 
 
 @pytest.mark.parametrize("known", [0.0, LABEL_ERROR])
@@ -71,7 +77,7 @@ def test_the_beat_of_alike_pixels_is_no_surer_than_labels(known: float, monkeypa
     def squares(brighter: float) -> np.ndarray:
         gain = (1.0 / 30.1222 - dark) / float(light.radiance[0, 0, 0]) * (1.0 + brighter)
         alike = replace(unit(model), gain=gain, dark=dark)
-        seen = [twin.simulate(model, alike, [flat], SHAPE, FIRST + n, [2])[0].times for n in range(8)]
+        seen = [twin.simulate(model, alike, [flat], SHAPE, FIRST_SEED + n, [2])[0].times for n in range(8)]
         return np.array([t.square[:, 3].sum() / t.terms[:, 3].sum() for t in seen])
 
     here, there = squares(0.0), squares(LABEL_ERROR)

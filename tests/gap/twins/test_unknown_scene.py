@@ -18,7 +18,7 @@ from spikecam_env.gap.diagnose import refittable
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.twins.case import Case, case_of
-from spikecam_env.gap.twins.unknown_scene import EXACT, likely_rates, missed_by, simulate_seen
+from spikecam_env.gap.twins.unknown_scene import RATE_TOLERANCE, correction, plausible_true_rates, simulate_seen
 from spikecam_env.sensor import Effect, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 
@@ -69,7 +69,8 @@ def test_effects_show_in_a_scene(added, statistic):
 def test_twins_fire_at_the_rates_that_were_seen_though_the_model_bends_them():
     """Without correction a dead time of 0.8 frames makes intervals of 5 frames 16 % longer.
 
-    2400 pixels of 80 spikes know their mean rate to a few 1e-5; light is corrected to EXACT by part of the range.
+    2400 pixels of 80 spikes know their mean rate to a few 1e-5; light is corrected to RATE_TOLERANCE by
+    part of the range.
     """
     case = scene()
     model = MODEL.with_effect(effect("dead_time", tau_us=20.0))
@@ -77,28 +78,28 @@ def test_twins_fire_at_the_rates_that_were_seen_though_the_model_bends_them():
     seen = case.observations[0]
     ratio = float(twin.rate.mean() / seen.rate.mean())
     print(f"mean rate of the twin over the one seen: {ratio:.4f}")
-    assert ratio == pytest.approx(1.0, abs=4 * EXACT)
+    assert ratio == pytest.approx(1.0, abs=4 * RATE_TOLERANCE)
 
 
 def test_a_correction_is_a_smooth_function_of_the_rate():
     wanted = np.linspace(0.05, 0.4, 5000)
-    factor = missed_by(wanted * (1.0 - 0.3 * wanted), wanted)
+    factor = correction(wanted * (1.0 - 0.3 * wanted), wanted)
     inside = slice(300, -300)
     error = np.abs(factor * (1.0 - 0.3 * wanted) - 1.0)[inside].max()
     print(f"largest error {error:.1e}")
     assert error < 5e-3
-    assert np.abs(missed_by(wanted, wanted) - 1.0).max() < EXACT
+    assert np.abs(correction(wanted, wanted) - 1.0).max() < RATE_TOLERANCE
 
 
 def test_rates_are_drawn_within_what_the_recording_leaves_open():
     """100 spikes of interval 4 are known to a frame in 400, 0.25 %."""
     seen = scene().observations[0]
-    drawn = likely_rates(seen, 4e-5, np.random.default_rng(0))
+    drawn = plausible_true_rates(seen, 4e-5, np.random.default_rng(0))
     spread = np.abs(drawn / seen.rate - 1.0) * seen.times.count
     print(f"relative difference times count: median {np.median(spread):.2f}, largest {spread.max():.2f}")
     assert 0.05 < np.median(spread) < 1.0
     silent = replace(seen, times=replace(seen.times, count=np.zeros_like(seen.times.count)))
-    assert np.isfinite(likely_rates(silent, 4e-5, np.random.default_rng(0))).all()
+    assert np.isfinite(plausible_true_rates(silent, 4e-5, np.random.default_rng(0))).all()
 
 
 def test_patterns_cannot_be_tested_in_a_scene_and_it_is_said_what_would():

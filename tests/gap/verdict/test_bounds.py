@@ -17,7 +17,7 @@ from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import shipped_templates
-from spikecam_env.gap.twins.budget import Effort
+from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.verdict.bounds import (
     LONGER_RECORDINGS,
@@ -100,10 +100,10 @@ def test_what_these_recordings_would_not_show_at_its_strongest_has_no_bound():
 
 
 def test_without_effort_there_is_no_bound_and_that_is_said():
-    case = replace(recorded(), effort=Effort(10, [9]))
+    case = replace(recorded(), budget=Budget(10, [9]))
     found, open_ = bounds(case, MODEL, None, None, ["dead_time", "vignetting"], shipped_templates())
     assert found == [] and dict(open_).keys() == {"dead_time", "vignetting"}
-    assert all("--effort" in needs for _, needs in open_) and case.effort.left_out == ["upper bounds"]
+    assert all("--effort" in needs for _, needs in open_) and case.budget.left_out == ["upper bounds"]
 
 
 def test_what_is_counted_is_first_tried_where_some_are_expected():
@@ -184,9 +184,9 @@ def test_the_least_refuted_strength_is_bracketed() -> None:
 
 @pytest.mark.parametrize("campaigns, begun", [(140, False), (160, True)])
 def test_bounds_are_begun_where_their_campaigns_are_left(campaigns: int, begun: bool) -> None:
-    case = replace(recorded(), effort=Effort(campaigns * len(CONDITIONS)))
+    case = replace(recorded(), budget=Budget(campaigns * len(CONDITIONS)))
     bounds(case, MODEL, None, None, [], SimpleNamespace(weakest=()))
-    assert (case.effort.left_out == []) == begun
+    assert (case.budget.left_out == []) == begun
 
 
 def test_a_strength_is_scaled_by_forty_at_once_at_most_and_five_times() -> None:

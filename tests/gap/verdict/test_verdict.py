@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap.baseline.off_nominal import OffNominal
-from spikecam_env.gap.compare.distance import HEAVY, misfit
+from spikecam_env.gap.compare.distance import HEAVY, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.result import Gap
 from spikecam_env.gap.statistics import Key
@@ -51,11 +51,11 @@ def test_a_weak_alarm_without_a_name_may_be_chance(p: float, chance: bool) -> No
 def test_a_name_leaves_a_fiftieth_of_the_deviance_at_most(share: float, explained: bool) -> None:
     """Sixty statistics are 100 noises off before; one is left at 6, no chance, and the others share the rest evenly."""
     before = np.where(np.arange(COUNT) < 60, 100.0, 0.0)
-    one = misfit(np.array([6.0]))
-    each = (COUNT + share * (misfit(before) - COUNT) - one) / 59
+    one = robust_squares(np.array([6.0]))
+    each = (COUNT + share * (robust_squares(before) - COUNT) - one) / 59
     left = np.where(before > 0, np.sqrt(HEAVY * np.expm1(each / (HEAVY + 1.0))), 0.0)
     left[0] = 6.0
-    print(f"{(misfit(left) - COUNT) / (misfit(before) - COUNT):.4f} left, {left[1]:.1f} noises each")
+    print(f"{(robust_squares(left) - COUNT) / (robust_squares(before) - COUNT):.4f} left, {left[1]:.1f} noises each")
     assert explains(NULL, before, left, EXACT) == explained
 
 

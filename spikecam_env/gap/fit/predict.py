@@ -1,0 +1,57 @@
+"""What a model with effects gives: twins of the null's draws, drawn units for the pattern, its unit settled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, paired, values_of
+from spikecam_env.gap.twins.case import Case, twins
+from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS, drawn_banks
+from spikecam_env.gap.unit.false_spikes import false_spikes_of
+from spikecam_env.gap.unit.indirect_inference import inferred_unit
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.gap.unit.traps import traps_of
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+MANY_UNITS = 240
+"""Units drawn for the pattern where DRAWN_UNITS of them do not show what was measured."""
+
+
+def predict_by_twins(
+    case: Case, model: SensorModel, base: BaseFit, null: Null, count: int, only: Sequence[int] | None = None
+) -> Prediction:
+    """What a model with effects gives, from twins of the null's last `count` draws; what is not simulated (`only`:
+    recordings, by index) is as in `null`."""
+    numbers = [d.number for d in null.draws[-count:]]
+    made = twins(case, model, base, numbers, only, {d.number: d.refit for d in null.draws})
+    draws = [Draw(n, values_of(t.bank, null.keys), t.base) for n, t in zip(numbers, made, strict=True)]
+    predicted = paired(null, draws)
+    changes_pattern = traps_of(model) or false_spikes_of(model)
+    return with_drawn_pattern(case, model, null, predicted) if changes_pattern else predicted
+
+
+def with_drawn_pattern(
+    case: Case, model: SensorModel, null: Null, predicted: Prediction, count: int = DRAWN_UNITS
+) -> Prediction:
+    """A prediction with its pattern statistics replaced by those of `count` units of the model."""
+    drawn = drawn_banks(model, case.base, case.conditions, case.shape, count, case.seed)
+    values = np.array([values_of(b, null.keys) for b in drawn])
+    known = np.isfinite(values).all(axis=0)
+    values = np.where(known, values, 0.0)
+    mean = np.where(known, values.mean(axis=0), predicted.mean)
+    spread = np.where(known, np.maximum(values.std(axis=0, ddof=1), null.sd), predicted.spread)
+    error = np.where(known, spread / np.sqrt(count), predicted.error)
+    return replace(predicted, mean=mean, error=error, spread=spread, units=np.where(known, values, np.nan))
+
+
+def settled_unit(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> BaseFit:
+    """The unit moved so that with the effect it is refitted as the null's is without."""
+    [without] = [d.refit for d in null.draws if d.number == predicted.draws[-1].number]
+    there = predicted.draws[-1].refit
+    return inferred_unit(model, base, without, [there]) if without and there else base

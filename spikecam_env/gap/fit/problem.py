@@ -1,0 +1,96 @@
+"""What a fit or a search has to explain: a campaign, the model that effects are added to, and how far it is off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.compare.distance import freedom_of, is_significant, residual, residual_and_misfit
+from spikecam_env.gap.compare.prediction import Null, Prediction, law_error, own_variance
+from spikecam_env.gap.fit.predict import predict_by_twins, settled_unit, with_drawn_pattern
+from spikecam_env.gap.fit.recordings import recordings_affected
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A campaign and a model to add effects to.
+
+    case: the campaign, its unit as the model has it.  null: what the model predicts.
+    seen: (S,) measured statistics of the recordings to fit, NaN elsewhere.  values: (S,) those of all recordings.
+    """
+
+    case: Case
+    model: SensorModel
+    null: Null
+    seen: Array
+    values: Array
+
+    @staticmethod
+    def of(case: Case, model: SensorModel, null: Null, values: Array) -> Problem:
+        """With the recordings to fit that the case says."""
+        return Problem(case, model, null, values_to_fit(case, null, values), values)
+
+    @property
+    def fitted_to_all(self) -> Problem:
+        """The same, to be fitted to all recordings."""
+        return replace(self, seen=self.values)
+
+    def standing_on(self, model: SensorModel, base: BaseFit, predicted: Prediction) -> Problem:
+        """What is left to explain of a model with effects already added, its unit and what it predicts."""
+        return replace(self, case=replace(self.case, base=base), model=model, null=standing_on(self.null, predicted))
+
+    def residual_and_misfit(self, predicted: Prediction) -> tuple[Array, float]:
+        """((S,) residual, misfit) of a prediction, by the recordings to fit."""
+        return residual_and_misfit(self.null, self.seen, predicted)
+
+    def misfit(self, predicted: Prediction | None = None) -> float:
+        """Of a prediction, by the recordings to fit; of the model itself where None."""
+        return self.residual_and_misfit(predicted or self.null.prediction)[1]
+
+    def is_explained(self, predicted: Prediction) -> bool:
+        """Whether a prediction leaves nothing but chance of the recordings to fit."""
+        return not is_significant(self.null, residual(self.null, self.seen, predicted), predicted)
+
+    def predict(self, model: SensorModel, base: BaseFit, count: int, only: Sequence[int] | None = None) -> Prediction:
+        """What another model gives (`predict_by_twins`)."""
+        return predict_by_twins(self.case, model, base, self.null, count, only)
+
+    def with_pattern(self, model: SensorModel, predicted: Prediction, count: int = DRAWN_UNITS) -> Prediction:
+        """A prediction with the pattern of units of another model (`with_drawn_pattern`)."""
+        return with_drawn_pattern(self.case, model, self.null, predicted, count)
+
+    def settled_unit(self, model: SensorModel, base: BaseFit, predicted: Prediction) -> BaseFit:
+        """The unit under another model (`predict.settled_unit`)."""
+        return settled_unit(model, base, self.null, predicted)
+
+    def affected(self, names: Sequence[str], change: Array | None = None) -> list[int]:
+        """Recordings that effects concern, by index (`recordings_affected`).  change: (S,) of the statistics; where
+        None it may be everywhere."""
+        everywhere = np.full(len(self.null.keys), np.inf)
+        change = everywhere if change is None else change
+        return recordings_affected(self.case, names, self.null, self.seen, change)
+
+    def allows(self, what: str, recordings: int = 0, *, needed: bool = False) -> bool:
+        """Whether the budget does (`Budget.allows`)."""
+        return self.case.budget.allows(what, recordings, needed=needed)
+
+
+def values_to_fit(case: Case, null: Null, values: Array) -> Array:
+    """(S,) values of recordings of use fit; NaN for the held-out ones, which take no part in the search."""
+    return np.where(case.to_fit(null.keys), values, np.nan)
+
+
+def standing_on(null: Null, predicted: Prediction) -> Null:
+    """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
+    floor = np.sqrt(null.floor**2 + law_error(null, predicted) ** 2 + own_variance(null, predicted))
+    freedom = freedom_of(null, predicted)
+    return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, freedom=freedom, draws=predicted.draws)

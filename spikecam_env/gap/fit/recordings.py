@@ -1,0 +1,54 @@
+"""Which recordings a candidate's twins simulate, and how many twins say what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates.table import Candidates, candidate
+from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.twins.case import Case, refit_recordings
+
+Array = NDArray[np.float64]
+
+TWINS_OF_RANDOM_COURSE, TWINS_OF_EVENTS = 6, 3
+"""Twins of an effect that makes statistics scatter; and of one that is few events, or in few pixels, or that is
+`mixed`, and so cannot be simulated stronger to stand above one twin's noise."""
+
+AFFECTED = 5.0
+"""Noises by which a statistic of a recording has to change, or to be off, for the recording to be simulated: of 600
+statistics one is off by so many in one campaign of 3000 by chance."""
+
+
+def twins_of(name: str) -> int:
+    """How many twins say what an effect does."""
+    what = candidate(name)
+    return TWINS_OF_EVENTS if what.events or what.few_pixels or what.mixed else 1
+
+
+def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int]:
+    """Recordings of use fit on which effects show, or something has to be explained, by index; all where none does.
+
+    With those that the refit rests on: the refit takes up the effects' mean, and the others are judged by that refit.
+    Of effects that leave steady uniform light alone, only the others, where the refit does not rest on them.
+    """
+    seen = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean))) > AFFECTED * null.noise
+    shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
+    fitted = {i for i, c in enumerate(case.conditions) if c.use == "fit"}
+    which = {i for i in fitted if case.conditions[i].name in shows} or fitted
+    uneven = {i for i in which if case.conditions[i].kind not in ("dark", "flat")}
+    if uneven and not uneven & refit_recordings(case) and Candidates(tuple(names)).only_contrast:
+        return sorted(uneven)
+    return sorted(which | refit_recordings(case))
+
+
+def with_held_out(case: Case, only: Sequence[int]) -> list[int]:
+    """With the recordings held out: those in motion, and all where there is a refit to judge the others by."""
+    held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
+    if any(case.conditions[i].kind == "picture" for i in held):
+        held |= refit_recordings(case)
+    if not refit_recordings(case) <= {*only, *held}:
+        held = {i for i in held if case.conditions[i].moves}
+    return sorted({*only, *held})

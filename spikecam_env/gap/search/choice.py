@@ -1,0 +1,74 @@
+"""Which of a round's fits are confirmed, which of them is chosen, and which may as well be true."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import is_significant, residual
+from spikecam_env.gap.compare.prediction import Draw
+from spikecam_env.gap.compare.thresholds import PER_PARAMETER, TO_CONFIRM, TO_DISMISS, TO_PREFER
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.search.rivals import is_rival, lead
+
+
+def confirmed_in_order(
+    fits: Sequence[Fit], confirm: Callable[[Fit], Fit], known: Sequence[Fit] = (), enough: float = np.inf
+) -> tuple[list[Fit], list[Fit]]:
+    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, two
+    at least, until one, as much better as that made the others, would be TO_CONFIRM above the best.
+
+    known: confirmed before.  enough: misfit that one has to come down to, for any to be confirmed.
+    """
+    waiting, done, better = sorted(fits, key=lambda f: f.misfit), list(known), 0.0
+    while waiting:
+        least, hope = min((f.misfit for f in done), default=np.inf), waiting[0].misfit - better
+        if min(least, hope) > enough or (len(done) > 1 and hope >= least + TO_CONFIRM):
+            break
+        done.append(confirm(waiting[0]))
+        better = max(better, waiting.pop(0).misfit - done[-1].misfit)
+    return sorted(done, key=lambda f: f.misfit), waiting
+
+
+def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) -> tuple[list[Fit], tuple[str, ...]]:
+    """(fits, the chosen one first; names of its rivals).  What may as well be true as the first, by the recordings to
+    fit, or leaves hardly more, is put in order by all recordings, and has to be a rival by them.  A parameter more has
+    to explain more: what has one is chosen where it leaves TO_PREFER less, and is a rival where it leaves as much less
+    as any parameter would (PER_PARAMETER).
+
+    here: what the candidates were added to.  draws: of the model as given.
+    """
+    if not confirmed:
+        return [], ()
+    null, seen, values = here.null, here.seen, here.values
+    first = confirmed[0].prediction
+    close = [
+        f
+        for f in confirmed
+        if f is confirmed[0]
+        or lead(null, seen, first, f.prediction) < TO_DISMISS
+        or is_rival(null, draws, seen, first, f.prediction)
+    ]
+    behind = {f.name: lead(null, values, first, f.prediction) for f in close}
+    parameters = {f.name: len(candidate(f.name).fitted) for f in close}
+    close.sort(key=lambda f: behind[f.name] + TO_PREFER * parameters[f.name])
+    best = close[0]
+    left = residual(null, values, best.prediction)
+
+    def may_be_true(f: Fit) -> bool:
+        more = parameters[f.name] - parameters[best.name]
+        pays = more <= 0 or behind[f.name] + PER_PARAMETER * more < behind[best.name]
+        return (
+            pays
+            and is_rival(null, draws, values, best.prediction, f.prediction)
+            and (
+                is_significant(null, left, best.prediction)
+                or not is_significant(null, residual(null, values, f.prediction), f.prediction)
+            )
+        )
+
+    rivals = tuple(f.name for f in close[1:] if may_be_true(f))
+    return [*close, *(f for f in confirmed if f not in close)], rivals

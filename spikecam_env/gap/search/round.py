@@ -1,0 +1,83 @@
+"""One round of the search, and what decides whether the next one begins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import is_significant
+from spikecam_env.gap.compare.prediction import Null, Prediction
+from spikecam_env.gap.compare.thresholds import TO_ADD
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+LEAST_SHARE = (0.2, 0.5)
+"""Share of what is beyond chance that the first effect, and each later one of what the others left, has to remove for
+another to be looked for beside them: less is a stand-in's."""
+
+LEAST_CHANGE = 2.0
+"""Noises by which an effect has to change a statistic to be added: twins of nothing may be luckier than others."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One turn of the search: the model it started from, what that left, and the candidates that were fitted.
+
+    rivals: names that may as well be true as the best of them.
+    used_held_out: whether recordings held out were needed for parameters too.
+    motion_alone: whether what moves among these was fitted, since nothing else disagreed any more.
+    to_join: misfit that its effect has to remove to be fitted together with what was found.
+    """
+
+    model: SensorModel
+    base: BaseFit
+    prediction: Prediction
+    rho: Array
+    misfit: float
+    fits: tuple[Fit, ...] = ()
+    rivals: tuple[str, ...] = ()
+    used_held_out: bool = False
+    motion_alone: bool = False
+    to_join: float = TO_ADD
+
+
+def has_candidate(turn: Round, here: Null) -> bool:
+    """Whether a round's best is to be fitted together with what was found.  here: what the round stands on."""
+    best = turn.fits[0]
+    least = TO_ADD if is_second_bend(turn, best) else turn.to_join
+    return turn.misfit - best.misfit >= least and is_visible(here, best)
+
+
+def is_second_bend(turn: Round, found: Fit) -> bool:
+    """Whether a fit bends the rate curve beside an effect that does: others of them fit in its error, and what is less
+    than TO_ADD says nothing."""
+    return candidate(found.name).bends_response and any(candidate(e.name).bends_response for e in turn.model.effects)
+
+
+def is_visible(here: Null, found: Fit) -> bool:
+    """Whether an effect does anything that a statistic would show, in the mean or by how campaigns scatter (a few hot
+    pixels are in some units); of one whose course is random always."""
+    there = found.prediction
+    change = np.hypot(there.mean - here.mean, np.sqrt(np.maximum(there.spread**2 - here.sd**2, 0.0))) / here.noise
+    return candidate(found.name).random_course or bool(change.max() > LEAST_CHANGE)
+
+
+def is_improvement(null: Null, before: float, best: Fit, later: bool, weak: bool = False) -> bool:
+    """Whether a fit of all that was found together leaves TO_ADD less misfit than `before`; a later one (beside others)
+    that leaves nothing significant has but to leave no more, and one that removed less by itself (`weak`) has to leave
+    nothing.  How widely effects scatter is simulated by other twins each time, and the misfit is known to some ten."""
+    explained = later and not is_significant(null, best.rho, best.prediction)
+    if weak and not explained:
+        return False
+    return before - best.misfit >= (0.0 if explained else TO_ADD)
+
+
+def is_small_share(turn: Round, left: float, chance: float, later: bool) -> bool:
+    """Whether a misfit `left` is little less than what a round started from; chance: misfit of noise alone."""
+    return turn.misfit - left < LEAST_SHARE[later] * (turn.misfit - chance)

@@ -1,0 +1,107 @@
+"""From templates to fits: which candidates a round fits, from where, and how far."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.candidate import Fit, fit
+from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.recordings import twins_of
+from spikecam_env.gap.fit.shapes import with_fitted_shapes, with_shapes_to_fit
+from spikecam_env.gap.screen.screen import Screened
+from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
+from spikecam_env.gap.twins.case import Case
+
+Array = NDArray[np.float64]
+
+STANDS_OUT = 6.0
+"""Noises by which a statistic of the pattern, or of motion, has to stand out for its effects to be tried; or it stands
+out most."""
+
+FEWEST_FITTED, MOST_FITTED = 3, 5
+"""Candidates fitted a round, the best by their templates: so many at least and at most."""
+
+LINE, LINE_SPIKES = 30.0, 1000
+"""Power of a line over what is usual in its spectrum, to start periodic candidates from its frequency; and spikes of a
+recording from which its spectrum says something."""
+
+
+def line_of(case: Case) -> float | None:
+    """Frequency [Hz] of the strongest line in steady light; None where no line stands out."""
+    both = zip(case.conditions, case.observations, strict=True)
+    steady = [o.frame for c, o in both if not c.moves and c.use == "fit"]
+    lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > LINE_SPIKES]
+    (ratio, at), frame = max(lines, key=lambda line: line[0][0], default=((0.0, 0), np.zeros(1)))
+    return frequency(frame, at) * case.frame_rate_hz if ratio > LINE else None
+
+
+def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
+    """Each candidate at the first, and best, of its shapes."""
+    return [s for i, s in enumerate(screened) if s.name not in {before.name for before in screened[:i]}]
+
+
+def starts_to_fit(shapes: Sequence[Screened], before: float, groups: Collection[str] = ()) -> list[Screened]:
+    """The best by their templates, FEWEST_FITTED and those that explain half of what the best does; one that takes
+    several twins a try is tried for that alone.  before: misfit of none.
+
+    groups: of statistics that stand out.  Where the pattern does, with all that only change it, whose statistics are
+    not in proportion to their strength; where motion does, with all that show by it alone, in every shape: templates
+    are of other pictures.
+    """
+    screened = best_of_each(shapes)
+    if not screened:
+        return []
+    half = before - 0.5 * (before - screened[0].misfit)
+    once = [s for s in screened if s.misfit < half or not takes_several_twins(s.name)]
+    tried = [s for i, s in enumerate(once[:MOST_FITTED]) if i < FEWEST_FITTED or s.misfit < half]
+    also = [s for s in screened if candidate(s.name).is_pattern] if "pattern" in groups else []
+    if {"moving", "step"} & set(groups):
+        also += [s for s in shapes if candidate(s.name).of_motion]
+    return tried + [s for s in also if s not in tried]
+
+
+def takes_several_twins(name: str) -> bool:
+    """Whether one twin of a candidate says little of its like."""
+    return candidate(name).random_course or candidate(name).few_pixels
+
+
+def groups_that_stand_out(null: Null, distance: Array) -> set[str]:
+    """Groups of which a statistic stands out by itself, or is what stands out most.  distance: (S,) in noise."""
+    least = min(STANDS_OUT, float(np.abs(distance).max()))
+    return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) >= least}
+
+
+def fits_of(problem: Problem, before: float, starts: Sequence[Screened]) -> tuple[list[Fit], dict[Screened, Fit]]:
+    """(candidates fitted from where their templates say, each from the best of its starts; the fit from each start).
+    before: misfit of none."""
+    with ThreadPoolExecutor(problem.case.jobs) as pool:
+        tries = dict(zip(starts, pool.map(partial(fit_from, problem), starts), strict=True))
+        names = dict.fromkeys(s.name for s in starts)
+        fits = [min((f for f in tries.values() if f.name == name), key=lambda f: f.misfit) for name in names]
+        unshaped = [f for f in with_shapes_to_fit(problem, before, fits) if may_be_shaped(problem, f)]
+        better = list(pool.map(partial(with_fitted_shapes, problem), unshaped))
+    return [*better, *(f for f in fits if f not in unshaped)], tries
+
+
+def fit_from(problem: Problem, start: Screened) -> Fit:
+    """A candidate's strength, fitted from where its template says."""
+    return fit(problem, start.name, start.start, start.expected, start.white)
+
+
+def may_be_shaped(problem: Problem, found: Fit) -> bool:
+    """Whether the budget allows a fit's other parameters: a derivative each, and a start."""
+    cost = recordings_of(problem, found) * (1 + len(candidate(found.name).fitted))
+    return problem.allows(f"{found.name} of finer shape", cost, needed=True)
+
+
+def recordings_of(problem: Problem, found: Fit) -> int:
+    """Recordings that one prediction of a candidate simulates."""
+    only = problem.affected([found.name], found.prediction.mean - problem.null.mean)
+    return len(only) * twins_of(found.name)

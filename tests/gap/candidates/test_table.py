@@ -1,0 +1,38 @@
+"""What a candidate, or several at once, are asked for."""
+
+from __future__ import annotations
+
+import pytest
+
+from spikecam_env.gap.candidates.table import CANDIDATES, Candidates, candidate
+from spikecam_env.sensor import CATALOGUE
+
+
+def test_a_candidate_knows_its_name():
+    assert all(name == c.name for name, c in CANDIDATES.items())
+
+
+@pytest.mark.parametrize(
+    "names, any_pattern, all_pattern, only_contrast",
+    [
+        (("row_fixed_pattern", "hot_pixels"), True, True, False),
+        (("row_fixed_pattern", "dead_time"), True, False, False),
+        (("readout_skew", "optical_blur"), False, False, True),
+        (("readout_skew", "crosstalk"), False, False, False),
+    ],
+)
+def test_several_are_asked_what_any_or_all_of_them_are(names, any_pattern, all_pattern, only_contrast):
+    group = Candidates(names)
+    assert (group.any_pattern, group.all_pattern, group.only_contrast) == (any_pattern, all_pattern, only_contrast)
+
+
+def test_what_bends_the_response_is_of_two_families():
+    bending = {name for name in CATALOGUE if candidate(name).bends_response}
+    assert {"dead_time", "photo_response_nonlinearity", "incomplete_reset"} < bending
+    assert not bending & {"crosstalk", "photodiode_lag", "shot_noise"}
+
+
+def test_noise_and_what_scatters_is_not_linear_in_its_strength():
+    linear = {name for name in CATALOGUE if candidate(name).is_linear}
+    assert {"dead_time", "photodiode_lag", "readout_skew"} < linear
+    assert not linear & {"crosstalk", "threshold_flicker_noise", "lamp_drift", "missed_spikes", "row_fixed_pattern"}
