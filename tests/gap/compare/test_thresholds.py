@@ -121,7 +121,7 @@ def test_a_later_effect_has_to_remove_4_to_be_fitted_with_those_before_it(remove
     monkeypatch.setattr(forward, "is_small_share", lambda *_: False)
     monkeypatch.setattr(forward, "is_improvement", lambda *_: True)
     monkeypatch.setattr(forward, "MOST_EFFECTS", 2)
-    monkeypatch.setattr(forward, "rings", lambda *_: True)
+    monkeypatch.setattr(forward, "is_discrepant", lambda *_: True)
     monkeypatch.setattr(forward, "try_cancelling_pair", lambda problem, names, rounds: rounds)
     monkeypatch.setattr(Problem, "standing_on", lambda problem, *_: problem)
     asked, strong = [], 10.0 * null().sd

@@ -27,7 +27,7 @@ EXACT = Prediction(np.zeros(COUNT), np.zeros(COUNT), np.ones(COUNT))
 
 def comparison(**others) -> Comparison:
     """Of nothing that disagrees."""
-    case = SimpleNamespace(effort=SimpleNamespace(left_out=[]))
+    case = SimpleNamespace(budget=SimpleNamespace(left_out=[]))
     plain = Comparison(case, None, None, NULL, np.zeros(COUNT), np.zeros(COUNT), (), OffNominal({}, None), ())
     return replace(plain, **others)
 
@@ -75,7 +75,7 @@ def test_contradictions_come_first_then_what_is_left_then_ties_then_names() -> N
     assert verdict_of(comparison(missing=("dark",)), rounds, tied, True) == "named"
     assert verdict_of(comparison(), rounds, found, True) == "named"
     assert verdict_of(comparison(), [], [], True) == ""
-    left_out = SimpleNamespace(effort=SimpleNamespace(left_out=["a second effect"]))
+    left_out = SimpleNamespace(budget=SimpleNamespace(left_out=["a second effect"]))
     assert verdict_of(comparison(case=left_out), rounds, found, True) == "unknown"
 
 
@@ -85,7 +85,7 @@ def test_a_share_of_a_gap_is_stated_where_there_is_one() -> None:
 
 
 def test_notes_are_by_kind() -> None:
-    plain, lent, alone = (SimpleNamespace(lent=x, alone=y) for x, y in ((False, False), (True, False), (False, True)))
+    plain, lent, alone = (SimpleNamespace(used_held_out=x, motion_alone=y) for x, y in ((False, False), (True, False), (False, True)))
     assert notes_of([plain]) == [] and notes_of([lent, alone]) == [*Note]
     assert gap_is_fitted([*Note]) and not gap_is_fitted([note.value for note in Note])
 
