@@ -85,7 +85,8 @@ def test_a_share_of_a_gap_is_stated_where_there_is_one() -> None:
 
 
 def test_notes_are_by_kind() -> None:
-    plain, lent, alone = (SimpleNamespace(used_held_out=x, motion_alone=y) for x, y in ((False, False), (True, False), (False, True)))
+    kinds = ((False, False), (True, False), (False, True))
+    plain, lent, alone = (SimpleNamespace(used_held_out=x, motion_alone=y) for x, y in kinds)
     assert notes_of([plain]) == [] and notes_of([lent, alone]) == [*Note]
     assert gap_is_fitted([*Note]) and not gap_is_fitted([note.value for note in Note])
 
