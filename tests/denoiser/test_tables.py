@@ -19,6 +19,7 @@ from denoiser.evaluate.report import report
 from denoiser.evaluate.rows import ROWS, Weights, why_not
 from denoiser.evaluate.summary import groups, mean_and_spread
 from denoiser.evaluate.tables import TABLES, Asked, evaluate_table
+from denoiser.pixel_map import PixelMap
 from spikecam_env.datasets import build, phm_n
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
@@ -305,9 +306,9 @@ def test_naturalness_counts_downwards() -> None:
 def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:
     """Against the rates of the same camera before even light: its gain and dark explain nearly all of their spread."""
     case = Case("still", "bright 0", 3, (24, 32), 400)
-    gain, dark = still.calibrated(case)
+    found = PixelMap.of(still.calibrated(case))
     camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, still.unit_seed(case))
     rate = camera.step(np.full(case.shape, 0.3, np.float32), 4000).mean(axis=0)
-    left = np.std(rate - (0.3 * gain + dark)) / np.std(rate)
+    left = np.std(rate - (0.3 * found.gain + found.dark)) / np.std(rate)
     print(f"spread of the rates that the maps leave: {left:.3f}")
     assert left < 0.1

@@ -22,14 +22,17 @@ def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) 
 
 
 def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
-    """Parameters within what their effect allows, whole where they must be."""
-    out = {}
+    """Parameters within what their effect allows, whole where they must be; what is true or false stays so."""
+    out: dict[str, float] = {}
     for key, f in CATALOGUE[name].__dataclass_fields__.items():
         if key not in parameters:
             continue
+        if isinstance(f.default, bool):
+            out[key] = parameters[key]
+            continue
         low, high = f.metadata["bounds"] or (-np.inf, np.inf)
         value = float(np.clip(parameters[key], low, high))
-        out[key] = round(value) if isinstance(f.default, int) and not isinstance(f.default, bool) else value
+        out[key] = round(value) if isinstance(f.default, int) else value
     return out
 
 

@@ -8,6 +8,7 @@ from small import MODEL, effect, recorded
 from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
 from spikecam_env.gap.twins.fresh_units import width
 from spikecam_env.gap.unit.conversion import exact_refit
+from spikecam_env.sensor import CATALOGUE, SensorModel
 
 SHAPE = (128, 128)
 
@@ -70,3 +71,15 @@ def test_a_unit_as_the_model_has_it_is_not_off():
     off = off_nominal(recorded(), MODEL, usual)
     assert off.parameters == {} and off.nominal is usual
     assert with_strengths(MODEL, off.parameters) == MODEL
+
+
+@pytest.mark.parametrize("preset", ["scsim", "physical", "measured"])
+def test_any_strength_of_a_preset_may_be_patched(preset):
+    """Other parameters stay what they are, those that are true or false too."""
+    model = SensorModel.preset(preset)
+    for e in model.effects:
+        key = CATALOGUE[e.name].strength
+        if key is None:
+            continue
+        patched = with_strengths(model, {e.name: {"measured": e.parameters()[key]}})
+        assert next(p for p in patched.effects if p.name == e.name).parameters() == e.parameters()
