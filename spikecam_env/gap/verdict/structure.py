@@ -46,7 +46,7 @@ def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
     total = max(sum(weight.values()), 1e-9)
     return {
         "light": "in the dark and in the light" if dark and lit else "in the dark" if dark else "in the light",
-        "levellevel_exponent": level_exponent(null, off, kind, level),
+        "level_exponent": level_exponent(null, off, kind, level),
         "extent": "common to many pixels" if common > COMMON_SHARE * total else "pixel by pixel",
         "time_scale_s": None,
         "history": any(k.group in _MEMORY and k.name not in ("level", "square", "row", "column") for k in keys),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.report.meaning import _STRUCTURE
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.verdict import structure as module
 from spikecam_env.gap.verdict.structure import level_exponent, structure
@@ -15,7 +16,7 @@ from spikecam_env.gap.verdict.structure import level_exponent, structure
 LEVELS = {"flat-0.1": 0.1, "flat-0.2": 0.2, "flat-0.4": 0.4}
 
 
-def test_of_statistics_seen_on_as_many_flats_the_first_gives_thelevel_exponent() -> None:
+def test_of_statistics_seen_on_as_many_flats_the_first_gives_the_exponent() -> None:
     """Statistic n goes with level^n; any but the first would give another exponent.  Eight, so that an order of chance
     (of a set of names, another in every process) would pass once in eight."""
     names = [f"statistic {n}" for n in range(8)]
@@ -54,4 +55,7 @@ def test_what_many_pixels_have_in_common_has_its_share_of_the_deviance(rows, ext
     null, off = made_up({("rows", "flat-0.1"): rows, ("rates", "flat-0.1"): 10.0, ("rates", "flat-0.2"): 10.0})
     share = np.log1p(off**2 / 8)
     print(f"{share[0] / share.sum():.2f}")
-    assert structure(case, null, off)["extent"] == extent
+    found = structure(case, null, off)
+    assert found["extent"] == extent
+    assert {"light", "level_exponent", "extent", "history", "neighbours", "clock", "where", "when"} <= set(found)
+    assert set(found) - {"worst_group", "groups"} <= set(_STRUCTURE), "what has no words on the page"
