@@ -13,6 +13,7 @@ import torch
 from tqdm import tqdm
 
 from denoiser.online import OnlineDnSS
+from denoiser.recipe import recipe_of
 from scenes import RotatingDisk
 from spikecam_env.sensor import SpikeSensor
 
@@ -24,11 +25,11 @@ CHUNK = 16
 def bench_online(threads: tuple[int, ...] = (1, 2), seconds: float = 3.0, seed: int = 0) -> list[dict[str, Any]]:
     """Frames a second of `OnlineDnSS` on a noisy stream of the disk, by size, network evaluation stride and threads.
 
-    Columns: mode, size, stride (frames between network evaluations; `best` gives 8 frames an evaluation), threads,
+    Columns: mode, size, stride (frames between network evaluations; `best` gives 16 frames an evaluation), threads,
     frames/s, x paper (same size and threads, stride 1), x real time (40 000 frames a second), latency [frames].
     """
     before = torch.get_num_threads()
-    contestants = [("paper", stride) for stride in STRIDES] + [("best", 8)]
+    contestants = [("paper", stride) for stride in STRIDES] + [("best", recipe_of("best").layout.planes)]
     jobs = [(shape, count, *c) for shape in SHAPES for count in threads for c in contestants]
     rows: list[dict[str, Any]] = []
     base = 0.0
