@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import StrEnum
+from enum import Enum
 
 from spikecam_env.gap.search.round import Round
 
 
-class Note(StrEnum):
+class Note(str, Enum):
     """Why the gap on recordings held out is no check.  The value is the sentence that page, terminal and JSON state."""
 
     PARAMETERS_FROM_HELD_OUT = (
@@ -22,6 +22,8 @@ class Note(StrEnum):
         "What moves among them was fitted: the gap on it is a fit, and no check."
     )
     """Nothing but motion held out shows what is missing."""
+
+    __str__ = str.__str__  # the sentence, as StrEnum has it from Python 3.11 on
 
 
 def notes_of(rounds: Sequence[Round]) -> list[str]:
