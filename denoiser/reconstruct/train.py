@@ -1,8 +1,8 @@
 """Training a reconstructor on simulated streams as they go on, resumable at any minute.
 
 Each step moves every stream on by `frames_a_step` frames and learns from the window that ends there
-(`rolling.py`), by the loss of `lessons.py`.  Adam; the rate of learning warms up over 100 steps and falls as a cosine
-to nothing at the end.  A run limited by `minutes` ends where the clock says; a resumed one goes on with new streams.
+(`rolling.py`), by the loss of `lessons.py`, in the loop that all training shares (`denoiser.training_loop`).  A resumed
+run goes on with new streams.
 
 In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `curve.json` and `curve.png`: validation on streams
 of another seed, against the true light, beside TFP 21, TFP 41 and TFI of the same windows.
@@ -10,7 +10,6 @@ of another seed, against the true light, beside TFP 21, TFP 41 and TFI of the sa
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import time
@@ -20,24 +19,22 @@ from pathlib import Path
 
 import torch
 from torch import Tensor, nn
-from tqdm import tqdm
 
 from denoiser.captured import captured
 from denoiser.reconstruct import ssml
 from denoiser.reconstruct.lessons import Lesson, Windows, lesson_of
 from denoiser.reconstruct.recipe import ReconstructorRecipe, reconstructor_recipe
 from denoiser.reconstruct.rolling import RollingWindows
-from denoiser.reconstruct.run import Run
 from denoiser.reconstruct.spk2imgnet import WINDOW
 from denoiser.reconstruct.weights import save_reconstructor
+from denoiser.run import Run
 from denoiser.simulated import UNIT_SHAPE, Bank, SimulatedStreams
+from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
 from spikecam_env.checked import checked_count, checked_number, checked_seed
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
-from spikecam_env.whole import whole_file, write_text_whole
 
-WARM_UP_STEPS = 100
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 64
 VALIDATION_MOMENTS = 4
@@ -118,36 +115,19 @@ def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -
     lesson = lesson_of(config.recipe())
     lesson.networks.to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
     run = Run.begin(lesson.networks)
-    if config.resume and (config.out / "last.pt").exists():
-        run.load(config.out / "last.pt")
-    return _loop(config, lesson, run, began, progress)
-
-
-def _loop(config: ReconstructorConfig, lesson: Lesson, run: Run, began: float, progress: bool) -> Path:
+    if config.resume and (config.out / RUN_FILE).exists():
+        run.load(config.out / RUN_FILE)
     rolling = _windows(config, run.step, lesson.span)
     held_out = _held_out(config)
-    before, saved = run.seconds, time.monotonic()
-    bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
-    losses: list[Tensor] = []
-    run.set_rate(_rate(config.lr, 0, 0.0))  # of the calls that come before a capture
-    step = captured(lambda: _step(config, lesson, run, rolling), torch.device(config.device), rolling.streams.rng)
-    while (done := _done(config, run)) < 1.0:
-        run.set_rate(_rate(config.lr, run.step, done))
-        losses.append(step())
-        run.step += 1
-        run.seconds = before + time.monotonic() - began
-        bar.update()
-        if run.step % config.validate_every == 0:
-            scores = validate(lesson.networks["student"], held_out)
-            loss = float(torch.stack(losses).mean())
-            run.curve.append({"step": run.step, "seconds": run.seconds, "loss": loss, **scores})
-            losses.clear()
-            bar.set_postfix(loss=loss, db=scores["network_db"])
-        if run.step % config.validate_every == 0 or time.monotonic() - saved > config.save_every_s:
-            _save(config, run)
-            saved = time.monotonic()
-    bar.close()
-    return _save(config, run)
+    return learn(
+        config,
+        run,
+        lambda: captured(lambda: _step(config, lesson, run, rolling), rolling.streams.device, rolling.streams.rng),
+        lambda: validate(lesson.networks["student"], held_out),
+        lambda: _save(config, lesson, run),
+        began=began,
+        progress=progress,
+    )
 
 
 def _step(config: ReconstructorConfig, lesson: Lesson, run: Run, rolling: RollingWindows) -> Tensor:
@@ -158,19 +138,9 @@ def _step(config: ReconstructorConfig, lesson: Lesson, run: Run, rolling: Rollin
         losses = lesson.losses(windows, torch.bfloat16)
     loss = (losses * windows.old).sum() / windows.old.sum().clamp(min=1)
     loss.backward()
-    nn.utils.clip_grad_norm_(run.networks.parameters(), 1.0)
+    nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
     run.optimiser.step()
     return loss.detach()
-
-
-def _done(config: ReconstructorConfig, run: Run) -> float:
-    """Share of the run that is over, by the clock where it is limited by minutes."""
-    return run.step / config.steps if config.minutes is None else run.seconds / (60 * config.minutes)
-
-
-def _rate(highest: float, step: int, done: float) -> float:
-    """The rate of learning of a step."""
-    return highest * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
 
 
 def _windows(config: ReconstructorConfig, step: int, span: int) -> RollingWindows:
@@ -213,28 +183,12 @@ def validate(network: nn.Module, held_out: list[Windows]) -> dict[str, float]:
     return {name: round(-10 * math.log10(max(total, 1e-12) / max(count, 1)), 3) for name, total in sums.items()}
 
 
-def _save(config: ReconstructorConfig, run: Run) -> Path:
+def _save(config: ReconstructorConfig, lesson: Lesson, run: Run) -> Path:
     weights = config.out / f"{config.mode}.pt"
-    student, record = run.networks["student"], training_record(config, run.step, run.seconds, run.resumed_at)
-    save_reconstructor(weights, config.mode, config.recipe(), student, record)
-    run.save(config.out / "last.pt")
-    write_text_whole(config.out / "curve.json", json.dumps(run.curve, indent=1))
-    if run.curve:
-        _plot(run.curve, config.out / "curve.png")
+    record = training_record(config, run.step, run.seconds, run.resumed_at)
+    save_reconstructor(weights, config.mode, config.recipe(), lesson.networks["student"], record)
+    save_progress(config.out, run)
     return weights
-
-
-def _plot(curve: list[dict[str, float]], path: Path) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6, 4))
-    axes = figure.subplots()
-    for name in ("network", "tfp21", "tfp41", "tfi"):
-        axes.plot([p["step"] for p in curve], [p[f"{name}_db"] for p in curve], label=name)
-    axes.set(xlabel="step", ylabel="PSNR against the true light [dB]")
-    axes.legend()
-    with whole_file(path) as beside:
-        figure.savefig(beside, dpi=120)
 
 
 def main() -> None:

@@ -10,7 +10,9 @@ import pytest
 import torch
 
 from denoiser import train as training
+from denoiser import training_loop
 from denoiser.recipe import RECIPES
+from denoiser.run import Run
 from denoiser.simulated import Bank
 from denoiser.train import Judge, TrainConfig, train
 from denoiser.training_record import command
@@ -43,17 +45,17 @@ def test_same_seed_same_weights(small, tmp_path):
 
 def test_a_resumed_run_goes_on(small, tmp_path, monkeypatch):
     """Two steps, then the rest of four: weights and moments come back, the streams are others."""
-    done, seeds, drawn = training._done, [], training.source
+    done, seeds, drawn = training_loop.share_done, [], training.source
     monkeypatch.setattr(training, "source", lambda *a, seed, **o: seeds.append(seed) or drawn(*a, seed=seed, **o))
-    monkeypatch.setattr(training, "_done", lambda config, run: 1.0 if run.step == 2 else done(config, run))
+    monkeypatch.setattr(training_loop, "share_done", lambda limits, run: 1.0 if run.step == 2 else done(limits, run))
     half = weights_after(tmp_path, 4)
-    begun = training._Run.begin(TrainConfig(out=tmp_path), RECIPES["best"])
+    begun = Run.begin(RECIPES["best"].network())
     begun.load(tmp_path / "last.pt")
     assert same(begun.network.state_dict(), half)
-    monkeypatch.setattr(training, "_done", done)
+    monkeypatch.setattr(training_loop, "share_done", done)
     whole = weights_after(tmp_path, 4)
     record = load_weights(tmp_path / "best.pt")[2]
-    moments = torch.load(tmp_path / "last.pt", weights_only=True)["optimiser"]["state"]
+    moments = torch.load(tmp_path / "last.pt", weights_only=True)["optimiser"]["moments"]
     assert record["resumed_at"] == [2] and record["steps"] == 4 and float(moments[0]["step"]) == 4
     assert seeds == [0, 2] and not same(half, whole)
 
@@ -100,11 +102,10 @@ def test_minutes_end_a_run(small, tmp_path):
 
 
 def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
-    adam = torch.optim.Adam([torch.zeros(1, requires_grad=True)])
-    rates = []
+    run, rates = Run.begin(torch.nn.Linear(1, 1)), []
     for step, done in ((0, 0.0), (99, 0.0), (1000, 0.5), (2000, 1.0)):
-        training._set_rate(adam, 2.0, step, done)
-        rates.append(adam.param_groups[0]["lr"])
+        run.set_rate(training_loop.rate_at(2.0, step, done))
+        rates.append(run.optimiser.param_groups[0]["lr"])
     assert rates == pytest.approx([0.02, 2.0, 1.0, 0.0])
 
 
@@ -190,13 +191,16 @@ ODD_RUNS = {
     "an unknown entry": lambda run: run.update(more=1),
     "weights NaN": lambda run: next(iter(run["network"].values())).fill_(float("nan")),
     "weights a list": lambda run: run.update(network=[1]),
-    "no groups": lambda run: run["optimiser"].pop("param_groups") and None,
-    "groups a number": lambda run: run["optimiser"].update(param_groups=3),
-    "other settings": lambda run: run["optimiser"]["param_groups"][0].update(betas=(2.0, 3.0)),
-    "rate NaN": lambda run: run["optimiser"]["param_groups"][0].update(lr=float("nan")),
-    "moments of others": lambda run: run["optimiser"]["state"].pop(0) and None,
-    "moments of another shape": lambda run: run["optimiser"]["state"][0].update(exp_avg=torch.zeros(3)),
-    "moments infinite": lambda run: run["optimiser"]["state"][0]["exp_avg"].fill_(float("inf")),
+    "no network": lambda run: run.pop("network") and None,
+    "no settings": lambda run: run["optimiser"].pop("settings") and None,
+    "settings a number": lambda run: run["optimiser"].update(settings=3),
+    "settings of text": lambda run: run["optimiser"].update(settings="Adam"),
+    "other settings": lambda run: run["optimiser"]["settings"][0].update(betas=(2.0, 3.0)),
+    "rate NaN": lambda run: run["optimiser"]["settings"][0].update(lr=float("nan")),
+    "no moments": lambda run: run["optimiser"].pop("moments") and None,
+    "moments of others": lambda run: run["optimiser"]["moments"].pop(0) and None,
+    "moments of another shape": lambda run: run["optimiser"]["moments"][0].update(exp_avg=torch.zeros(3)),
+    "moments infinite": lambda run: run["optimiser"]["moments"][0]["exp_avg"].fill_(float("inf")),
 }
 
 
@@ -215,7 +219,6 @@ def test_an_odd_run_to_resume_is_refused_in_one_line(begun, tmp_path, name):
     run = torch.load(begun, weights_only=True)
     changed = ODD_RUNS[name](run)
     torch.save(changed if isinstance(changed, list) else run, tmp_path / "last.pt")
-    config = TrainConfig(out=tmp_path)
     with pytest.raises(InputError, match=r"last\.pt") as caught:
-        training._Run.begin(config, RECIPES["best"]).load(tmp_path / "last.pt")
+        Run.begin(RECIPES["best"].network()).load(tmp_path / "last.pt")
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""A run of training that can go on where it was stopped: networks, optimiser, and how far it is.
+"""A run of training that can go on where it was stopped: what learns, its optimiser, and how far it is.
 
 `last.pt` holds them as plain values; reading it checks every name, shape, type and number before anything is used.
 """
@@ -21,9 +21,10 @@ from spikecam_env.untrusted import Declared, Name, Whole, declared
 
 @dataclass
 class Run:
-    """networks: by name, all of them learned together.  seconds: spent so far.  curve: the validations."""
+    """network: what learns; several that learn together are one `nn.ModuleDict`.  seconds: spent so far.  curve: the
+    validations.  resumed_at: steps."""
 
-    networks: nn.ModuleDict
+    network: nn.Module
     optimiser: torch.optim.Optimizer
     step: int
     seconds: float
@@ -31,11 +32,12 @@ class Run:
     resumed_at: list[int]
 
     @classmethod
-    def begin(cls, networks: nn.ModuleDict) -> Run:
-        weights = list(networks.parameters())
+    def begin(cls, network: nn.Module) -> Run:
+        """Before the first step, on the device where the network is."""
+        weights = list(network.parameters())
         on_gpu = weights[0].is_cuda
         rate = torch.tensor(1e-3, device=weights[0].device) if on_gpu else 1e-3  # a replayed step reads tensors alone
-        return cls(networks, torch.optim.Adam(weights, rate, capturable=on_gpu), 0, 0.0, [], [])
+        return cls(network, torch.optim.Adam(weights, rate, capturable=on_gpu), 0, 0.0, [], [])
 
     def set_rate(self, rate: float) -> None:
         """The rate of learning from now on."""
@@ -49,24 +51,24 @@ class Run:
         """Write all of it; the file appears whole."""
         progress = {name: getattr(self, name) for name in ("step", "seconds", "curve", "resumed_at")}
         parts = {
-            "networks": self.networks.state_dict(),
+            "network": self.network.state_dict(),
             "optimiser": {"moments": self._moments(), "settings": self._settings()},
         }
         write_whole(path, parts | progress)
 
     def load(self, path: Path) -> None:
-        """Go on from a file of `save`.  Raises InputError where it is damaged, or of other networks."""
+        """Go on from a file of `save`.  Raises InputError where it is damaged, or of another network."""
         data = read_plain(path)
         try:
-            if not isinstance(data, dict) or not {"networks", "optimiser"} <= set(data):
-                raise InputError(f"{path} holds no networks")
-            weights, moments = data.pop("networks"), data.pop("optimiser")
+            if not isinstance(data, dict) or not {"network", "optimiser"} <= set(data):
+                raise InputError(f"{path} holds no network")
+            weights, moments = data.pop("network"), data.pop("optimiser")
             progress = declared(_Progress, data, str(path))
-            tensors_like(self.networks.state_dict(), weights, str(path))
+            tensors_like(self.network.state_dict(), weights, str(path))
             self._refuse_others(moments, str(path))
         except InputError as error:
             raise InputError(f"{error}; it is not a run of this mode: give another --out, or resume=False") from error
-        self.networks.load_state_dict(weights)
+        self.network.load_state_dict(weights)
         groups = self.optimiser.state_dict()["param_groups"]
         self.optimiser.load_state_dict({"state": moments["moments"], "param_groups": groups})
         self.step, self.seconds, self.curve = progress.step, progress.seconds, [dict(p) for p in progress.curve]
@@ -85,7 +87,7 @@ class Run:
         """Raises InputError unless these are moments of an Adam of the same parameters and settings."""
         if not isinstance(found, dict) or found.get("settings") != self._settings():
             raise InputError(f"{where}: the optimiser has other settings or parameters")
-        weights = [p.detach().cpu() for p in self.networks.parameters()]
+        weights = [p.detach().cpu() for p in self.network.parameters()]
         moments = found.get("moments")
         if not isinstance(moments, dict) or set(moments) not in (set(), set(range(len(weights)))):
             raise InputError(f"{where}: the optimiser has no moments of these parameters")

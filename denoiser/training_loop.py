@@ -1,0 +1,124 @@
+"""The loop of every training here: steps at a rate of learning that warms up and falls, validations, and what is kept.
+
+The rate warms up over WARM_UP_STEPS steps and falls as a cosine to nothing at the end.  A run that is limited by
+minutes ends where the clock says.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import torch
+from torch import Tensor
+from tqdm import tqdm
+
+from denoiser.run import Run
+from spikecam_env.whole import whole_file, write_text_whole
+
+WARM_UP_STEPS = 100
+RUN_FILE = "last.pt"
+"""What a run resumes from, in its folder."""
+
+
+class Limits(Protocol):
+    """What the loop reads of a training's options."""
+
+    @property
+    def mode(self) -> str:
+        """Shown beside the progress bar."""
+
+    @property
+    def steps(self) -> int:
+        """Steps in all."""
+
+    @property
+    def minutes(self) -> float | None:
+        """Minutes in all; they count instead of the steps where they are given."""
+
+    @property
+    def lr(self) -> float:
+        """Highest rate of learning."""
+
+    @property
+    def validate_every(self) -> int:
+        """Steps."""
+
+    @property
+    def save_every_s(self) -> float:
+        """Seconds."""
+
+
+def learn(
+    limits: Limits,
+    run: Run,
+    step_of: Callable[[], Callable[[], Tensor]],
+    validate: Callable[[], dict[str, float]],
+    save: Callable[[], Path],
+    *,
+    began: float,
+    progress: bool,
+) -> Path:
+    """Take steps to the end of the run; returns the path of the weights.
+
+    step_of: makes the step, a function that returns its loss; on a GPU a few steps are taken meanwhile (`captured`).
+    validate: scores by name, "network_db" among them.  save: writes all that is kept.  began: when this part of the
+    run did, by `time.monotonic`.
+    """
+    before, saved = run.seconds, time.monotonic()
+    bar = tqdm(total=limits.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=limits.mode)
+    losses: list[Tensor] = []
+    run.set_rate(rate_at(limits.lr, 0, 0.0))  # of the steps that come before a capture
+    step = step_of()
+    while (done := share_done(limits, run)) < 1.0:
+        run.set_rate(rate_at(limits.lr, run.step, done))
+        losses.append(step())
+        run.step += 1
+        run.seconds = before + time.monotonic() - began
+        bar.update()
+        if run.step % limits.validate_every == 0:
+            scores = validate()
+            loss = float(torch.stack(losses).mean())
+            run.curve.append({"step": run.step, "seconds": run.seconds, "loss": loss, **scores})
+            losses.clear()
+            bar.set_postfix(loss=loss, db=scores["network_db"])
+        if run.step % limits.validate_every == 0 or time.monotonic() - saved > limits.save_every_s:
+            save()
+            saved = time.monotonic()
+    bar.close()
+    return save()
+
+
+def share_done(limits: Limits, run: Run) -> float:
+    """Share of the run that is over, by the clock where it is limited by minutes."""
+    return run.step / limits.steps if limits.minutes is None else run.seconds / (60 * limits.minutes)
+
+
+def rate_at(highest: float, step: int, done: float) -> float:
+    """The rate of learning of a step."""
+    return highest * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
+
+
+def save_progress(folder: Path, run: Run) -> None:
+    """Write what the run resumes from, and its validations as numbers and as a picture; each file appears whole."""
+    run.save(folder / RUN_FILE)
+    write_text_whole(folder / "curve.json", json.dumps(run.curve, indent=1))
+    if run.curve:
+        _plot(run.curve, folder / "curve.png")
+
+
+def _plot(curve: list[dict[str, float]], path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6, 4))
+    axes = figure.subplots()
+    for name in (key for key in curve[0] if key.endswith("_db")):
+        axes.plot([p["step"] for p in curve], [p[name] for p in curve], label=name.removesuffix("_db"))
+    axes.set(xlabel="step", ylabel="PSNR against the true light [dB]")
+    axes.legend()
+    with whole_file(path) as beside:
+        figure.savefig(beside, dpi=120)
