@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenes.derived import Derived
 from scenes.protocol import Dimmable, Gaze, Placed, Scene, Truth
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
@@ -44,21 +45,11 @@ def checked_interval(mean_interval: float) -> float:
 
 
 @dataclass(frozen=True)
-class Exposed:
+class Exposed(Derived):
     """Scene: another one with its light multiplied by `gain`."""
 
     scene: Scene
     gain: float
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(rows, columns)."""
-        return self.scene.shape
-
-    @property
-    def frame_rate_hz(self) -> float:
-        """Frames a second."""
-        return self.scene.frame_rate_hz
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, scaled."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenes.derived import Derived
 from scenes.exposure import METERED_FRAMES
 from scenes.protocol import Gaze, Scene, Truth
 from spikecam_env.checked import checked_number
@@ -23,7 +24,7 @@ MOST_FACTOR = 1e3
 
 
 @dataclass(frozen=True)
-class Faster:
+class Faster(Derived):
     """Scene: another one's light; frame t is its frame `factor` * t.
 
     Keys lie at fractions of frames, which costs the sensor a pass a frame.
@@ -35,16 +36,6 @@ class Faster:
 
     def __post_init__(self) -> None:
         checked_number(self.factor, "factor", 0.0, MOST_FACTOR, above=True)
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(rows, columns)."""
-        return self.scene.shape
-
-    @property
-    def frame_rate_hz(self) -> float:
-        """Frames a second."""
-        return self.scene.frame_rate_hz
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, at their frames here."""

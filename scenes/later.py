@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from scenes.derived import Derived
 from scenes.protocol import Gaze, Placed, Truth
 from spikecam_env.sensor import Keyframes
 
 
 @dataclass(frozen=True)
-class Later:
+class Later(Derived):
     """Scene: another one's light, frame 0 being its frame `frames`, a camera at rest being one at `offset`.
 
     frames   whole frames
@@ -19,16 +20,6 @@ class Later:
     scene: Placed
     frames: int = 0
     offset: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(rows, columns)."""
-        return self.scene.shape
-
-    @property
-    def frame_rate_hz(self) -> float:
-        """Frames a second."""
-        return self.scene.frame_rate_hz
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, at their frames here."""
