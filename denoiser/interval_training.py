@@ -16,7 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from denoiser.pairs import WARM_UP
-from denoiser.simulated import Bank, SimulatedStreams
+from denoiser.simulated import Bank, SimulatedStreams, in_turn
 from denoiser.window import WindowLayout
 
 LOOK_AHEAD = 96
@@ -95,8 +95,7 @@ class IntervalWindows:
         """The next windows of the streams whose turn it is, and of those after them."""
         device, middle, span = self.streams.device, self.layout.past, self.layout.span
         for _ in range(passes):
-            rows = torch.remainder(self._next + torch.arange(self.taken, device=device), self.streams.count)
-            self._next += self.taken
+            rows = in_turn(self._next, self.taken, self.streams.count)
             part = self.streams.advance(ADVANCE, rows)
             self._take(rows, part.noisy, part.clean, part.light, part.begins)
             noisy, clean = self._noisy[rows], self._clean[rows]

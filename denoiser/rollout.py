@@ -21,7 +21,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from denoiser.simulated import Bank, SimulatedStreams
+from denoiser.simulated import Bank, SimulatedStreams, in_turn
 from denoiser.stream_network import CARRY, Carried
 from denoiser.window import WindowLayout
 from denoiser.window_torch import Windows, learned, pushed
@@ -131,8 +131,7 @@ class Rollouts:
     def _passes(self, network: nn.Module, passes: int) -> Iterator[Pass]:
         """The next passes of the streams whose turn it is."""
         layout, device = self.layout, self.streams.device
-        rows = torch.remainder(self._next + torch.arange(self.taken, device=device), self.streams.count)
-        self._next += self.taken
+        rows = in_turn(self._next, self.taken, self.streams.count)
         windows = self._windows.rows(rows)
         past = _Past(**{name: value[rows] for name, value in vars(self._past).items()})
         for _ in range(passes):

@@ -305,6 +305,13 @@ class SimulatedStreams:
         return torch.randint(least, stop, shape, generator=self.rng, device=self.device)
 
 
+def in_turn(following: Tensor, taken: int, count: int) -> Tensor:
+    """Rows (int64) of the next `taken` of `count` streams; `following`, a number on their device, moves on in place."""
+    rows = torch.remainder(following + torch.arange(taken, device=following.device), count)
+    following += taken
+    return rows
+
+
 def _where(mask: Tensor, new: dict[str, Tensor], old: dict[str, Tensor]) -> dict[str, Tensor]:
     """`new` in the rows of the mask, else `old`."""
     return {n: torch.where(mask.reshape(-1, *[1] * (v.ndim - 1)), new[n], v) for n, v in old.items()}
