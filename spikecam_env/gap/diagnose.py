@@ -236,8 +236,7 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     keep = [i for i, c in enumerate(case.conditions) if c.name not in bad]
     if not bad or not refittable([case.conditions[i] for i in keep]):
         return case
-    part = case.of([case.conditions[i] for i in keep], [case.observations[i] for i in keep])
-    return replace(part, nominal_per_label=case.nominal_per_label)
+    return case.of([case.conditions[i] for i in keep], [case.observations[i] for i in keep])
 
 
 def templates_for(comparison: Comparison) -> Templates:

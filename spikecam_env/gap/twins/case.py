@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +62,9 @@ class Case:
         return held if held.any() else np.ones(len(keys), bool)
 
     def of(self, conditions: Sequence[Condition], observations: Sequence[Observation]) -> Case:
-        """Other recordings of the same camera, refitted anew."""
-        return case_of(self.shape, conditions, observations, self.seed, self.jobs, self.frame_rate_hz)
+        """Other recordings of the same camera in the same unit of light, refitted anew."""
+        other = case_of(self.shape, conditions, observations, self.seed, self.jobs, self.frame_rate_hz)
+        return replace(other, nominal_per_label=self.nominal_per_label)
 
 
 @dataclass(frozen=True)
