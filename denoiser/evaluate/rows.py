@@ -197,17 +197,13 @@ def _count(path: Path) -> int:
     return sum(tensor.numel() for tensor in read_plain(path)["state_dict"].values())
 
 
-@lru_cache(maxsize=2)
-def _online(path: Path) -> OnlineDnSS:
-    return OnlineDnSS.from_file(path, output="rate")
+@lru_cache(maxsize=4)
+def _online(path: Path, overlap: bool) -> OnlineDnSS:
+    return OnlineDnSS.from_file(path, output="rate", overlap=overlap)
 
 
-def _network(name: str) -> Callable[[Case, Exposed, Weights], Planes]:
-    return lambda case, exposed, weights: denoised(_online(weights.path(name)).another(), exposed)
-
-
-def _overlapped(case: Case, exposed: Exposed, weights: Weights) -> Planes:
-    return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", overlap=True), exposed)
+def _network(name: str, *, overlap: bool = False) -> Callable[[Case, Exposed, Weights], Planes]:
+    return lambda case, exposed, weights: denoised(_online(weights.path(name), overlap).another(), exposed)
 
 
 def _calibrated(case: Case, exposed: Exposed, weights: Weights) -> Planes:
@@ -228,7 +224,7 @@ def _light(case: Case, exposed: Exposed, weights: Weights) -> Planes:
 
 _SOURCES: dict[str, Callable[[Case, Exposed, Weights], Planes]] = {
     **{name: _network(file) for name, file in NETWORKS.items()},
-    "best-overlap": _overlapped,
+    "best-overlap": _network("best", overlap=True),
     "best-map": _calibrated,
     **{name: _pipeline(name) for name in PIPELINES},
     "light": _light,
