@@ -19,10 +19,10 @@ Gain.  Where things move, the ratio of a pixel's spikes to its denoised rate, bo
 
     g = (sum of spikes + 2) / (sum of rates + 2)            cut to [1/2, 2]
 
-is the pixel's fixed pattern: light passes, the pattern stays.  Still scenes leave texture in it.  The rate planes are divided by g and the
-planes 4 (g - 1) and 0 are added.  The sums forget with the layout's `gain_memory`; `learn` feeds them the network's own
-rates.  Where a calibration map gives the pixel's gain and dark rate, the planes are (plane - dark) / gain, and 1 is
-added instead of 0: texture and pattern are then distinct in still scenes too.
+is the pixel's fixed pattern: light passes, the pattern stays. Still scenes leave texture in it. The rate planes are
+divided by g and the planes 4 (g - 1) and 0 are added. The sums forget with the layout's `gain_memory`; `learn` feeds
+them the network's own rates. Where a calibration map gives the pixel's gain and dark rate, the planes are (plane -
+dark) / gain, and 1 is added instead of 0: texture and pattern are then distinct in still scenes too.
 
 Edges: before the first and after the last frame the spikes are mirrored (frame -1 - i is frame i); the planes use
 real frames only.  The state is the frames of one window, the last spike before it, the running means and the sums.
