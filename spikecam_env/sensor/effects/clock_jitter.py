@@ -4,7 +4,7 @@
 
 Stage: read-out.  Seen in: spikes a frame over the whole array: variance 2 (x sigma)^2, lag-1 correlation -1/2.
 Twins: common_threshold_noise (does not grow with light), light_flicker (a line).
-Source: period jitter of a clock; nanoseconds in practice.  Light within a frame counts as steady.
+Source: period jitter of a clock; nanoseconds in practice.
 """
 
 from __future__ import annotations
@@ -30,11 +30,18 @@ class ClockJitter(Effect):
 
     stage = Stage.READOUT
     strength = "sigma_ns"
+    within_frame = True
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:
         return Edge(rng.standard_normal(), rng)
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Edge) -> tuple[Charge, Charge, Edge]:
         edges = np.concatenate([[memory.at], memory.rng.standard_normal(now.frames)])
-        length = (1.0 + np.diff(edges) * (self.sigma_ns * 1e-9 * now.frame_rate_hz))[:, None, None]
-        return light.scaled(length), dark.scaled(length), Edge(edges[-1], memory.rng)
+        late = (edges * (self.sigma_ns * 1e-9 * now.frame_rate_hz))[:, None, None]
+        begin, end = late[:-1], late[1:]
+        length = 1.0 + (end - begin)
+        rises = light.rises
+        read = light.scaled(length)
+        if rises.any():
+            read = Charge(read.values + rises * ((end + begin) * length / 2.0), 1.0, rises)
+        return read, dark.scaled(length), Edge(edges[-1], memory.rng)

@@ -12,9 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.within_frame import mean_decay
 
 
 @dataclass(frozen=True)
@@ -26,4 +25,5 @@ class DarkCurrentDrift(Effect):
     strength = "rise"
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
-        return light, dark.scaled(1.0 - self.rise * np.expm1(-1e3 * now.middle_s / self.tau_ms)), memory
+        left = mean_decay(now.start, 1e-3 * self.tau_ms * now.frame_rate_hz)
+        return light, dark.scaled(1.0 + self.rise * (1.0 - left)), memory

@@ -38,6 +38,8 @@ class LampDrift(Effect):
         return Walk(0.0, rng)
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Walk) -> tuple[Charge, Charge, Walk]:
-        steps = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz) * memory.rng.standard_normal(now.frames)
+        sigma = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz)
+        steps, bridge = sigma * memory.rng.standard_normal((now.frames, 2)).T
         path = np.cumsum(np.concatenate([[memory.at], steps]))
-        return light.scaled(np.maximum(1.0 + path[1:, None, None], 0.0)), dark, Walk(path[-1], memory.rng)
+        mean = (path[1:] + path[:-1]) / 2.0 + bridge / math.sqrt(12.0)
+        return light.scaled(np.maximum(1.0 + mean[:, None, None], 0.0)), dark, Walk(path[-1], memory.rng)

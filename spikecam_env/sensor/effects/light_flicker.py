@@ -1,6 +1,6 @@
 """Light flicker: the lamp's brightness swings with the mains or its driver.
 
-    L(t) <- L(t) (1 + m sin(2 pi (f t + p)))        at the middle of the frame
+    L(t) <- L(t) (1 + m sin(2 pi (f t + p)))        integrated over each frame, in light that is linear in it
 
 Stage: optics.  Seen in: any lit recording: a line at f in the population's rate, absent in the dark.
 Twins: supply_ripple (also in the dark, and of opposite sign), lamp_drift (no line).
@@ -12,9 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.within_frame import wave_moments
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,9 @@ class LightFlicker(Effect):
 
     stage = Stage.OPTICS
     strength = "modulation"
+    within_frame = True
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
-        wave = np.sin(2.0 * np.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))
-        return light.scaled(1.0 + self.modulation * wave), dark, memory
+        cycles = self.frequency_hz * now.middle_s + self.phase_cycles
+        wave = wave_moments(self.modulation, self.frequency_hz / now.frame_rate_hz, cycles)
+        return light.modulated(wave), dark, memory

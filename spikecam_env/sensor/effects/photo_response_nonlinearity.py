@@ -21,7 +21,11 @@ class PhotoResponseNonlinearity(Effect):
 
     stage = Stage.PHOTODIODE
     strength = "beta"
+    within_frame = True
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
-        x = light.values
-        return Charge(x * (1.0 - self.beta * x)), dark, memory
+        x, d = light.values, light.rises
+        collected = x * (1.0 - self.beta * x)
+        if not d.any():
+            return Charge(collected), dark, memory
+        return Charge(collected - self.beta / 12.0 * d**2, 1.0, d * (1.0 - 2.0 * self.beta * x)), dark, memory
