@@ -38,7 +38,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Sequence
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -64,6 +64,16 @@ class Stage(IntEnum):
     THRESHOLD = 4
     RESET = 5
     READOUT = 6
+
+
+class Within(Enum):
+    """How an effect acts within a frame; its docstring says so in these words, and how far that is exact."""
+
+    CONSTANT = "constant in time"
+    INTEGRATED = "integrated over the frame"
+    CROSSING = "at the crossing"
+    END = "at the end of the frame"
+    DRAWN = "drawn once a frame"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -196,6 +206,10 @@ class Feedback(NamedTuple):
     left_tau: float = 1.0
     droop: float = 0.0
 
+    def lost(self, rate: Array) -> Array:
+        """Light (n,) that falls while a reset holds the node, of pixels with this charge a frame [thresholds]."""
+        return self.lost_per_root_rate * np.sqrt(rate) + self.lost_per_rate * rate
+
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
@@ -205,6 +219,7 @@ class Effect:
     """
 
     stage: ClassVar[Stage]
+    within: ClassVar[Within | None] = None
     within_frame: ClassVar[bool] = False
     """Whether `collect` asks for the rise of light within a frame."""
     name: ClassVar[str] = "effect"

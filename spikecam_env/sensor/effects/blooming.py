@@ -4,6 +4,8 @@
 
 Stage: photodiode.  Seen in: pictures with lights brighter than one spike a frame: a halo in the pixels next to them.
 Twins: optical_blur (at all levels), crosstalk (at all rates).
+Within a frame: integrated over the frame, in light that is linear in it; what a pixel hands on rises as its own light
+does.
 Source: overflow model of CCD and CMOS texts (Janesick, Photon Transfer).  Light counts up to x = 2, the engines' cap.
 """
 
@@ -15,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,7 @@ class Blooming(Effect):
     full: float = parameter(1.0, unit="thresholds a frame", bounds=(0.0, 2.0), doc="charge a frame that still stays")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "share"
     within_frame = True
 

@@ -4,6 +4,7 @@
 
 Stage: read-out.  Seen in: spikes a frame over the whole array: variance 2 (x sigma)^2, lag-1 correlation -1/2.
 Twins: common_threshold_noise (does not grow with light), light_flicker (a line).
+Within a frame: integrated over the frame between its edges, in light that is linear on both sides of each.
 Source: period jitter of a clock; nanoseconds in practice.
 """
 
@@ -14,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 
 
 class Edge(NamedTuple):
@@ -29,6 +30,7 @@ class ClockJitter(Effect):
     sigma_ns: float = parameter(20.0, unit="ns", bounds=(0.0, 5000.0), doc="standard deviation of an edge")
 
     stage = Stage.READOUT
+    within = Within.INTEGRATED
     strength = "sigma_ns"
     within_frame = True
 

@@ -4,6 +4,7 @@
 
 Stage: photodiode.  Seen in: dark recordings: the rate climbs; lit ones hardly.
 Twins: lamp_drift (in the light), random_telegraph_noise (pixel by pixel).
+Within a frame: integrated over the frame.
 Source: dark current doubles every 6 to 8 K (Janesick, Photon Transfer); the exponential is first-order warming.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 from spikecam_env.sensor.within_frame import mean_decay
 
 
@@ -22,6 +23,7 @@ class DarkCurrentDrift(Effect):
     tau_ms: float = parameter(50.0, unit="ms", bounds=(1e-3, 1e8), doc="time constant of the warming")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "rise"
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:

@@ -4,6 +4,7 @@
 
 Stage: optics.  Seen in: lit recordings: the population's rate wanders, variance growing with time, dark does not.
 Twins: light_flicker (a line), dark_current_drift (in the dark).
+Within a frame: integrated over the frame, but where the walk would make light negative in a part of it.
 Source: form assumed; a random walk is the usual model of a free-running source (power as 1/f^2).
 """
 
@@ -15,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 
 
 class Walk(NamedTuple):
@@ -32,6 +33,7 @@ class LampDrift(Effect):
     )
 
     stage = Stage.OPTICS
+    within = Within.INTEGRATED
     strength = "sigma_per_root_s"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:

@@ -4,6 +4,7 @@
 
 Stage: optics.  Seen in: any lit recording: a line at f in the population's rate, absent in the dark.
 Twins: supply_ripple (also in the dark, and of opposite sign), lamp_drift (no line).
+Within a frame: integrated over the frame, in light that is linear in it.
 Source: lamps on 50 Hz mains swing at 100 Hz, by per cents (LED) to tens of them (IEEE 1789); here its first harmonic.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 from spikecam_env.sensor.within_frame import wave_moments
 
 
@@ -23,6 +24,7 @@ class LightFlicker(Effect):
     phase_cycles: float = parameter(0.0, unit="cycles", bounds=(0.0, 1.0), doc="phase p at frame 0")
 
     stage = Stage.OPTICS
+    within = Within.INTEGRATED
     strength = "modulation"
     within_frame = True
 

@@ -5,6 +5,7 @@
 
 Stage: photodiode.  Seen in: steps and moving light (tails of length tau); static light is unchanged.
 Twins: incomplete_reset (depends on the last interval, not on the last light), optical_blur.
+Within a frame: integrated over the frame, in light that is linear in it.
 Source: first-order image lag (Janesick, Photon Transfer); light before frame 0 is taken as steady.
 """
 
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, Within, parameter
 from spikecam_env.sensor.within_frame import decay_moment
 
 
@@ -26,6 +27,7 @@ class PhotodiodeLag(Effect):
     tau_us: float = parameter(1000.0, unit="us", bounds=(0.1, 1e7), doc="time constant of the late charge")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "fraction"
     within_frame = True
 
@@ -61,7 +63,7 @@ def _flat(values: Array, shape: tuple[int, int, int]) -> Array:
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def _follow(x, d, fraction, law, slow, mean, rise):  # type: ignore[no-untyped-def]
-    """mean, rise (F, P), overwritten: charge of which a part is late.  x, d: (F or 1, P).  slow: (P,) what lags, updated.
+    """mean, rise (F, P), overwritten: charge of which a part is late.  x, d: (F or 1, P).  slow (P,): what lags.
 
     What lags is s(t) = L(t) - d tau + (s - x + d/2 + d tau) exp(-t/tau).
     """

@@ -5,6 +5,7 @@
 
 Stage: photodiode.  Seen in: dark recordings: counts of these pixels have two levels, windows shorter than the dwell.
 Twins: spurious_spikes (no levels), threshold_flicker_noise (all pixels, also in the light).
+Within a frame: integrated over the frame; a switch is timed to 2^-16 of a frame.
 Source: dark-current RTN in irradiated CCD pixels (Hopkins and Hopkinson 1993); one trap a pixel,
 even dwell times assumed.
 """
@@ -17,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Few, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Few, Stage, Within, parameter
 
 AHEAD = 4096
 """Switches that are drawn at once."""
@@ -50,6 +51,7 @@ class RandomTelegraphNoise(Effect):
     dwell_ms: float = parameter(10.0, unit="ms", bounds=(1e-3, 1e7), doc="mean time in a state")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "amplitude_pA"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Traps:

@@ -4,9 +4,9 @@ The effects' hooks say once a block what arrives and how the references move (`d
 then goes from frame to frame and does what depends on the spikes, from the numbers of `Feedback`.
 
 Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's
-draw mixed in.  N counts what the reset loses and where the reference stands at the reset.  What moves the reference, or
-the charge (`kick`), by delta from there to the next spike is taken without the shot noise of delta: of a spike's
-variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
+draw mixed in.  N counts where the reference stands at the reset, and not the light that falls while the node is held.
+What moves the reference, or the charge (`kick`), by delta from there to the next spike is taken without the shot noise
+of delta: of a spike's variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ def line_rises(of_time: np.ndarray) -> np.ndarray:
     return 12.0 * np.einsum("t,ftp->fp", t, of_time.reshape(FRAMES, FINE, -1)) / FINE
 
 
-def collected(effect, cuts: tuple[int, ...] = (FRAMES,), dark: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(FRAMES, 3) what the effect makes of that light and of a steady dark charge, and the light's rise."""
+def collected(effect, cuts: tuple[int, ...] = (FRAMES,), dark: float = 0.0) -> tuple[np.ndarray, ...]:
+    """Three (FRAMES, 3): what the effect makes of that light, of a steady dark charge, and the light's rise."""
     at_ends = ends()
     x, d = (at_ends[1:] + at_ends[:-1]) / 2, np.diff(at_ends, axis=0)
     memory = effect.begin(FIRST, np.random.default_rng(1), np.random.default_rng(2))
