@@ -13,8 +13,9 @@ a frame, the grains collected before frame k are
 in 32-bit integer arithmetic, rounded down, so engines that compute it in closed form or frame by frame give the same
 bits.  F never falls, down to single grains: 1/2n is taken in 2^-18, rounded up.
 
-Rounding: of steady light at most half a grain a frame; of a ramp at most a grain more a segment, a quarter of a grain
-less on average where every frame is a segment of its own: 3e-4 of light that takes 10 000 frames to a spike.
+Rounding: at most half a grain a frame of light that is steady, or has keys inside the frame; of a ramp a grain more a
+segment.  Where every frame is a ramp of its own that is a quarter of a grain less on average: 3e-4 of light that takes
+10 000 frames to a spike.
 """
 
 from __future__ import annotations
@@ -189,6 +190,8 @@ class Segment:
     """Frames first .. first + count of a key interval of `length` frames, light linear over the interval.
 
     radiance0, radiance1: (H*W,) float32, light at the start and at the end of the whole interval.
+    rise: (H*W,) float32, of a frame with keys inside it, whose mean the two are: by how much more light there is at its
+    end than at its start, of the line with its first moment.  None elsewhere, where the two say so.
     """
 
     radiance0: NDArray[np.float32]
@@ -196,6 +199,7 @@ class Segment:
     length: int
     first: int
     count: int
+    rise: NDArray[np.float32] | None = None
 
 
 def segments(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> Iterator[Segment]:
@@ -231,17 +235,14 @@ def _segments_from(light: Keyframes, at: int, stop: int) -> Iterator[Segment]:
 
 
 def _frame_with_keys(light: Keyframes, at: int) -> Segment:
-    """The frame from `at` on, with the exact mean of its light, and its rise as far as that leaves light between none
-    and one spike a frame at both ends: beyond is capped in a pixel of twice the gain (MAX_GRAINS_PER_FRAME)."""
+    """The frame from `at` on: the exact mean of its light, and its rise as far as a line of it stays above zero."""
     first, of_mean, of_rise = key_weights(light.frame, at, at + 1)
-    mean, half, product = np.zeros((3, light.radiance[0].size))
-    for picture, m, r in zip(light.radiance[first:], of_mean, of_rise / 2.0, strict=False):
+    mean, rise, product = np.zeros((3, light.radiance[0].size))
+    for picture, m, r in zip(light.radiance[first:], of_mean, of_rise, strict=False):
         mean += np.multiply(picture.reshape(-1), m, dtype=np.float64, out=product)
-        half += np.multiply(picture.reshape(-1), r, dtype=np.float64, out=product)
-    most = np.maximum(np.minimum(mean, 1.0 - mean), 0.0)
-    half = np.clip(half, -most, most)
-    start, end = (mean - half).astype(np.float32), (mean + half).astype(np.float32)
-    return Segment(start, start if np.array_equal(start, end) else end, 1, 0, 1)
+        rise += np.multiply(picture.reshape(-1), r, dtype=np.float64, out=product)
+    held = mean.astype(np.float32)
+    return Segment(held, held, 1, 0, 1, np.clip(rise, -2.0 * mean, 2.0 * mean).astype(np.float32))
 
 
 def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]:
@@ -254,20 +255,26 @@ def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]
 
 @dataclass(frozen=True)
 class Ramp:
-    """The integers of F(k) for every pixel of a segment: i0, B, and r / 2n in 2^-18 (see the module's equation)."""
+    """The integers of F(k) for every pixel of a segment: i0, B, and r / 2n in 2^-18 (see the module's equation).
+
+    own_rise: (P,) [grains/frame] of a frame with keys inside it.
+    """
 
     level: NDArray[np.int32]
     curve: NDArray[np.int32]
     rest: NDArray[np.int32]
+    own_rise: NDArray[np.float32] | None = None
 
     @cached_property
     def steady(self) -> bool:
         """Whether the light stays, for every pixel."""
-        return not (self.curve.any() or self.rest.any())
+        return self.own_rise is None and not (self.curve.any() or self.rest.any())
 
     @property
     def rise(self) -> NDArray[np.float64]:
         """(P,) by how much more light there is at a frame's end than at its start [grains/frame]."""
+        if self.own_rise is not None:
+            return self.own_rise.astype(np.float64)
         return 2.0 * self.curve + self.rest * (1.0 / (1 << 17))
 
     def collected(self, frame: int) -> NDArray[np.int32]:
@@ -283,7 +290,12 @@ def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32])
     twice = 2 * segment.length
     curve = np.floor(d.astype(np.float32) * np.float32(1.0 / twice)).astype(np.int32)
     per = -(-(1 << 18) // twice)
-    return Ramp(i0, curve, (d - curve * np.int32(twice)) * np.int32(per))
+    return Ramp(i0, curve, (d - curve * np.int32(twice)) * np.int32(per), rise_of(segment, gain))
+
+
+def rise_of(segment: Segment, gain: NDArray[np.float32]) -> NDArray[np.float32] | None:
+    """`Ramp.own_rise` of a segment."""
+    return None if segment.rise is None else segment.rise * gain
 
 
 def _grains_per_frame(

@@ -50,8 +50,8 @@ def random_keys(rng: np.random.Generator, frames: int) -> tuple[np.ndarray, np.n
 
 
 def test_light_between_any_keys_is_integrated_to_grains_and_cut_at_will() -> None:
-    """Off by a grain from rounding both ends of a ramp, and two where float32 holds no more of light near 1."""
-    rng, worst, mean = np.random.default_rng(0), 0.0, []
+    """Frames with keys inside are off by half a grain, ramps by up to two, and as much more as float32 is of light."""
+    rng, worst, ramps = np.random.default_rng(0), 0.0, 0.0
     for _ in range(300):
         times, values = random_keys(rng, 40)
         light = uniform(times, values)
@@ -60,14 +60,17 @@ def test_light_between_any_keys_is_integrated_to_grains_and_cut_at_will() -> Non
         np.testing.assert_array_equal(charges(light, 40, cuts), found)
         truth = np.array([trapezoids(times, values, n) for n in range(40)]) * GRAINS
         np.testing.assert_allclose(frame_means(times, values.astype(float), 40) * GRAINS, truth, atol=1e-5)
-        worst = max(worst, float(np.abs(found - truth).max()))
-        mean.append(float((found - truth).mean()))
-    print(f"worst {worst:.2f} grains, mean {np.mean(mean):+.2f}")
-    assert worst < 2.0
+        with_keys = np.isin(np.arange(40), np.floor(times[times > np.floor(times)]))
+        off = np.abs(found - truth)
+        worst, ramps = (
+            max(w, float(o.max(initial=0.0))) for w, o in ((worst, off[with_keys]), (ramps, off[~with_keys]))
+        )
+    print(f"worst {worst:.2f} grains where keys are inside, {ramps:.2f} in ramps")
+    assert worst < 0.5 + GRAINS * 2.0**-25 + 1e-3 and ramps < 2.0
 
 
 def test_dim_light_has_little_bias() -> None:
-    """Rounding takes a quarter of a grain a frame with keys: 3e-4 of light of 1e-4 a frame, 839 grains."""
+    """Light of 1e-4 a frame, 839 grains; rounding takes a quarter of a grain a frame from ramps of one frame."""
     rng, biases = np.random.default_rng(0), []
     for _ in range(500):
         times, values = np.sort(rng.uniform(0, 40, 60)), (rng.uniform(0.5, 1.5, 60) * 1e-4).astype(np.float32)
@@ -117,7 +120,7 @@ def test_light_of_whole_keys_is_cut_at_keys_and_every_64_frames_from_them() -> N
     assert found == [*held[0], *ramps, *held[1]]
 
 
-def test_light_never_falls_below_nothing_within_a_frame_nor_beyond_what_is_counted() -> None:
+def test_light_that_rises_within_a_frame_is_never_negative() -> None:
     rng = np.random.default_rng(5)
     for _ in range(100):
         times = np.sort(rng.uniform(0, 10, 40))
@@ -125,8 +128,8 @@ def test_light_never_falls_below_nothing_within_a_frame_nor_beyond_what_is_count
         light = uniform(times, values)
         for frame in np.unique(np.floor(times)).astype(int):
             (s,) = segments(light, int(frame), 1)
-            low, high = sorted((float(s.radiance0[0]), float(s.radiance1[0])))
-            assert s.length == 1 and low >= 0.0 and (high <= 1.0 or low == high)
+            assert s.length == 1 and s.radiance1 is s.radiance0
+            assert abs(float(s.rise[0])) <= 2.0 * float(s.radiance0[0]) * (1 + 1e-6)
 
 
 def test_a_frame_looks_at_its_own_keys_alone() -> None:
@@ -152,6 +155,12 @@ def test_engines_agree_on_light_between_any_keys() -> None:
     block = SpikeSensor(with_effect, SHAPE, 1, "fast").step(light, 60)
     np.testing.assert_array_equal(fast, reference)
     np.testing.assert_array_equal(block, reference)
+    for name in ("photodiode_lag", "readout_skew", "light_flicker", "clock_jitter", "optical_blur", "blooming"):
+        model = SensorModel.preset("ideal").with_effect(CATALOGUE[name]())
+        by_block, by_reference = (
+            SpikeSensor(model, SHAPE, 1, engine).step(light, 60) for engine in ("fast", "reference")
+        )
+        np.testing.assert_array_equal(by_block, by_reference)
     lights, seeds = [moving(1), moving(2)], [3, 4]
     batch = SpikeSensorBatch("scsim", SHAPE, seeds, device="cpu")
     spikes = np.concatenate([batch.step(lights, n).numpy() for n in (7, 1, 52)], axis=1)

@@ -4,8 +4,8 @@
 
 Stage: reset.  Seen in: flats at x > 0.3 (every interval longer by tau, whatever the level).
 Twins: comparator_delay (grows as 1/sqrt(x)), photo_response_nonlinearity.
-Within a frame: at the crossing; the light lost is that of its frame for as long as the node is held, wrong by that
-time times the light's change from one frame to the next.
+Within a frame: at the crossing; the light lost is that of its frame for as long as the node is held: below 1 % of a
+threshold off while d tau^2 < 0.02, d the change of x from one frame to the next.
 Source: SCSim's script (0.2 % of a 50 us frame).
 """
 

@@ -24,7 +24,7 @@ from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, Few, having
 from spikecam_env.sensor.kernels import block_loop, fast, loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
-from spikecam_env.sensor.light import GRAINS, Ramp, Segment
+from spikecam_env.sensor.light import GRAINS, Ramp, Segment, rise_of
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
 
@@ -167,7 +167,7 @@ def _parts(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[_Part]:
     for s in segments:
         if last is None or light is None or s.length != last.length or not _same_light(s, last):
             ends = fast.compilable(s.radiance0), fast.compilable(s.radiance1)
-            light = Ramp(*loop.ramp(*ends, law.gain, law.dark, s.length))
+            light = Ramp(*loop.ramp(*ends, law.gain, law.dark, s.length), own_rise=rise_of(s, law.gain))
         last = s
         most = _most(light)
         for done in range(0, s.count, most):
