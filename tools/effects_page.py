@@ -149,8 +149,8 @@ class SlowShutter(Effect):
 That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))` and `[[effect]]`
 in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
 anew. `within` says how it acts within a frame, and its docstring how far that is exact: charge is integrated over the
-frame, not sampled at its middle. `now.start` is when each frame begins, `spikecam_env/sensor/within_frame.py` has closed
-forms, and with `within_frame = True` a `Charge` says how light rises within the frame.
+frame, not sampled at its middle. `now.start` is when each frame begins, `spikecam_env/sensor/within_frame.py` has
+closed forms, and with `within_frame = True` a `Charge` says how light rises within the frame.
 
 The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
 changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is

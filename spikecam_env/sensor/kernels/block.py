@@ -167,7 +167,8 @@ def _parts(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[_Part]:
     for s in segments:
         if last is None or light is None or s.length != last.length or not _same_light(s, last):
             ends = fast.compilable(s.radiance0), fast.compilable(s.radiance1)
-            light = Ramp(*loop.ramp(*ends, law.gain, law.dark, s.length), own_rise=rise_of(s, law.gain))
+            light = Ramp(*loop.ramp(*ends, law.gain, law.dark, s.length))
+            light = replace(light, own_rise=rise_of(s, law.gain))
         last = s
         most = _most(light)
         for done in range(0, s.count, most):
