@@ -20,10 +20,11 @@ from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Wi
 
 
 class Walk(NamedTuple):
-    """at: the walk's value.  rng: what drives it."""
+    """at: the walk's value.  rng: what drives it from frame to frame.  within: what drives it within frames."""
 
     at: float
     rng: np.random.Generator
+    within: np.random.Generator
 
 
 @dataclass(frozen=True)
@@ -37,11 +38,11 @@ class LampDrift(Effect):
     strength = "sigma_per_root_s"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:
-        return Walk(0.0, rng)
+        return Walk(0.0, rng, rng.spawn(1)[0])
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Walk) -> tuple[Charge, Charge, Walk]:
         sigma = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz)
-        steps, bridge = sigma * memory.rng.standard_normal((now.frames, 2)).T
+        steps, bridge = (sigma * rng.standard_normal(now.frames) for rng in (memory.rng, memory.within))
         path = np.cumsum(np.concatenate([[memory.at], steps]))
         mean = (path[1:] + path[:-1]) / 2.0 + bridge / math.sqrt(12.0)
-        return light.scaled(np.maximum(1.0 + mean[:, None, None], 0.0)), dark, Walk(path[-1], memory.rng)
+        return light.scaled(np.maximum(1.0 + mean[:, None, None], 0.0)), dark, memory._replace(at=path[-1])
