@@ -45,6 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import unknown_name
+from spikecam_env.sensor.effects.identification import Identification
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.ranges import parameter as parameter
 from spikecam_env.sensor.unit import PixelArray, Unit
@@ -192,6 +193,8 @@ class Effect:
     name: ClassVar[str] = "effect"
     strength: ClassVar[str]
     neutral: ClassVar[float] = 0.0
+    identification: ClassVar[Identification] = Identification()
+    """How a diagnosis finds it in recordings."""
 
     def __init_subclass__(cls) -> None:
         cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()

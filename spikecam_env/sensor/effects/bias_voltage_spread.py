@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -22,6 +23,7 @@ class BiasVoltageSpread(Effect):
 
     stage = Stage.THRESHOLD
     strength = "sigma_V"
+    identification = Identification(family="pattern", needs=Needs.EVEN, experiment=SECOND_V_D)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_swings_off(self.sigma_V, rng.standard_normal(pixels.gain.shape))

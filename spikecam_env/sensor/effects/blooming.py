@@ -16,6 +16,7 @@ import numpy as np
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,13 @@ class Blooming(Effect):
 
     stage = Stage.PHOTODIODE
     strength = "share"
+    identification = Identification(
+        family="coupling",
+        fitted=("share", "full"),
+        shapes={"full": (0.75, 0.85, 1.0)},
+        needs=Needs.BRIGHT,
+        shape_step=-0.1,
+    )
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         x = light.values

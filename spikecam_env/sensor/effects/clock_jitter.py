@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 class Edge(NamedTuple):
@@ -30,6 +31,7 @@ class ClockJitter(Effect):
 
     stage = Stage.READOUT
     strength = "sigma_ns"
+    identification = Identification(family="common", square=True, needs=Needs.STEADY)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:
         return Edge(rng.standard_normal(), rng)

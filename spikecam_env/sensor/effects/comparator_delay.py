@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class ComparatorDelay(Effect):
 
     stage = Stage.RESET
     strength = "delay_us"
+    identification = Identification(family="saturation", needs=Needs.LEVELS)
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
         return residual - np.sqrt(rate) * self.delay(now)

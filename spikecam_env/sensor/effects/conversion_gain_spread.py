@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -22,6 +23,7 @@ class ConversionGainSpread(Effect):
 
     stage = Stage.PHOTODIODE
     strength = "sigma"
+    identification = Identification(family="pattern", needs=Needs.EVEN)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         factor = 1.0 + self.sigma * rng.standard_normal(pixels.gain.shape)

@@ -24,6 +24,7 @@ from spikecam_env.sensor.effects.base import (
     neighbour_sum,
     parameter,
 )
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Crosstalk(Effect):
 
     stage = Stage.RESET
     strength = "kick"
+    identification = Identification(family="coupling", mixed=True, needs=Needs.STEADY)
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
         return charge + self.kick * neighbour_sum(spikes.astype(np.float64)), memory

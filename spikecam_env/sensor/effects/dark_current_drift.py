@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,9 @@ class DarkCurrentDrift(Effect):
 
     stage = Stage.PHOTODIODE
     strength = "rise"
+    identification = Identification(
+        family="dark", fitted=("rise", "tau_ms"), shapes={"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=Needs.DARK
+    )
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         return light, dark.scaled(1.0 - self.rise * np.expm1(-1e3 * now.middle_s / self.tau_ms)), memory

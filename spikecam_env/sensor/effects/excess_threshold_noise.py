@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -23,6 +24,7 @@ class ExcessThresholdNoise(Effect):
 
     stage = Stage.THRESHOLD
     strength = "sigma_mV"
+    identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_reset_noise(self.sigma_mV)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.random_fields import Words, white_field, words
 
 
@@ -23,6 +24,7 @@ class FrameThresholdNoise(Effect):
 
     stage = Stage.THRESHOLD
     strength = "sigma_mV"
+    identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Words:
         return words(rng)

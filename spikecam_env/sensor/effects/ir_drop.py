@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,11 @@ class IrDrop(Effect):
 
     stage = Stage.THRESHOLD
     strength = "droop"
+    identification = Identification(
+        family="saturation",
+        needs=Needs.LEVELS,
+        experiment="flats at several levels beside a picture with bright and dark rows",
+    )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Array:
         return np.zeros((first.shape[0], 1))

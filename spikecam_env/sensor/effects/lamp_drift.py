@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 class Walk(NamedTuple):
@@ -33,6 +34,7 @@ class LampDrift(Effect):
 
     stage = Stage.OPTICS
     strength = "sigma_per_root_s"
+    identification = Identification(family="light", square=True, needs=Needs.STEADY, random_course=True)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:
         return Walk(0.0, rng)

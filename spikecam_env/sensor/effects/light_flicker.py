@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,9 @@ class LightFlicker(Effect):
 
     stage = Stage.OPTICS
     strength = "modulation"
+    identification = Identification(
+        family="light", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=Needs.STEADY
+    )
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         wave = np.sin(2.0 * np.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))

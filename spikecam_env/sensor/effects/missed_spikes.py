@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class MissedSpikes(Effect):
 
     stage = Stage.READOUT
     strength = "probability"
+    identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "spikes"))
 
     def read_out(
         self, spikes: Spikes, now: Exposure, memory: np.random.Generator

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,7 @@ class PhotoResponseNonlinearity(Effect):
 
     stage = Stage.PHOTODIODE
     strength = "beta"
+    identification = Identification(family="saturation", needs=Needs.LEVELS)
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         x = light.values

@@ -17,6 +17,7 @@ import numpy as np
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,13 @@ class PhotodiodeLag(Effect):
 
     stage = Stage.PHOTODIODE
     strength = "fraction"
+    identification = Identification(
+        family="lag",
+        fitted=("fraction", "tau_us"),
+        shapes={"tau_us": (150.0, 600.0, 2500.0, 10000.0)},
+        needs=Needs.MOTION,
+        only_contrast=True,
+    )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None

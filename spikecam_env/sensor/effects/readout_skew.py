@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class ReadoutSkew(Effect):
     stage = Stage.READOUT
     strength = "span"
     within_frame = True
+    identification = Identification(family="readout", needs=Needs.MOTION, only_contrast=True)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None

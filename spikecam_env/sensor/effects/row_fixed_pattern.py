@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -23,6 +24,7 @@ class RowFixedPattern(Effect):
 
     stage = Stage.THRESHOLD
     strength = "sigma_mV"
+    identification = Identification(family="pattern", needs=Needs.EVEN)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_swings_off(1e-3 * self.sigma_mV, rng.standard_normal((pixels.gain.shape[0], 1)))
