@@ -37,7 +37,7 @@ with the noise of fewer electrons, in the tail of a spread, it would reach below
 
 
 def missing(effects: Sequence[Effect]) -> list[str]:
-    """Names of effects, or options of them, that this engine does not carry; what is fixed, noise of a reset too, it does."""
+    """Names of effects, or options of them, that this engine does not carry: all that do something a frame."""
     names = [e.name for e in effects if not e.is_fixed()]
     names += ["shot_noise.dark_is_noisy=false" for e in effects if getattr(e, "dark_is_noisy", True) is False]
     quanta = [getattr(e, "quanta", MIN_ELECTRONS) for e in effects]
