@@ -18,11 +18,11 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import TOLERANCE
 from spikecam_env.gap.fit.predict import predict_by_twins
+from spikecam_env.gap.fit.standard_case import standard_case
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
-from tools.standard_case import standard_case
 
 PEAK, TWINS = 15.0, 4
 

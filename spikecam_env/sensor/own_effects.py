@@ -47,7 +47,7 @@ def load_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
     wrongly (`check_declaration`), or names one as an effect of another file is named.
     """
     source = Path(os.path.abspath(path))
-    module = _module_of(source, read_text(path))
+    module = _module_of(source, read_text(Path(path)))
     found = tuple(_effects_in(module))
     if not found:
         raise InputError(

@@ -11,7 +11,7 @@ from pathlib import Path
 from spikecam_env.errors import InputError, shown
 from spikecam_env.names import file_name
 from spikecam_env.sensor.declaration import NAME
-from spikecam_env.sensor.effects import CATALOGUE, Effect, base
+from spikecam_env.sensor.effects import CATALOGUE, base
 from spikecam_env.whole import check_file, write_text_whole
 
 BEGUN = "new_effect"
@@ -25,7 +25,7 @@ def check_new_name(name: str) -> None:
         raise InputError(f"effect name {shown(name)}: give lower-case words with underscores between, as threshold_sag")
     if name in CATALOGUE:
         raise InputError(f"there is an effect {name} already; `spikecam effects show {name}` explains it")
-    named = type(class_name(name), (Effect,), {}).name
+    named = base.effect_name(class_name(name))
     if named != name:
         raise InputError(f"effect name {shown(name)}: a class {class_name(name)} is called {named}; give that name")
     if hasattr(base, class_name(name)):

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, load_effects
 
-[NewEffect] = load_effects(Path(__file__).with_name("new_effect.py"))
+NewEffect: Any = load_effects(Path(__file__).with_name("new_effect.py"))[0]
 
 SHAPE, FRAMES = (10, 12), 160
 
 
 def spikes_of(model: SensorModel, engine: str = "auto") -> np.ndarray:
     """(frames, rows, columns) in light of all levels that changes."""
-    keys = np.arange(0, FRAMES + 1, 16)
-    light = np.random.default_rng(0).uniform(0.0, 1.2, (keys.size, *SHAPE))
+    keys = np.arange(0.0, FRAMES + 1, 16)
+    light = np.random.default_rng(0).uniform(0.0, 1.2, (keys.size, *SHAPE)).astype(np.float32)
     return SpikeSensor(model, SHAPE, seed=4, engine=engine).step(Keyframes(keys, light), FRAMES)
 
 

@@ -197,7 +197,7 @@ class Effect:
     """How a diagnosis finds it in recordings."""
 
     def __init_subclass__(cls) -> None:
-        cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+        cls.name = effect_name(cls.__name__)
 
     def __post_init__(self) -> None:
         check_parameters(self, self.name)
@@ -274,6 +274,11 @@ class Effect:
 BLOCK_HOOKS = ("collect", "compare", "read_out")
 SPIKE_HOOKS = ("react", "after_reset", "spiked")
 FRAME_HOOKS = ("begin", *BLOCK_HOOKS, *SPIKE_HOOKS)
+
+
+def effect_name(class_name: str) -> str:
+    """The name of an effect by that of its class: DeadTime is dead_time."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", class_name).lower()
 
 
 def having(hook: str, effects: Sequence[Effect]) -> list[Effect]:
