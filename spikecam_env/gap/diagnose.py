@@ -45,6 +45,7 @@ from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.gap.verdict.verdict import conclude, with_stand_ins
 from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor.own_effects import files_of
 
 
 @sums_in_one_order
@@ -108,6 +109,7 @@ def diagnose(
         simulated=found.simulated,
         effort=effort,
         not_bounded=found.not_bounded,
+        effect_files=files_of((*names, *(effect.name for effect in tested.effects))),
     )
 
 
