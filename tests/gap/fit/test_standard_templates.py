@@ -149,7 +149,7 @@ def test_the_cache_is_where_the_system_has_it(monkeypatch, tmp_path: Path) -> No
 
 
 def test_a_filter_of_grey_is_simulated_weak_and_severe_on_the_standard_case(own: str, monkeypatch, capsys) -> None:
-    """In a small array: it changes nothing but rates, which a refit takes up; at strength they are those of less light."""
+    """In a small array."""
     monkeypatch.setattr(standard_case, "SHAPE", (16, 16))
     monkeypatch.setattr(standard_case, "FRAMES", 400)
     [(name, made)] = simulated_of([own], progress=True)
