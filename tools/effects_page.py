@@ -112,7 +112,8 @@ E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of spike times t. At the strength said to chan
 
 _TAIL = '''## Adding an effect
 
-Of your own, outside of this package: [own_effect.md](own_effect.md). In it: one new file. `spikecam_env/sensor/effects/slow_shutter.py`:
+Of your own, outside of this package: [own_effect.md](own_effect.md). In it: one new file.
+`spikecam_env/sensor/effects/slow_shutter.py`:
 
 ```python
 """Slow shutter: the light comes on over the first frames.
@@ -150,7 +151,8 @@ That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_sh
 in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
 anew. The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
 changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
-cut, saved and restored; docs, bounds, twins that exist, a declaration in order; and a test of your own, `test_slow_shutter_...`, of its law.
+cut, saved and restored; docs, bounds, twins that exist, a declaration in order; and a test of your own,
+`test_slow_shutter_...`, of its law.
 
 Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
 carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames,
