@@ -22,13 +22,13 @@ from spikecam_env.gap.acquisition.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.predict import with_drawn_pattern
+from spikecam_env.gap.fit.standard_case import FRAMES, SHAPE, standard_case
 from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.unit.usual import USUAL_NOISE
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from tests.hidden_world.catalogue import CATALOGUE as HIDDEN
-from tools.standard_case import FRAMES, SHAPE, standard_case
 
 CLEAR = 6.0
 TABLE = Path(__file__).parents[1] / "tests/hidden_world/limits.toml"

@@ -15,14 +15,14 @@ import sys
 import numpy as np
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
-from spikecam_env.gap.candidates.table import CANDIDATES, candidate
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import TOLERANCE
 from spikecam_env.gap.fit.predict import predict_by_twins
+from spikecam_env.gap.fit.standard_case import standard_case
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
-from tools.standard_case import standard_case
 
 PEAK, TWINS = 15.0, 4
 
@@ -36,7 +36,7 @@ def report(preset: str) -> None:
     has = {e.name for e in model.effects}
     names = [
         n
-        for n in CANDIDATES
+        for n in CATALOGUE
         if candidate(n).power == 1.0 and not (candidate(n).random_course or candidate(n).is_pattern)
     ]
     for name in sorted((n for n in names if n not in has), key=lambda n: not candidate(n).is_linear):

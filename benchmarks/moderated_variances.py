@@ -19,9 +19,9 @@ from tqdm import tqdm
 from spikecam_env.gap.baseline.alarm import ALARM_LEVEL
 from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
 from spikecam_env.gap.compare.prediction import Null, null_of
+from spikecam_env.gap.fit.standard_case import standard_case
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import constrained_refit
-from tools.standard_case import standard_case
 
 Array = NDArray[np.float64]
 

@@ -14,11 +14,11 @@ import numpy as np
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import values_of
+from spikecam_env.gap.fit.standard_case import standard_case
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
-from tools.standard_case import standard_case
 
 PEAK, PAIRS = 20.0, 4
 EFFECTS = ("dead_time", "comparator_delay", "photodiode_lag", "crosstalk", "missed_spikes", "synchronous_reset")

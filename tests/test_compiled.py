@@ -66,7 +66,7 @@ def run(folder: Path, *arguments: str) -> str:
 
 
 def test_a_read_only_package_without_a_home_runs_and_keeps_what_it_compiles(read_only: Path) -> None:
-    assert "tau_us" in run(read_only, "-m", "spikecam_env", "effects", "dead_time")
+    assert "tau_us" in run(read_only, "-m", "spikecam_env", "effects", "show", "dead_time")
     assert run(read_only, "-c", USES_A_KERNEL) == "0 from the cache\n"
     assert run(read_only, "-c", USES_A_KERNEL) == "1 from the cache\n"
     kept = read_only / "tmp" / f"spikecam-env-{os.getuid()}"

@@ -112,7 +112,8 @@ E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of spike times t. At the strength said to chan
 
 _TAIL = '''## Adding an effect
 
-One new file. `spikecam_env/sensor/effects/slow_shutter.py`:
+Of your own, outside of this package: [own_effect.md](own_effect.md). In it: one new file.
+`spikecam_env/sensor/effects/slow_shutter.py`:
 
 ```python
 """Slow shutter: the light comes on over the first frames.
@@ -130,6 +131,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.within_frame import mean_decay
 
 
@@ -140,6 +142,7 @@ class SlowShutter(Effect):
     stage = Stage.OPTICS
     within = Within.INTEGRATED
     strength = "tau_us"
+    identification = Identification(family="light", needs=Needs.STEADY, experiment="recordings begun after the shutter")
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         tau = 1e-6 * self.tau_us * now.frame_rate_hz
@@ -154,7 +157,8 @@ closed forms, and with `within_frame = True` a `Charge` says how light rises wit
 
 The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
 changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
-cut, saved and restored; docs, bounds, twins that exist; and a test of your own, `test_slow_shutter_...`, of its law.
+cut, saved and restored; docs, bounds, twins that exist, a declaration in order; and a test of your own,
+`test_slow_shutter_...`, of its law.
 
 Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
 carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames,

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from spikecam_env.cli.effect_files import EffectFiles
+
 if TYPE_CHECKING:
     from spikecam_env.sensor import SensorModel
 
@@ -22,6 +24,8 @@ class Camera:
     effects` lists them."""
     without: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
     """Take an effect of the model away; may be repeated."""
+    effect_file: EffectFiles = ()
+    """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
 
     frame_rate: float | None = None
     """Frames a second; default: the model's, 40 000 in the presets.  Light is a frame's, dark current a second's."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
+from spikecam_env.cli.effect_files import EffectFiles
 from spikecam_env.cli.options import Effort, Seed, Workers
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ class Diagnose:
     """Effects to try; default: all of the catalogue."""
     exclude: tuple[str, ...] = ()
     """Effects not to try."""
+    effect_file: EffectFiles = ()
+    """Effects of your own to try too, a Python file each; it is run, so give what you would run.  May be repeated."""
     seed: Seed = 0
     """Of every simulation; the same seed gives the same result."""
     jobs: Workers = 1

@@ -1,25 +1,47 @@
-"""`spikecam effects`: the catalogue of effects, from their own declarations."""
+"""`spikecam effects`: the catalogue of effects, from their own declarations, and the beginning of a new one."""
 
 from __future__ import annotations
 
-from dataclasses import Field, dataclass, fields
-from typing import TYPE_CHECKING, Any
+from dataclasses import Field, dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
+
+from spikecam_env.cli.effect_files import EffectFiles
 
 if TYPE_CHECKING:
     from spikecam_env.sensor import Effect
 
 
 @dataclass
-class Effects:
-    """List the sensor's effects in physical order, or say all about one.
+class List:
+    """A line an effect, in physical order, written as --effect takes it.
 
-    example:  spikecam effects dead_time
+    example:  spikecam effects list --effect-file threshold_sag.py
     """
 
-    name: tyro.conf.Positional[str] = ""
-    """Effect to explain; without it all are listed."""
+    effect_file: EffectFiles = ()
+    """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
+
+    def run(self) -> None:
+        from spikecam_env.cli.table import table
+        from spikecam_env.sensor import CATALOGUE
+
+        print(table([_line(effect) for effect in CATALOGUE.values()]))
+
+
+@dataclass
+class Show:
+    """All about one effect: its law, parameters, where it is seen, what looks like it, its source.
+
+    example:  spikecam effects show dead_time
+    """
+
+    name: tyro.conf.Positional[str]
+    """Effect to explain."""
+    effect_file: EffectFiles = ()
+    """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
 
     def run(self) -> None:
         from spikecam_env.cli.table import table
@@ -27,9 +49,6 @@ class Effects:
         from spikecam_env.sensor import CATALOGUE
         from spikecam_env.sensor.effect_sheet import Sheet
 
-        if not self.name:
-            print(table([_line(effect) for effect in CATALOGUE.values()]))
-            return
         if self.name not in CATALOGUE:
             raise unknown_name("effect", self.name, CATALOGUE)
         effect = CATALOGUE[self.name]
@@ -38,6 +57,48 @@ class Effects:
         print(table([_parameter(f, effect) for f in fields(effect)]))
         for title, text in sheet.sections.items():
             print(f"\n{title}: {text}")
+
+
+@dataclass
+class New:
+    """Write an effect of your own to begin with, NAME.py, and its test, test_NAME.py; both run as they stand.
+
+    example:  spikecam effects new threshold_sag
+    """
+
+    name: tyro.conf.Positional[str]
+    """Of the effect: lower-case words with underscores between them, not one of the catalogue."""
+    out: Path = Path()
+    """Folder to write them into; it is made if there is none."""
+    force: bool = False
+    """Replace files of these names."""
+
+    def run(self) -> None:
+        from spikecam_env.cli.files import out_folder
+        from spikecam_env.sensor.beginning import check_new_name, write_new_effect
+
+        check_new_name(self.name)
+        with out_folder(self.out) as folder:
+            effect, test = write_new_effect(self.name, folder, force=self.force)
+        print(f"wrote {effect} and {test}")
+        print(f"test it: python -m pytest {test}   use it: spikecam record --effect-file {effect} --effect {self.name}")
+
+
+@dataclass
+class Effects:
+    """The sensor's effects: list them, explain one, or begin one of your own.
+
+    example:  spikecam effects show dead_time
+    """
+
+    action: (
+        Annotated[List, tyro.conf.subcommand("list", prefix_name=False)]
+        | Annotated[Show, tyro.conf.subcommand("show", prefix_name=False)]
+        | Annotated[New, tyro.conf.subcommand("new", prefix_name=False)]
+    ) = field(default_factory=List)
+
+    def run(self) -> None:
+        self.action.run()
 
 
 def _line(effect: type[Effect]) -> dict[str, str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import tyro
 
+from spikecam_env.cli.effect_files import EffectFiles
 from spikecam_env.cli.options import Seed, Workers
 
 
@@ -23,6 +24,8 @@ class Ladder:
     """Folder for the results."""
     model: str = "ideal"
     """The first rung: a preset's name, or a model file (.toml)."""
+    effect_file: EffectFiles = ()
+    """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
     seed: Seed = 0
     """Of every simulation; the same seed gives the same result."""
     jobs: Workers = 1

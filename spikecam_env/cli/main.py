@@ -14,6 +14,7 @@ from spikecam_env.cli.dataset import Dataset
 from spikecam_env.cli.demo import Demo
 from spikecam_env.cli.denoise import Denoise
 from spikecam_env.cli.diagnose import Diagnose
+from spikecam_env.cli.effect_files import effects_of
 from spikecam_env.cli.effects import Effects
 from spikecam_env.cli.entry import say
 from spikecam_env.cli.evaluate import Evaluate
@@ -76,7 +77,8 @@ def run(args: list[str] | None = None) -> int:
         with warnings_as_lines():
             command = tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=args, config=config)
             check_options(command)
-            command.run()
+            with effects_of(command):
+                command.run()
     except InputError as error:
         say(str(error))
     except MemoryError as error:

@@ -28,12 +28,13 @@ from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.simulated_templates import own_templates
+from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
 from spikecam_env.gap.report.evidence import evidence_for
 from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
-from spikecam_env.gap.screen.templates import Templates, shipped_templates
+from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
@@ -44,6 +45,7 @@ from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.gap.verdict.verdict import conclude, with_stand_ins
 from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor.own_effects import files_of
 
 
 @sums_in_one_order
@@ -107,6 +109,7 @@ def diagnose(
         simulated=found.simulated,
         effort=effort,
         not_bounded=found.not_bounded,
+        effect_files=files_of((*names, *(effect.name for effect in tested.effects))),
     )
 
 
@@ -144,8 +147,9 @@ def of_spikes(
     case, null, values = comparison.case, comparison.null, comparison.values
     rounds: list[Round] = []
     if comparison.disagrees:
+        with stages.timed("templates"):
+            templates = templates or templates_for(comparison, stages.progress)
         with stages.timed("candidates"):
-            templates = templates or templates_for(comparison)
             rounds = forward_selection(Problem.of(case, comparison.model, null, values), comparison.names, templates)
             rounds = with_stand_ins(case, null, values, rounds)
     with stages.timed("verdict"):
@@ -156,9 +160,8 @@ def of_spikes(
     not_bounded: list[tuple[str, str]] = []
     if conclusion.verdict in ("none", "parameter"):
         with stages.timed("bounds"):
-            bounded, not_bounded = bounds(
-                case, comparison.model, null, values, comparison.names, templates or shipped_templates()
-            )
+            standard = templates or templates_of(comparison.names, jobs=case.jobs, progress=stages.progress)
+            bounded, not_bounded = bounds(case, comparison.model, null, values, comparison.names, standard)
     notes += unfinished(case.budget)
     return Findings(conclusion, evidence, tuple(bounded), tuple(not_bounded), tuple(notes), case.budget.simulated)
 
@@ -239,14 +242,12 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
     return case.of([case.conditions[i] for i in keep], [case.observations[i] for i in keep])
 
 
-def templates_for(comparison: Comparison) -> Templates:
-    """The shipped templates, or of scenes that nobody measured their own."""
+def templates_for(comparison: Comparison, progress: bool) -> Templates:
+    """Those of the standard design, or of scenes that nobody measured their own."""
     case = comparison.case
-    return (
-        own_templates(case, comparison.model, comparison.null, comparison.names)
-        if case.scenes_only
-        else shipped_templates()
-    )
+    if case.scenes_only:
+        return own_templates(case, comparison.model, comparison.null, comparison.names)
+    return templates_of(comparison.names, jobs=case.jobs, progress=progress)
 
 
 @dataclass

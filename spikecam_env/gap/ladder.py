@@ -28,11 +28,11 @@ from spikecam_env.gap.compare.distance import adjusted
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.diagnose import read_case
 from spikecam_env.gap.fit.problem import Problem, values_to_fit
+from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.report import plots
 from spikecam_env.gap.report.quantities import quantity
 from spikecam_env.gap.report.words import human, parameter_unit
 from spikecam_env.gap.result import SIGNIFICANT
-from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.workers import sums_in_one_order
@@ -181,7 +181,7 @@ def searched(judge: Judge, model: SensorModel, names: Sequence[str]) -> list[Run
         return []
     rungs = []
     for was, now in itertools.pairwise(
-        forward_selection(Problem.of(case, model, null, values), names, shipped_templates())
+        forward_selection(Problem.of(case, model, null, values), names, templates_of(names, jobs=case.jobs))
     ):
         if now.model is not was.model:
             fit = was.fits[0]

@@ -194,7 +194,8 @@ class Diagnosis:
     not_bounded: (name, what is needed) of effects that were not found and that no bound can be stated of.
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
     candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
-    simulated.  simulated: recordings that were, but for the page's own.
+    simulated.  simulated: recordings that were, but for the page's own.  effect_files: of a user's own effects, among
+    the model's and those that were tried.
     """
 
     verdict: str
@@ -220,6 +221,7 @@ class Diagnosis:
     simulated: int = 0
     effort: float = CAMPAIGNS
     not_bounded: tuple[tuple[str, str], ...] = ()
+    effect_files: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
@@ -249,6 +251,7 @@ class Diagnosis:
             "not_bounded": [{"name": n, "needs": w} for n, w in self.not_bounded],
             "ranking": [asdict(r) for r in self.ranking],
             "model": self.model_name,
+            "effect_files": list(self.effect_files),
             "campaign": self.campaign,
             "seed": self.seed,
             "simulated": self.simulated,

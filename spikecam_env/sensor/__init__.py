@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
 from spikecam_env.sensor.light import Keyframes
 from spikecam_env.sensor.model import SensorModel
+from spikecam_env.sensor.own_effects import effects_from, load_effects, load_installed_effects
 from spikecam_env.sensor.sensor import SensorState, SpikeSensor
 from spikecam_env.sensor.unit import Circuit, Unit
 
@@ -23,6 +24,9 @@ __all__ = [
     "SpikeSensorBatch",
     "Stage",
     "Unit",
+    "effects_from",
+    "load_effects",
+    "load_installed_effects",
 ]
 
 

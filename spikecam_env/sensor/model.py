@@ -17,6 +17,7 @@ from pydantic import ConfigDict, Field
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 from spikecam_env.sensor.effects.base import build
+from spikecam_env.sensor.own_effects import files_of
 from spikecam_env.sensor.ranges import check_parameters, parameter
 from spikecam_env.sensor.unit import Circuit, PixelArray, Unit, firing_law
 from spikecam_env.untrusted import Declared, Name, Positive, checked_format, declared, parse_toml, read_toml
@@ -84,7 +85,10 @@ class SensorModel:
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> SensorModel:
-        """Read a model file; raises InputError for a missing file, broken TOML, unknown effect or parameter."""
+        """Read a model file; raises InputError for a missing file, broken TOML, unknown effect or parameter.
+
+        Effects of a user's own must be loaded before (`load_effects`).
+        """
         try:
             data = read_toml(os.fspath(path))
         except InputError as error:
@@ -104,6 +108,12 @@ class SensorModel:
         for key in file.circuit:
             if key not in _CIRCUIT:
                 raise unknown_name(f"circuit entry of {where}", key, _CIRCUIT)
+        for entry in file.effect:
+            if entry.name not in CATALOGUE:
+                unknown = unknown_name("effect", entry.name, CATALOGUE)
+                raise InputError(
+                    f"{where}: {unknown}; if it is of your own, give its file (--effect-file, load_effects)"
+                )
         try:
             effects = tuple(build(CATALOGUE, entry.name, entry.model_extra or {}) for entry in file.effect)
             return cls(file.name, Circuit(**file.circuit), file.frame_rate_hz, effects)
@@ -115,7 +125,7 @@ class SensorModel:
         write_text_whole(Path(path), self.toml())
 
     def toml(self) -> str:
-        """The model as the text of its file."""
+        """The model as the text of its file; effects of a user's own are said to need theirs."""
         effects = [{"name": e.name, **e.parameters()} for e in self.effects]
         data = {
             "format": FORMAT,
@@ -124,7 +134,8 @@ class SensorModel:
             "circuit": asdict(self.circuit),
             "effect": effects,
         }
-        return tomli_w.dumps(data)
+        own = "".join(f"# needs --effect-file {Path(file).name}\n" for file in files_of(e.name for e in self.effects))
+        return own + tomli_w.dumps(data)
 
     def with_effect(self, effect: Effect) -> SensorModel:
         """This model with an effect added, or replaced where it has one of that name."""

@@ -76,7 +76,7 @@ def test_every_effect_is_an_option_with_all_its_parameters(name: str, capsys) ->
 
 
 def test_effects_explains_one(capsys) -> None:
-    assert spikecam("effects", "dead_time") == 0
+    assert spikecam("effects", "show", "dead_time") == 0
     printed = capsys.readouterr().out
     assert "T = 1/x + tau" in printed and "0 .. 25" in printed and "Seen in: flats at x > 0.3" in printed
 

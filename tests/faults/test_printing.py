@@ -22,7 +22,7 @@ SPIKECAM = f"{sys.executable} -m spikecam_env"
         ("set -o pipefail; {} effects | head -1 > /dev/null", {0, 141}, ""),
         ("set -o pipefail; {} --help | true", {0, 141}, ""),
         ("{} effects nope 2>&-", {2}, ""),
-        ("{} effects dead_time > /dev/null 2>&-", {0}, ""),
+        ("{} effects show dead_time > /dev/null 2>&-", {0}, ""),
     ],
 )
 def test_output_that_nobody_takes_ends_without_a_traceback(line: str, codes: set[int], error: str) -> None:

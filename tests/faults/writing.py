@@ -160,6 +160,7 @@ WRITINGS: dict[str, Writing] = {
     "blind-trial": Writing(
         "blind-trial --out {out} --limit 1 --only none --diagnose tests.faults.writing:nothing_found", "trial", {}
     ),
+    "effects new": Writing("effects new my_effect --out {out}", "mine", {}),
     "bench": Writing("bench sensor --out {out}", "speed.json", BENCH),
 }
 

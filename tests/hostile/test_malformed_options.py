@@ -21,6 +21,7 @@ WORKERS = (0, -1, 10**6, 2**64)
 SIZES = ((0, 8), (8, -3), (10**9, 10**9), (2**63, 1), (1, 10**9))
 FLOATS = ("nan", "inf", "-inf", "-1", "0", "1e400")
 SIZE_8 = ("--size", 8, 8)
+EFFECT_FILES = ("", "{here}", "{here}/none.py", "{here}/a.dat", "{here}/a.dat/x.py", "\x00.py", "/dev/null")
 
 COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
     "record": (
@@ -51,6 +52,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
                 "afterpulsing:delay_frames=-1",
             ),
             "--without": ("", "shot", "\x00"),
+            "--effect-file": EFFECT_FILES,
             "--model": ("", "scs", "..", "/", "\x00.toml", "x" * 300 + ".toml", "/dev/null.toml"),
             "--scene": ("", "disks", "\x00"),
             "--truth-every": (-1, 10**16, 10**30),
@@ -152,10 +154,14 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--effort": ("nan", "-1", "0", "-inf"),
             "--candidates": ("", "lag"),
             "--exclude": ("", "lag"),
+            "--effect-file": EFFECT_FILES,
             "--model": ("scs", "", "{here}/none.toml"),
         },
     ),
-    "ladder": (("ladder", "{here}", "--out", "{out}"), {"--seed": SEEDS, "--jobs": WORKERS, "--model": ("scs",)}),
+    "ladder": (
+        ("ladder", "{here}", "--out", "{out}"),
+        {"--seed": SEEDS, "--jobs": WORKERS, "--model": ("scs",), "--effect-file": EFFECT_FILES},
+    ),
     "dataset spift-n": (
         ("dataset", "spift-n", "--out", "{out}", *SIZE_8, "--frames", 2, "--train", 1, "--test", 0),
         {
@@ -268,7 +274,14 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         ("blind-trial", "--out", "{out}"),
         {"--jobs": WORKERS, "--threads": WORKERS, "--limit": COUNTS, "--world": ("{here}",), "--only": ("easy",)},
     ),
-    "effects": (("effects",), {"": ("dead_tim", "..", "\x00", "x" * 1000)}),
+    "effects show": (("effects", "show"), {"": ("dead_tim", "..", "\x00", "x" * 1000)}),
+    "effects list": (("effects", "list"), {"--effect-file": EFFECT_FILES}),
+    "effects new": (
+        ("effects", "new", "--out", "{out}"),
+        {"": ("", "..", "../mine", "/etc/mine", "\x00", "x" * 1000, "dead_time", "DeadTime", "mine.py", "my-effect",
+              "a_b", "effect", "stage", "2nd", "_mine", "mütze", "con")},
+    ),
+    "effects new mine": (("effects", "new", "mine", "--out", "{out}"), {"--out": ("{here}/a.dat", "\x00")}),
     "bench": (("bench", "sensor", "--out", "{here}/none/x.json"), {}),
 }  # fmt: skip
 

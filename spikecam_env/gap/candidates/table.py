@@ -1,54 +1,35 @@
-"""The candidates: every effect of the catalogue, with what is fitted of it and which recordings can show it."""
+"""The candidates: every effect of the catalogue, read from its own `identification`; and what recordings show which."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 
 from spikecam_env.errors import unknown_name
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
-
-Needs = Callable[[Sequence[Condition]], "str | None"]
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 BENDING = ("saturation", "reset")
 """Families of what bends the rate curve."""
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """What a diagnosis knows of an effect besides its law.
+@dataclass(frozen=True, kw_only=True)
+class Candidate(Identification):
+    """An effect as a diagnosis knows it: what it declares (`Identification`), and what follows from that.
 
-    family: effects of one family act on the same thing.  fitted: parameters, the strength first.
-    shapes: values of other parameters to start from.  square: statistics go with the square of the strength.
-    mixed: some statistics go with the strength, others with its square.
-    only_contrast: it changes nothing in light that is steady and uniform.
-    random_course: its course in time is drawn anew every time, so that it changes no mean, but how statistics scatter.
-    events: it is single events, few enough for one twin to have many more or less of them than another.
-    few_pixels: it is in a few pixels, others in every twin: one takes where they lie for a sign of it.
-    share: the parameter that is a share of what can be counted, and of what: pixels, spikes, or frames of pixels.
-    shape_step: step of a shape's logarithm to take a derivative by: a time constant needs a long one, to show above
-    what twins scatter; a level of light from which something begins leads elsewhere by it.
-    needs: says what recordings are lacking to see it, or None.
-    experiment: what would distinguish it from others that do the same.
+    fitted: parameters, the strength first; never empty.
     """
 
     name: str
-    family: str
-    fitted: tuple[str, ...]
-    shapes: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    square: bool = False
-    mixed: bool = False
-    needs: Needs = lambda shown: None
-    only_contrast: bool = False
-    random_course: bool = False
-    events: bool = False
-    few_pixels: bool = False
-    share: tuple[str, str] | None = None
-    shape_step: float = -0.5
-    experiment: str = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
+
+    @classmethod
+    def of(cls, effect: type[Effect]) -> Candidate:
+        """The candidate that an effect declares."""
+        declared = {f.name: getattr(effect.identification, f.name) for f in fields(Identification)}
+        return cls(name=effect.name, **{**declared, "fitted": effect.identification.fitted or (effect.strength,)})
 
     @property
     def strength(self) -> str:
@@ -75,7 +56,7 @@ class Candidate:
     @property
     def of_motion(self) -> bool:
         """Whether it shows by contrast or change alone, so that how depends on the very picture."""
-        return self.needs in (_moving, _edges, _bright)
+        return self.needs in (Needs.MOTION, Needs.EDGES, Needs.BRIGHT)
 
     @property
     def may_be_negative(self) -> bool:
@@ -130,95 +111,25 @@ def _even(shown: Sequence[Condition]) -> str | None:
     )
 
 
-_FIELD = "flats at several levels beside a picture with bright and dark rows"
-_SECOND_V_D = "flats at a second V_d"
-
-_ALL = (
-    Candidate("dead_time", "saturation", ("tau_us",), needs=_levels),
-    Candidate("comparator_delay", "saturation", ("delay_us",), needs=_levels),
-    Candidate("photo_response_nonlinearity", "saturation", ("beta",), needs=_levels),
-    Candidate("ir_drop", "saturation", ("droop",), needs=_levels, experiment=_FIELD),
-    Candidate("synchronous_reset", "reset", ("fraction",), needs=_steady),
-    Candidate("incomplete_reset", "reset", ("fraction", "tau_us"), {"tau_us": (50.0, 250.0, 1250.0)}, needs=_levels),
-    Candidate(
-        "photodiode_lag",
-        "lag",
-        ("fraction", "tau_us"),
-        {"tau_us": (150.0, 600.0, 2500.0, 10000.0)},
-        needs=_moving,
-        only_contrast=True,
-    ),
-    Candidate(
-        "light_flicker", "light", ("modulation",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
-    ),
-    Candidate("lamp_drift", "light", ("sigma_per_root_s",), square=True, needs=_steady, random_course=True),
-    Candidate(
-        "supply_ripple", "common", ("ripple",), {"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=_steady
-    ),
-    Candidate("common_threshold_noise", "common", ("sigma_mV",), square=True, needs=_steady),
-    Candidate("clock_jitter", "common", ("sigma_ns",), square=True, needs=_steady),
-    Candidate("row_temporal_noise", "common", ("sigma_mV",), square=True, needs=_steady),
-    Candidate("threshold_flicker_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
-    Candidate("frame_threshold_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
-    Candidate("excess_threshold_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
-    Candidate("reset_noise", "noise", ("sigma_mV",), square=True, needs=_steady, experiment=_SECOND_V_D),
-    Candidate("shot_noise", "noise", ("quanta",), needs=_steady, experiment=_SECOND_V_D),
-    Candidate(
-        "random_telegraph_noise",
-        "dark",
-        ("amplitude_pA", "fraction", "dwell_ms"),
-        {"dwell_ms": (0.5, 3.0, 20.0)},
-        square=True,
-        few_pixels=True,
-        share=("fraction", "pixels"),
-        needs=_steady,
-    ),
-    Candidate(
-        "dark_current_drift", "dark", ("rise", "tau_ms"), {"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=_dark
-    ),
-    Candidate("dark_current", "dark", ("mean_pA",), needs=_dark),
-    Candidate("dark_current_spread", "dark", ("sigma_pA",), needs=_dark),
-    Candidate("dark_current_tail", "dark", ("sigma",), needs=_dark),
-    Candidate(
-        "hot_pixels", "dark", ("fraction", "mean_pA"), {"mean_pA": (3.0,)}, share=("fraction", "pixels"), needs=_dark
-    ),
-    Candidate("dead_pixels", "defects", ("fraction",), share=("fraction", "pixels"), needs=_even),
-    Candidate("conversion_gain_spread", "pattern", ("sigma",), needs=_even),
-    Candidate("capacitor_spread", "pattern", ("sigma_fF",), needs=_even, experiment=_SECOND_V_D),
-    Candidate("bias_voltage_spread", "pattern", ("sigma_V",), needs=_even, experiment=_SECOND_V_D),
-    Candidate("row_fixed_pattern", "pattern", ("sigma_mV",), needs=_even),
-    Candidate("column_fixed_pattern", "pattern", ("sigma_mV",), needs=_even),
-    Candidate("vignetting", "optics", ("falloff",), needs=_even),
-    Candidate("optical_blur", "optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
-    Candidate("crosstalk", "coupling", ("kick",), mixed=True, needs=_steady),
-    Candidate("blooming", "coupling", ("share", "full"), {"full": (0.75, 0.85, 1.0)}, needs=_bright, shape_step=-0.1),
-    Candidate("readout_skew", "readout", ("span",), needs=_moving, only_contrast=True),
-    Candidate(
-        "missed_spikes", "readout", ("probability",), share=("probability", "spikes"), needs=_steady, events=True
-    ),
-    Candidate(
-        "spurious_spikes", "readout", ("probability",), share=("probability", "frames"), needs=_steady, events=True
-    ),
-    Candidate(
-        "afterpulsing",
-        "readout",
-        ("probability",),
-        {"delay_frames": (1, 2, 3, 4, 6)},
-        share=("probability", "spikes"),
-        needs=_steady,
-        events=True,
-    ),
-)
-
-CANDIDATES: dict[str, Candidate] = {c.name: c for c in _ALL}
+LACKING: dict[Needs, Callable[[Sequence[Condition]], str | None]] = {
+    Needs.NOTHING: lambda shown: None,
+    Needs.MOTION: _moving,
+    Needs.EDGES: _edges,
+    Needs.BRIGHT: _bright,
+    Needs.LEVELS: _levels,
+    Needs.DARK: _dark,
+    Needs.STEADY: _steady,
+    Needs.EVEN: _even,
+}
+"""What recordings are lacking of those that an effect needs, in words; None where they are there."""
 
 NOISE_OF_A_RESET = ("reset_noise", "excess_threshold_noise", "shot_noise")
 """White noise of a spike: one number, s^2, whatever it is called; a second V_d splits it."""
 
 
 def candidate(name: str) -> Candidate:
-    """What is known of an effect; one of a user's own is fitted by its strength alone."""
-    return CANDIDATES.get(name) or Candidate(name, "other", (CATALOGUE[name].strength,))
+    """What is known of an effect of the catalogue."""
+    return Candidate.of(CATALOGUE[name])
 
 
 @dataclass(frozen=True)
@@ -274,5 +185,5 @@ def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str
 
 def testable(names: Sequence[str], shown: Sequence[Condition]) -> tuple[list[str], list[tuple[str, str]]]:
     """Candidates that these recordings can reveal, and the others with what each would need."""
-    lacks = [(n, candidate(n).needs(shown)) for n in names]
+    lacks = [(n, LACKING[candidate(n).needs](shown)) for n in names]
     return [n for n, why in lacks if why is None], [(n, why) for n, why in lacks if why is not None]

@@ -1,6 +1,6 @@
-"""Templates by simulation: of one candidate on a campaign, and of all on the campaign at hand.
+"""Templates by simulation: of one candidate on a campaign, weak and severe, and of all on the campaign at hand.
 
-The shipped templates are of the standard design.  An unknown scene has statistics that no flat has
+Those of the standard design are shipped (`standard_templates`).  An unknown scene has statistics that no flat has
 (`statistics/clock`), and is short and quick to simulate: its templates are made anew (`own_templates`).
 """
 
@@ -18,15 +18,19 @@ from numpy.typing import NDArray
 from spikecam_env.gap.baseline.null_model import unit_under
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET, candidate
-from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.fit.gauss_newton import at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
 from spikecam_env.gap.screen.templates import Template, Templates
-from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.case import Case, twins
+from spikecam_env.gap.twins.simulate import simulate
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
+
+REFITTED = 3
+"""Twins that say what a model without the effect gives, refitted to a severe one."""
 
 PEAK = 40.0
 """Noises of the statistic that shows an effect best, of recordings to fit, at which its template is taken."""
@@ -77,6 +81,24 @@ def simulated_template(
         now = then
         shift = simulated_shift(case, model, null, name, now)
     return Template(name, now, shift)
+
+
+def severe_template(
+    case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float], times: float
+) -> Template:
+    """A candidate's template where the unit's own refit is biased: its campaign as if it were a measurement."""
+    there = with_effect(model, name, parameters)
+    if candidate(name).is_pattern:
+        return Template(name, dict(parameters), simulated_shift(case, model, null, name, parameters), times)
+    seed = case.seed * 1000 + 7
+    made = simulate(there, constrained_refit(there, case.base), case.conditions, case.shape, seed)
+    seen = case.of(case.conditions, made)
+    without = twins(seen, model, constrained_refit(model, seen.base), range(REFITTED))
+    mean = np.mean([values_of(t.bank, null.keys) for t in without], axis=0)
+    shift = np.nan_to_num((values_of(seen.bank, null.keys) - mean) / null.noise)
+    of_pattern = np.array([k.group == "pattern" for k in null.keys])
+    white = float(min(case.base.white / seen.base.white, 1.0))
+    return Template(name, dict(parameters), np.where(of_pattern, 0.0, shift), times, white)
 
 
 def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Array:

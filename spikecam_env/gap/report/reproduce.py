@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import shlex
 from collections.abc import Iterator
 from importlib import metadata
 
@@ -15,7 +16,8 @@ from spikecam_env.version import __version__
 def model_section(d: Diagnosis) -> Iterator[str]:
     """The patched model as a file."""
     added = "The model as it was given" if d.verdict in ("none", "data") else "The model with what was found"
-    yield element("p", f"{added}: model.toml beside this page. It loads wherever a model is asked for.")
+    with_files = ", ".join(["", *(f"with {option}" for option in _effect_files(d))])
+    yield element("p", f"{added}: model.toml beside this page. It loads wherever a model is asked for{with_files}.")
     yield element("pre", d.patched.toml().strip())
 
 
@@ -37,6 +39,7 @@ def reproduce_section(d: Diagnosis) -> Iterator[str]:
 def command_of(d: Diagnosis) -> str:
     """The command that makes this diagnosis again."""
     words = ["spikecam diagnose", d.campaign, f"--model {d.model_name}", "--out DIR", f"--seed {d.seed}"]
+    words += _effect_files(d)
     if d.candidates is not None:
         words.append(f"--candidates {' '.join(d.candidates)}")
     if d.exclude:
@@ -44,3 +47,8 @@ def command_of(d: Diagnosis) -> str:
     if d.effort != CAMPAIGNS:
         words.append(f"--effort {d.effort:g}")
     return " ".join(words)
+
+
+def _effect_files(d: Diagnosis) -> list[str]:
+    """The options that give effects of a user's own."""
+    return [f"--effect-file {shlex.quote(file)}" for file in d.effect_files]

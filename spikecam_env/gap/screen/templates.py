@@ -2,22 +2,26 @@
 
 A template is a direction, in noise, at a strength that shows clearly.  Statistics are not in proportion where an effect
 is severe, so there are others of SEVERE times as much; screening (`screen`) scales the one that fits best.  The shipped
-ones are of the standard design, by `python -m tools.build_templates`.
+ones are of the standard design, by `python -m tools.build_templates`; `fit/standard_templates.py` simulates others.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from spikecam_env.errors import InputError
 from spikecam_env.gap.statistics import Key
 from spikecam_env.sensor import CATALOGUE
+from spikecam_env.untrusted import Declared, declared, numbers, parse_json, read_arrays
 from spikecam_env.whole import whole_file
 
 Array = NDArray[np.float64]
@@ -52,7 +56,8 @@ class Template:
 class Templates:
     """keys: (S,) of the standard design's statistics; noise: (S,) theirs, of which `shift` is so many.
 
-    levels: radiance of its recordings by name; kinds: of them.
+    levels: radiance of its recordings by name; kinds: of them.  laws: digests of the effects that were simulated, by
+    name (`sensor/effect_law.py`).
     """
 
     keys: tuple[Key, ...]
@@ -60,35 +65,88 @@ class Templates:
     levels: dict[str, float]
     kinds: dict[str, str]
     entries: tuple[Template, ...]
+    laws: dict[str, str] = field(default_factory=dict)
 
     @property
     def weakest(self) -> tuple[Template, ...]:
         """Those whose statistics are in proportion to the strength, and to less."""
         return tuple(e for e in self.entries if e.times == 1.0)
 
+    def with_those_of(self, others: Iterable[Templates]) -> Templates:
+        """These, with the effects of others in place of their own; in the order of the catalogue, and in this noise.
+
+        A statistic that others lack is taken not to change.
+        """
+        laws = {name: law for more in others for name, law in more.laws.items()}
+        new = [replace(e, shift=self._in_this_noise(more, e.shift)) for more in others for e in more.entries]
+        kept = [e for e in self.entries if e.name not in laws]
+        order = {name: i for i, name in enumerate(CATALOGUE)}
+        entries = sorted([*kept, *new], key=lambda e: order.get(e.name, len(order)))
+        return replace(self, entries=tuple(entries), laws={**self.laws, **laws})
+
+    def _in_this_noise(self, other: Templates, shift: Array) -> Array:
+        if other.keys == self.keys and np.array_equal(other.noise, self.noise):
+            return shift
+        change = dict(zip(other.keys, shift * other.noise, strict=True))
+        return np.array([change.get(key, 0.0) for key in self.keys]) / self.noise
+
+
+class _Entry(Declared):
+    """A template, but for its shift."""
+
+    name: str
+    parameters: dict[str, float]
+    times: float
+    white: float
+
+
+class _About(Declared):
+    """What a file of templates holds beside arrays."""
+
+    keys: list[Annotated[list[str], Field(min_length=3, max_length=3)]]
+    levels: dict[str, float]
+    kinds: dict[str, str]
+    laws: dict[str, str]
+    entries: list[_Entry]
+
 
 def shipped_templates() -> Templates:
     """The shipped templates, of the standard design."""
-    with resources.as_file(resources.files(__package__) / FILE) as path, np.load(path) as file:
-        about = json.loads(str(file["about"]))
-        shifts, noise = file["shift"].astype(np.float64), file["noise"].astype(np.float64)
-    entries = tuple(Template(**e, shift=s) for e, s in zip(about["entries"], shifts, strict=True))
-    return Templates(tuple(Key(*k) for k in about["keys"]), noise, about["levels"], about["kinds"], entries)
+    with resources.as_file(resources.files(__package__) / FILE) as path:
+        return read_templates(path)
+
+
+def read_templates(path: Path) -> Templates:
+    """Templates as `save_templates` writes them; raises InputError for a file that is no such."""
+    arrays = read_arrays(path, ("about", "shift", "noise"))
+    about = declared(_About, parse_json(str(arrays["about"]), str(path)), str(path))
+    shifts = numbers(arrays["shift"], "shift", str(path)).astype(np.float64)
+    noise = numbers(arrays["noise"], "noise", str(path)).astype(np.float64)
+    if shifts.shape != (len(about.entries), len(about.keys)) or noise.shape != (len(about.keys),):
+        raise InputError(f"{path}: shift {shifts.shape} and noise {noise.shape} do not fit its entries and keys")
+    entries = (Template(**dict(e), shift=shift) for e, shift in zip(about.entries, shifts, strict=True))
+    return Templates(tuple(Key(*k) for k in about.keys), noise, about.levels, about.kinds, tuple(entries), about.laws)
 
 
 def save_templates(templates: Templates, path: Path) -> None:
-    """Write them whole, as `shipped_templates` reads them: shifts in half precision."""
+    """Write them whole, as they are when they are `rounded`."""
     about: dict[str, Any] = {
         "keys": templates.keys,
         "levels": templates.levels,
         "kinds": templates.kinds,
-        "entries": [about_template(e) for e in templates.entries],
+        "laws": templates.laws,
+        "entries": [{k: v for k, v in vars(e).items() if k != "shift"} for e in templates.entries],
     }
-    shift = np.clip([e.shift for e in templates.entries], -6e4, 6e4).astype(np.float16)
+    shift = np.array([_halved(e.shift) for e in templates.entries]).reshape(-1, len(templates.keys))
     with whole_file(path) as beside, beside.open("wb") as file:
         np.savez_compressed(file, about=json.dumps(about), shift=shift, noise=templates.noise.astype(np.float32))
 
 
-def about_template(entry: Template) -> dict[str, Any]:
-    """A template as JSON has it, but for its `shift`."""
-    return {"name": entry.name, "parameters": entry.parameters, "times": entry.times, "white": entry.white}
+def rounded(templates: Templates) -> Templates:
+    """Templates as they are read again: shifts in half precision, noise in single."""
+    entries = tuple(replace(e, shift=_halved(e.shift).astype(np.float64)) for e in templates.entries)
+    return replace(templates, noise=templates.noise.astype(np.float32).astype(np.float64), entries=entries)
+
+
+def _halved(shift: Array) -> NDArray[np.float16]:
+    return np.clip(shift, -6e4, 6e4).astype(np.float16)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 class Pending(NamedTuple):
@@ -34,6 +35,13 @@ class Afterpulsing(Effect):
     stage = Stage.READOUT
     within = Within.END
     strength = "probability"
+    identification = Identification(
+        family="readout",
+        shapes={"delay_frames": (1, 2, 3, 4, 6)},
+        needs=Needs.STEADY,
+        events=True,
+        share=("probability", "spikes"),
+    )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Pending:
         return Pending(np.zeros(0, dtype=np.int64), rng)

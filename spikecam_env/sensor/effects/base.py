@@ -45,6 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import unknown_name
+from spikecam_env.sensor.effects.identification import Identification
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.ranges import parameter as parameter
 from spikecam_env.sensor.unit import PixelArray, Unit
@@ -225,9 +226,11 @@ class Effect:
     name: ClassVar[str] = "effect"
     strength: ClassVar[str]
     neutral: ClassVar[float] = 0.0
+    identification: ClassVar[Identification] = Identification()
+    """How a diagnosis finds it in recordings."""
 
     def __init_subclass__(cls) -> None:
-        cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+        cls.name = effect_name(cls.__name__)
 
     def __post_init__(self) -> None:
         check_parameters(self, self.name)
@@ -304,6 +307,11 @@ class Effect:
 BLOCK_HOOKS = ("collect", "compare", "read_out")
 SPIKE_HOOKS = ("react", "after_reset", "spiked")
 FRAME_HOOKS = ("begin", *BLOCK_HOOKS, *SPIKE_HOOKS)
+
+
+def effect_name(class_name: str) -> str:
+    """The name of an effect by that of its class: DeadTime is dead_time."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", class_name).lower()
 
 
 def having(hook: str, effects: Sequence[Effect]) -> list[Effect]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -24,6 +25,7 @@ class BiasVoltageSpread(Effect):
     stage = Stage.THRESHOLD
     within = Within.CONSTANT
     strength = "sigma_V"
+    identification = Identification(family="pattern", needs=Needs.EVEN, experiment=SECOND_V_D)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_swings_off(self.sigma_V, rng.standard_normal(pixels.gain.shape))

@@ -18,6 +18,7 @@ import numpy as np
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,13 @@ class Blooming(Effect):
     within = Within.INTEGRATED
     strength = "share"
     within_frame = True
+    identification = Identification(
+        family="coupling",
+        fitted=("share", "full"),
+        shapes={"full": (0.75, 0.85, 1.0)},
+        needs=Needs.BRIGHT,
+        shape_step=-0.1,
+    )
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         half = np.abs(light.rises) / 2.0

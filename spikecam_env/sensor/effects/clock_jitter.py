@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 class Edge(NamedTuple):
@@ -33,6 +34,7 @@ class ClockJitter(Effect):
     within = Within.INTEGRATED
     strength = "sigma_ns"
     within_frame = True
+    identification = Identification(family="common", square=True, needs=Needs.STEADY)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:
         return Edge(rng.standard_normal(), rng)

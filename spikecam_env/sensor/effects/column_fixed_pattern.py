@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -25,6 +26,7 @@ class ColumnFixedPattern(Effect):
     stage = Stage.THRESHOLD
     within = Within.CONSTANT
     strength = "sigma_mV"
+    identification = Identification(family="pattern", needs=Needs.EVEN)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_swings_off(1e-3 * self.sigma_mV, rng.standard_normal((1, pixels.gain.shape[1])))

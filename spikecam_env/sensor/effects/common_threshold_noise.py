@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class CommonThresholdNoise(Effect):
     stage = Stage.THRESHOLD
     within = Within.DRAWN
     strength = "sigma_mV"
+    identification = Identification(family="common", square=True, needs=Needs.STEADY)
 
     def compare(self, now: Exposure, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:
         return Shift(millivolts=self.sigma_mV * memory.standard_normal((now.frames, 1, 1))), memory

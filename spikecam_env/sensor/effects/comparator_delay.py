@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class ComparatorDelay(Effect):
     stage = Stage.RESET
     within = Within.CROSSING
     strength = "delay_us"
+    identification = Identification(family="saturation", needs=Needs.LEVELS)
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
         return residual - np.sqrt(rate) * self.delay(now)

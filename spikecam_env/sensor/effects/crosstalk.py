@@ -26,6 +26,7 @@ from spikecam_env.sensor.effects.base import (
     neighbour_sum,
     parameter,
 )
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Crosstalk(Effect):
     stage = Stage.RESET
     within = Within.END
     strength = "kick"
+    identification = Identification(family="coupling", mixed=True, needs=Needs.STEADY)
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
         return charge + self.kick * neighbour_sum(spikes.astype(np.float64)), memory

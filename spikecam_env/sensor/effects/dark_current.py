@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -23,6 +24,7 @@ class DarkCurrent(Effect):
     stage = Stage.PHOTODIODE
     within = Within.CONSTANT
     strength = "mean_pA"
+    identification = Identification(family="dark", needs=Needs.DARK)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return replace(pixels, dark_current_pA=pixels.dark_current_pA + self.mean_pA)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.within_frame import mean_decay
 
 
@@ -25,6 +26,9 @@ class DarkCurrentDrift(Effect):
     stage = Stage.PHOTODIODE
     within = Within.INTEGRATED
     strength = "rise"
+    identification = Identification(
+        family="dark", fitted=("rise", "tau_ms"), shapes={"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=Needs.DARK
+    )
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         left = mean_decay(now.start, 1e-3 * self.tau_ms * now.frame_rate_hz)

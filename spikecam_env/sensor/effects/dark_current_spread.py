@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -24,6 +25,7 @@ class DarkCurrentSpread(Effect):
     stage = Stage.PHOTODIODE
     within = Within.CONSTANT
     strength = "sigma_pA"
+    identification = Identification(family="dark", needs=Needs.DARK)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         current = pixels.dark_current_pA + self.sigma_pA * rng.standard_normal(pixels.gain.shape)

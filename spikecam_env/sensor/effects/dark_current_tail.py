@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -25,6 +26,7 @@ class DarkCurrentTail(Effect):
     stage = Stage.PHOTODIODE
     within = Within.CONSTANT
     strength = "sigma"
+    identification = Identification(family="dark", needs=Needs.DARK)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         factor = np.exp(self.sigma * rng.standard_normal(pixels.gain.shape))

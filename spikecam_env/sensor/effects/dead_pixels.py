@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -25,6 +26,7 @@ class DeadPixels(Effect):
     stage = Stage.READOUT
     within = Within.CONSTANT
     strength = "fraction"
+    identification = Identification(family="defects", needs=Needs.EVEN, share=("fraction", "pixels"))
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         alive = rng.random(pixels.gain.shape) >= self.fraction

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class DeadTime(Effect):
     stage = Stage.RESET
     within = Within.CROSSING
     strength = "tau_us"
+    identification = Identification(family="saturation", needs=Needs.LEVELS)
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
         return residual - rate * self.tau(now)

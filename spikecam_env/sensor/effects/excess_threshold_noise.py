@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -25,6 +26,7 @@ class ExcessThresholdNoise(Effect):
     stage = Stage.THRESHOLD
     within = Within.CROSSING
     strength = "sigma_mV"
+    identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_reset_noise(self.sigma_mV)

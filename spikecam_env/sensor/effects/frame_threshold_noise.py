@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.random_fields import Words, white_field, words
 
 
@@ -25,6 +26,7 @@ class FrameThresholdNoise(Effect):
     stage = Stage.THRESHOLD
     within = Within.DRAWN
     strength = "sigma_mV"
+    identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Words:
         return words(rng)

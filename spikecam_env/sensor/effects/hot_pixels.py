@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -26,6 +27,13 @@ class HotPixels(Effect):
     stage = Stage.PHOTODIODE
     within = Within.CONSTANT
     strength = "fraction"
+    identification = Identification(
+        family="dark",
+        fitted=("fraction", "mean_pA"),
+        shapes={"mean_pA": (3.0,)},
+        needs=Needs.DARK,
+        share=("fraction", "pixels"),
+    )
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         hot = rng.random(pixels.gain.shape) < self.fraction

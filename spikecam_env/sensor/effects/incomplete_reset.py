@@ -20,6 +20,7 @@ import numpy as np
 
 from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,9 @@ class IncompleteReset(Effect):
     stage = Stage.RESET
     within = Within.END
     strength = "fraction"
+    identification = Identification(
+        family="reset", fitted=("fraction", "tau_us"), shapes={"tau_us": (50.0, 250.0, 1250.0)}, needs=Needs.LEVELS
+    )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Array:
         return np.full(first.shape, -np.inf)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,11 @@ class IrDrop(Effect):
     stage = Stage.THRESHOLD
     within = Within.END
     strength = "droop"
+    identification = Identification(
+        family="saturation",
+        needs=Needs.LEVELS,
+        experiment="flats at several levels beside a picture with bright and dark rows",
+    )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Array:
         return np.zeros((first.shape[0], 1))

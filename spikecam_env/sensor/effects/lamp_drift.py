@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 class Walk(NamedTuple):
@@ -36,6 +37,7 @@ class LampDrift(Effect):
     stage = Stage.OPTICS
     within = Within.INTEGRATED
     strength = "sigma_per_root_s"
+    identification = Identification(family="light", square=True, needs=Needs.STEADY, random_course=True)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:
         return Walk(0.0, rng, rng.spawn(1)[0])

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.within_frame import wave_moments
 
 
@@ -27,6 +28,9 @@ class LightFlicker(Effect):
     within = Within.INTEGRATED
     strength = "modulation"
     within_frame = True
+    identification = Identification(
+        family="light", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=Needs.STEADY
+    )
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         cycles = self.frequency_hz * now.middle_s + self.phase_cycles

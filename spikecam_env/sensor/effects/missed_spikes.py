@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class MissedSpikes(Effect):
     stage = Stage.READOUT
     within = Within.END
     strength = "probability"
+    identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "spikes"))
 
     def read_out(
         self, spikes: Spikes, now: Exposure, memory: np.random.Generator

@@ -22,6 +22,7 @@ from scipy.ndimage import convolve1d
 from scipy.optimize import brentq
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 _NO_BLUR = 1e-9
 """[pixels] Below, the neighbours' weight is under 1e-18, and no float32 moves by it."""
@@ -34,6 +35,7 @@ class OpticalBlur(Effect):
     stage = Stage.OPTICS
     within = Within.CONSTANT
     strength = "sigma_pixels"
+    identification = Identification(family="optics", square=True, needs=Needs.EDGES, only_contrast=True)
 
     def image(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
         if self.sigma_pixels < _NO_BLUR:

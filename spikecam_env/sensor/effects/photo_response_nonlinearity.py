@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class PhotoResponseNonlinearity(Effect):
     within = Within.INTEGRATED
     strength = "beta"
     within_frame = True
+    identification = Identification(family="saturation", needs=Needs.LEVELS)
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
         x, d = light.values, light.rises

@@ -19,6 +19,7 @@ import numpy as np
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.within_frame import decay_moment
 
 
@@ -31,6 +32,13 @@ class PhotodiodeLag(Effect):
     within = Within.INTEGRATED
     strength = "fraction"
     within_frame = True
+    identification = Identification(
+        family="lag",
+        fitted=("fraction", "tau_us"),
+        shapes={"tau_us": (150.0, 600.0, 2500.0, 10000.0)},
+        needs=Needs.MOTION,
+        only_contrast=True,
+    )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Few, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 AHEAD = 4096
 """Switches that are drawn at once."""
@@ -53,6 +54,15 @@ class RandomTelegraphNoise(Effect):
     stage = Stage.PHOTODIODE
     within = Within.INTEGRATED
     strength = "amplitude_pA"
+    identification = Identification(
+        family="dark",
+        fitted=("amplitude_pA", "fraction", "dwell_ms"),
+        shapes={"dwell_ms": (0.5, 3.0, 20.0)},
+        square=True,
+        needs=Needs.STEADY,
+        few_pixels=True,
+        share=("fraction", "pixels"),
+    )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Traps:
         pixels = np.flatnonzero(pattern.random(first.shape) < self.fraction)

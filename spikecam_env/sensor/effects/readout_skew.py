@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class ReadoutSkew(Effect):
     within = Within.INTEGRATED
     strength = "span"
     within_frame = True
+    identification = Identification(family="readout", needs=Needs.MOTION, only_contrast=True)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -26,6 +27,7 @@ class ResetNoise(Effect):
     stage = Stage.THRESHOLD
     within = Within.CROSSING
     strength = "sigma_mV"
+    identification = Identification(family="noise", square=True, needs=Needs.STEADY, experiment=SECOND_V_D)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_reset_noise(self.sigma_mV)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -37,6 +38,7 @@ class ShotNoise(Effect):
     within = Within.INTEGRATED
     strength = "quanta"
     neutral = math.inf
+    identification = Identification(family="noise", needs=Needs.STEADY, experiment=SECOND_V_D)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         quanta = self.quanta if math.isfinite(self.quanta) else 0.0

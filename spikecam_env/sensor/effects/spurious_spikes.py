@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 _AT_ONCE = 256
 """Gaps drawn at a time."""
@@ -39,6 +40,7 @@ class SpuriousSpikes(Effect):
     stage = Stage.READOUT
     within = Within.END
     strength = "probability"
+    identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "frames"))
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Strikes:
         return Strikes(np.array([-1]), rng)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,9 @@ class SupplyRipple(Effect):
     stage = Stage.THRESHOLD
     within = Within.CROSSING
     strength = "ripple"
+    identification = Identification(
+        family="common", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=Needs.STEADY
+    )
 
     def compare(self, now: Exposure, memory: Any) -> tuple[Shift, Any]:
         wave = np.sin(2.0 * np.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))

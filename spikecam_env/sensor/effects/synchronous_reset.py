@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class SynchronousReset(Effect):
     stage = Stage.RESET
     within = Within.CROSSING
     strength = "fraction"
+    identification = Identification(family="reset", needs=Needs.STEADY)
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
         return residual * (1.0 - self.fraction)

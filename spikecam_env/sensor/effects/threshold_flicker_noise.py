@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.random_fields import Words, octave_field, words
 
 
@@ -38,6 +39,7 @@ class ThresholdFlickerNoise(Effect):
     stage = Stage.THRESHOLD
     within = Within.DRAWN
     strength = "sigma_mV"
+    identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Octaves:
         shape = (int(self.octaves), *first.shape)

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -28,6 +29,7 @@ class Vignetting(Effect):
     stage = Stage.OPTICS
     within = Within.CONSTANT
     strength = "falloff"
+    identification = Identification(family="optics", needs=Needs.EVEN)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         rows, columns = pixels.gain.shape

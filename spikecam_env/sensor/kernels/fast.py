@@ -17,16 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects import CATALOGUE, Effect
+from spikecam_env.sensor.effects import Effect
 from spikecam_env.sensor.kernels import loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.light import GRAINS, Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
-
-CARRIES: frozenset[str] = frozenset(name for name, effect in CATALOGUE.items() if effect.is_fixed())
-"""Every effect that does nothing from frame to frame: fixed patterns, static optics, noise drawn at a reset."""
 
 _NO_BITS = np.empty((0, 0), dtype=np.uint8)
 _NO_WORDS = np.empty((0, 0), dtype=np.uint64)
@@ -40,8 +37,8 @@ with the noise of fewer electrons, in the tail of a spread, it would reach below
 
 
 def missing(effects: Sequence[Effect]) -> list[str]:
-    """Names of effects, or options of them, that this engine does not carry."""
-    names = [e.name for e in effects if e.name not in CARRIES]
+    """Names of effects, or options of them, that this engine does not carry: all that do something a frame."""
+    names = [e.name for e in effects if not e.is_fixed()]
     names += ["shot_noise.dark_is_noisy=false" for e in effects if getattr(e, "dark_is_noisy", True) is False]
     quanta = [getattr(e, "quanta", MIN_ELECTRONS) for e in effects]
     return names + [f"shot_noise.quanta={n:g} (below {MIN_ELECTRONS:g})" for n in quanta if n < MIN_ELECTRONS]

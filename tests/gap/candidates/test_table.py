@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import pytest
 
-from spikecam_env.gap.candidates.table import CANDIDATES, Candidates, candidate
-from spikecam_env.sensor import CATALOGUE
+from spikecam_env.gap.candidates.table import LACKING, Candidate, Candidates, candidate
+from spikecam_env.sensor import CATALOGUE, Effect, Stage
+from spikecam_env.sensor.effects.base import parameter
 
 
 def test_a_candidate_knows_its_name():
-    assert all(name == c.name for name, c in CANDIDATES.items())
+    assert all(candidate(name).name == name for name in CATALOGUE)
 
 
 @pytest.mark.parametrize(
@@ -36,3 +39,16 @@ def test_noise_and_what_scatters_is_not_linear_in_its_strength():
     linear = {name for name in CATALOGUE if candidate(name).is_linear}
     assert {"dead_time", "photodiode_lag", "readout_skew"} < linear
     assert not linear & {"crosstalk", "threshold_flicker_noise", "lamp_drift", "missed_spikes", "row_fixed_pattern"}
+
+
+@dataclass(frozen=True)
+class _Plain(Effect):
+    level: float = parameter(0.1, unit="relative", bounds=(0.0, 1.0), doc="made up")
+
+    stage = Stage.OPTICS
+    strength = "level"
+
+
+def test_an_effect_that_declares_nothing_is_fitted_by_its_strength_and_needs_nothing():
+    plain = Candidate.of(_Plain)
+    assert (plain.fitted, plain.family, plain.power, LACKING[plain.needs](())) == (("level",), "other", 1.0, None)

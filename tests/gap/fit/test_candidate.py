@@ -10,7 +10,7 @@ from small import MODEL, effect, null, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.strength import with_effect
-from spikecam_env.gap.candidates.table import CANDIDATES, candidate, chosen
+from spikecam_env.gap.candidates.table import candidate, chosen
 from spikecam_env.gap.candidates.table import testable as split_testable
 from spikecam_env.gap.compare.distance import residual_and_misfit, robust_squares
 from spikecam_env.gap.compare.prediction import Prediction, values_of
@@ -136,15 +136,10 @@ def test_a_wrong_effect_leaves_more_than_the_right_one():
 
 
 def test_every_effect_of_the_catalogue_is_a_candidate_with_a_strength():
-    assert set(CANDIDATES) == set(CATALOGUE)
-    for name, what in CANDIDATES.items():
-        assert what.fitted[0] == CATALOGUE[name].strength, name
-        assert set(what.fitted) | set(what.shapes) <= set(CATALOGUE[name].__dataclass_fields__), name
-
-
-def test_an_effect_without_a_line_of_its_own_is_fitted_by_its_strength(monkeypatch):
-    monkeypatch.delitem(CANDIDATES, "dead_time")
-    assert candidate("dead_time").fitted == ("tau_us",) and candidate("dead_time").family == "other"
+    for name, effect_class in CATALOGUE.items():
+        what = candidate(name)
+        assert what.fitted[0] == effect_class.strength, name
+        assert set(what.fitted) | set(what.shapes) <= set(effect_class.__dataclass_fields__), name
 
 
 def test_pattern_effects_are_those_that_only_draw_units():

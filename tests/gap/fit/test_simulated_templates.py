@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spikecam_env.gap.candidates.table import CANDIDATES, NOISE_OF_A_RESET
+from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET, candidate
 from spikecam_env.gap.fit import simulated_templates
 from spikecam_env.gap.fit.simulated_templates import simulated_template, template_parameters
 from spikecam_env.sensor import CATALOGUE
@@ -16,13 +16,13 @@ TO_FIT = SimpleNamespace(to_fit=lambda keys: np.array([True, True, False]))
 NULL = SimpleNamespace(keys=())
 
 
-@pytest.mark.parametrize("name", CANDIDATES)
+@pytest.mark.parametrize("name", CATALOGUE)
 def test_a_template_is_taken_at_every_combination_of_shapes(name):
-    shapes = CANDIDATES[name].shapes
+    shapes = candidate(name).shapes
     found = template_parameters(name)
     assert len(found) == (0 if name in NOISE_OF_A_RESET else np.prod([len(v) for v in shapes.values()], dtype=int))
     for parameters in found:
-        assert set(parameters) == {CATALOGUE[name].strength, *CANDIDATES[name].fitted, *shapes}
+        assert set(parameters) == {CATALOGUE[name].strength, *candidate(name).fitted, *shapes}
 
 
 @pytest.mark.parametrize("noises", [4.0, 20.0, 400.0])

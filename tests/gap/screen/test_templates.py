@@ -14,6 +14,7 @@ from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET
 from spikecam_env.gap.compare.distance import robust_squares
 from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.fit.standard_templates import is_lacking
 from spikecam_env.gap.screen.screen import Screened, screen
 from spikecam_env.gap.screen.templates import FILE, SEVERE, save_templates, shipped_templates
 from spikecam_env.gap.search.neighbours import other_starts
@@ -31,6 +32,13 @@ def test_every_candidate_has_templates_weak_ones_first_and_severe_ones_stronger(
         strength = e.parameters[CATALOGUE[e.name].strength]
         assert e.times == 1 or weak[e.shape] < strength <= 1.01 * e.times * weak[e.shape], e.name
         assert 0 < e.white <= 1 and e.shift.shape == templates.noise.shape and np.isfinite(e.shift).all()
+
+
+def test_shipped_templates_are_of_the_present_laws():
+    """Others are simulated anew in every diagnosis that is not served from a cache."""
+    shipped = shipped_templates()
+    other = [name for name in CATALOGUE if is_lacking(name, shipped)]
+    assert not other, f"python -m tools.build_templates --rebuild {' '.join(other)}  (or --same-law, where it is)"
 
 
 def test_what_is_saved_is_read_again(tmp_path):

@@ -1,6 +1,6 @@
 """The standard case: a unit of a preset recorded in the standard design, as if it were a measurement.
 
-Templates are made of it (`tools.build_templates`), and benchmarks measure by it.
+Templates are made of it (`standard_templates`), and benchmarks measure by it.
 """
 
 from __future__ import annotations

@@ -1,0 +1,86 @@
+"""Whether an effect's class declares what every effect must: asked of a user's own before it joins the catalogue."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields
+from typing import Any
+
+from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.sensor.effect_sheet import Sheet
+from spikecam_env.sensor.effects.base import Effect, Stage
+from spikecam_env.sensor.effects.identification import Identification, Needs
+
+NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+COUNTED = ("pixels", "spikes", "frames")
+"""What a `share` can be a share of."""
+
+
+def check_declaration(effect: type[Effect]) -> None:
+    """Raises InputError for the first thing that is missing or wrong in an effect's class, and says how to mend it."""
+    _check_class(effect)
+    known = {f.name: f for f in fields(effect)}
+    for field in known.values():
+        _check_parameter(effect, field)
+    if getattr(effect, "strength", None) not in known:
+        raise unknown_name(f"strength of {effect.name}", getattr(effect, "strength", None), known)
+    if isinstance(known[effect.strength].default, bool):
+        raise _wrong(effect, f"its strength {effect.strength} is a switch; a strength is a number")
+    Sheet.of(effect)
+    _made(effect, {})
+    _made(effect, {effect.strength: effect.neutral})
+    _check_identification(effect, known)
+
+
+def _check_class(effect: type[Effect]) -> None:
+    if not NAME.fullmatch(effect.name):
+        raise _wrong(effect, f"its class {effect.__name__} has no plain name; write it as ThresholdSag")
+    parameters = vars(effect).get("__dataclass_params__")
+    if parameters is None or not parameters.frozen:
+        raise _wrong(effect, "it is no frozen dataclass; write @dataclass(frozen=True) above the class")
+    if not isinstance(getattr(effect, "stage", None), Stage):
+        raise _wrong(effect, f"it has no stage; write stage = Stage.X, one of {', '.join(s.name for s in Stage)}")
+
+
+def _check_parameter(effect: type[Effect], field: Field[Any]) -> None:
+    if not {"unit", "bounds", "doc"} <= set(field.metadata):
+        raise _wrong(effect, f"{field.name} has no unit and bounds; declare it by parameter(...)")
+    if field.default is MISSING:
+        raise _wrong(effect, f"{field.name} has no default; a parameter's default is one that shows")
+    if field.metadata["bounds"] is None and not isinstance(field.default, bool):
+        raise _wrong(effect, f"{field.name} has no bounds; give the lowest and the highest value")
+
+
+def _check_identification(effect: type[Effect], known: Mapping[str, Field[Any]]) -> None:
+    declared = effect.identification
+    if not isinstance(declared, Identification) or not isinstance(declared.needs, Needs):
+        raise _wrong(effect, "its identification is none; write identification = Identification(needs=Needs.STEADY)")
+    for name in (*declared.fitted, *declared.shapes, *((declared.share or ())[:1])):
+        if name not in known:
+            raise unknown_name(f"parameter of {effect.name} in its identification", name, known)
+    if declared.fitted and declared.fitted[0] != effect.strength:
+        raise _wrong(effect, f"fitted begins with {declared.fitted[0]}; the strength, {effect.strength}, comes first")
+    if declared.share and declared.share[1] not in COUNTED:
+        raise unknown_name(f"kind of share of {effect.name}", declared.share[1], COUNTED)
+    if not math.isfinite(declared.shape_step) or declared.shape_step == 0:
+        raise _wrong(effect, f"shape_step = {shown(declared.shape_step)}; it is a step, -0.5 as a rule")
+    for name, values in declared.shapes.items():
+        if not values:
+            raise _wrong(effect, f"shapes of {name} are empty; give values to start from")
+        for value in values:
+            _made(effect, {name: value})
+
+
+def _made(effect: type[Effect], values: Mapping[str, Any]) -> None:
+    try:
+        effect(**values)
+    except InputError:
+        raise
+    except Exception as error:
+        raise _wrong(effect, f"it cannot be made with {shown(dict(values))}: {error}") from error
+
+
+def _wrong(effect: type[Effect], what: str) -> InputError:
+    return InputError(f"effect {effect.name}: {what}")

@@ -1,0 +1,78 @@
+"""docs/own_effect.md from its first command to its last, in a small array: the hidden effect is named."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from spikecam_env import cache_folder
+from spikecam_env.cli.main import run
+from spikecam_env.gap.fit import standard_case, standard_templates
+from spikecam_env.sensor import CATALOGUE
+
+PAGE = Path(__file__).parents[2] / "docs" / "own_effect.md"
+LAW, LIMITING_CASE, IN_PYTHON = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+LINES = "".join(re.findall(r"```bash\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)).splitlines()
+
+SHAPE, FRAMES = (16, 16), 1000
+SMALLER = {
+    "campaign": ["--shape", "16", "16", "--frames", str(FRAMES)],
+    "record": ["--size", "16", "16", "--frames", "100"],
+}
+"""Options added to the page's, by command."""
+STRONGER = ("sag=0.004,tau_ms=40", "sag=0.02,tau_ms=10")
+"""What is hidden: a hundredth of the pixels and frames show five times as much, over a shorter recording."""
+
+
+@pytest.mark.slow
+def test_the_page_does_what_it_says(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(cache_folder.VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setattr(standard_case, "SHAPE", SHAPE)
+    monkeypatch.setattr(standard_case, "FRAMES", FRAMES)
+    for line in LINES:
+        program, *words = shlex.split(line.replace(*STRONGER))
+        if program == "python":
+            pytest_says(words)
+        else:
+            assert program == "spikecam" and run([*words, *SMALLER.get(words[0], [])]) == 0, line
+        if words[:2] == ["effects", "new"]:
+            with_the_pages_code("threshold_sag")
+    assert Path("sag.h5").exists() and "threshold_sag" not in CATALOGUE
+    done = subprocess.run([sys.executable, "-c", IN_PYTHON], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(Path("diagnosed/diagnosis.json").read_text())
+    [effect] = found["effects"]
+    sag, tau = (effect["parameters"][name] for name in ("sag", "tau_ms"))
+    print(capsys.readouterr().out.splitlines()[-4:], sag, tau, found["gap"]["removed"])
+    assert (found["verdict"], effect["name"]) == ("named", "threshold_sag")
+    assert sag["value"] == pytest.approx(0.02, rel=0.2) and tau["value"] == pytest.approx(10.0, rel=0.5)
+    assert found["effect_files"] == ["threshold_sag.py"]
+    assert "--effect-file threshold_sag.py" in Path("diagnosed/report.html").read_text()
+    assert len(list(Path("cache/templates").glob("*.npz"))) == 1
+    again = [*shlex.split(next(line for line in LINES if "diagnose" in line))[1:-1], "again"]
+    standard_templates._IN_MEMORY.clear()
+    monkeypatch.setattr(standard_templates, "simulated_of", lambda names, **_: [] if not names else pytest.fail("made"))
+    assert run(again) == 0
+    second = json.loads(Path("again/diagnosis.json").read_text())
+    of_time = {"stages_s": None, "elapsed_s": None}
+    assert {**second, **of_time} == {**found, **of_time}
+
+
+def with_the_pages_code(name: str) -> None:
+    """The law in place of what was written to begin with, and its limiting case."""
+    Path(f"{name}.py").write_text(LAW, encoding="utf-8")
+    test = Path(f"test_{name}.py")
+    before, _, _ = test.read_text(encoding="utf-8").partition("def test_limiting_case")
+    test.write_text(before + LIMITING_CASE, encoding="utf-8")
+
+
+def pytest_says(words: list[str]) -> None:
+    done = subprocess.run([sys.executable, *words, "-q", "-p", "no:cacheprovider"], capture_output=True, text=True)
+    assert done.returncode == 0 and " passed" in done.stdout, done.stdout + done.stderr
