@@ -54,7 +54,7 @@ def page_block(page: Page) -> str:
             *_sizes(page),
             beside_measured(page),
             *map(markdown, page.sections.get("gap", ())),
-            *map(markdown, page.sections["statistics"]),
+            *map(markdown, page.sections.get("statistics", ())),
             *_candidates(page),
             _not_testable(page),
             *(f"Note: {text}." for text in page.texts("audit", "li")),
@@ -64,11 +64,11 @@ def page_block(page: Page) -> str:
 
 def short_block(page: Page) -> str:
     """The verdict, how many statistics differ, and the gap: a paragraph."""
-    compared = page.texts("statistics", "p")[0].partition(" z: ")[0]
+    compared = [text.partition(" z: ")[0] for text in page.texts("statistics", "p")]
     return " ".join(
         [
             f"**{page.verdict}.** {page.sentence}",
-            compared,
+            *compared,
             *page.texts("gap", "p"),
             f"*{page.about}; by {page.version}.*",
         ]
@@ -77,7 +77,7 @@ def short_block(page: Page) -> str:
 
 def beside_measured(page: Page) -> str:
     """Effects of the page's model that the published one has not, beside the same of the preset `measured`."""
-    found = parse_toml("\n".join(page.texts("model", "pre")), "the page's model")["effect"]
+    found = parse_toml("\n".join(page.texts("model", "pre")), "the page's model").get("effect", [])
     published, measured = (SensorModel.preset(name) for name in ("scsim", "measured"))
     known, others = ({e.name: e.parameters() for e in model.effects} for model in (published, measured))
     rows = [
@@ -122,12 +122,17 @@ def markdown(part: Part) -> str:
 
 
 def _sizes(page: Page) -> Iterator[str]:
-    """Tables of what the verdict means: sizes of effects and parameters, or what an unknown difference looks like."""
+    """What the verdict means: sizes of effects and parameters, an experiment, what an unknown difference looks like.
+
+    Of text the headings, with the paragraph below each, and lists.
+    """
+    above: Part = Text("", "")
     for part in page.sections["meaning"]:
         if isinstance(part, Table):
             yield markdown(part.without("meaning"))
-        elif part.tag == "h3":
+        elif part.tag in ("h3", "li") or (isinstance(above, Text) and above.tag == "h3" and part.tag == "p"):
             yield markdown(part)
+        above = part
 
 
 def _candidates(page: Page) -> Iterator[str]:

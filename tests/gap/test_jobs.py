@@ -1,4 +1,4 @@
-"""The answer does not depend on the number of jobs: flats in test_diagnose.py, maps in maps/test_maps.py, a scene here."""
+"""The answer does not depend on the number of jobs: of a scene here, of flats in test_diagnose.py, of maps in maps."""
 
 from __future__ import annotations
 

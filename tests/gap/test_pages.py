@@ -6,12 +6,20 @@ python -m tools.pages makes them anew.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
+import made_up
 import pytest
 
 from spikecam_env.errors import InputError
+from spikecam_env.gap.report.cells import number
+from spikecam_env.gap.report.page import write_report
+from spikecam_env.gap.report.quantities import quantity
+from spikecam_env.gap.report.sentence import gap_line
+from spikecam_env.gap.report.words import HEADINGS, human, parameter_unit
+from spikecam_env.gap.result import VERDICTS
 from tools import pages
-from tools.figure_blocks import filled
+from tools.figure_blocks import filled, page_block, short_block
 from tools.page_reading import read_page
 
 DATA = pages.REPOSITORY / pages.REAL
@@ -64,6 +72,24 @@ def test_a_block_that_nobody_writes_and_one_without_an_end_are_errors() -> None:
         filled("<!-- figures: won -->\n<!-- end of figures -->", {"one": ""})
     with pytest.raises(InputError, match="does not end"):
         filled("<!-- figures: one -->\n", {"one": ""})
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_a_page_of_every_verdict_gives_its_figures(verdict: str, tmp_path) -> None:
+    d = replace(made_up.EVERY[verdict](), evidence=None)
+    write_report(d, tmp_path / "page.html", "spikecam campaign import")
+    page = read_page(tmp_path / "page.html")
+    whole, short = page_block(page), short_block(page)
+    for block in (whole, short):
+        assert d.sentence in block and HEADINGS[verdict] in block and page.version in block
+        assert d.gap is None or gap_line(d.gap) in block
+    for r in d.ranking:
+        assert f"| {human(r.name)} | {number(r.misfit)} |" in whole and r.reason in whole
+    for e in d.effects:
+        for name, estimate in e.parameters.items():
+            assert quantity(estimate.value, parameter_unit(e.name, name), estimate.sd) in whole
+    assert "spikecam campaign import" in whole and all(note in whole for note in d.data)
+    assert (d.class_ or {}).get("experiment", "") in whole
 
 
 def test_a_page_whose_recording_is_missing_is_kept_and_the_command_says_why(tmp_path, monkeypatch, capsys) -> None:
