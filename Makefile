@@ -4,7 +4,7 @@ VENV ?= .venv
 WORKERS ?= 2
 BIN := $(VENV)/bin
 
-.PHONY: install install-dev demo test test-oldest lint clean
+.PHONY: install install-dev demo test test-oldest lint pages clean
 
 install: $(VENV)/.installed
 install-dev: $(VENV)/.installed-dev
@@ -38,6 +38,10 @@ $(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
 test-oldest: $(OLDEST)/.installed
 	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning \
 		--numprocesses $(WORKERS) --dist loadfile $(OLDEST_TESTS)
+
+# The committed diagnoses of real recordings, where these are at hand, and every figure about them in docs.
+pages: install-dev
+	$(BIN)/python -m tools.pages
 
 lint: install-dev
 	$(BIN)/ruff check .

@@ -85,7 +85,10 @@ class Statistic:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate that was tried.  misfit: heavy-tailed sum of squares of what it leaves; parameters: at the best."""
+    """A candidate that was tried.  misfit: heavy-tailed sum of squares of what it leaves; parameters: at the best.
+
+    misfit_before: of what the candidates of its step were added to.  reason: why it was accepted or rejected.
+    """
 
     name: str
     family: str
@@ -94,6 +97,21 @@ class Ranked:
     parameters: dict[str, Estimate]
     accepted: bool
     reason: str
+
+
+LEAST_STATED = 0.05
+"""Of the misfit, from which what a candidate removes is stated with one decimal."""
+
+
+def why_rejected(misfit: float, before: float, best: str, asked: float) -> str:
+    """Why a candidate was not added, by its misfit alone.  before: what its step started from; best: the candidate
+    that was preferred; asked: what has to be removed of the misfit for an effect to be added."""
+    removed = before - misfit
+    if removed < LEAST_STATED:
+        return "explains nothing"
+    if removed < asked:
+        return f"removes {removed:.1f} of the misfit, and {asked:g} are asked of an effect"
+    return f"larger misfit than {best.replace('_', ' ')}"
 
 
 @dataclass(frozen=True)
@@ -141,8 +159,8 @@ class Gap:
         return cls(before, after, floor, removed, rows)
 
 
-LABELLED_LIGHT, NOMINAL_LIGHT = "radiance (label)", "radiance (nominal)"
-"""Names of the light on a page: as it was labelled, or counted anew (`unit.label_unit`)."""
+LABELLED_LIGHT, NOMINAL_LIGHT = "radiance [unit of the labels]", "radiance [nominal, 1: a spike a frame]"
+"""Axes of light on a page: as it was labelled, or counted anew (`unit.label_unit`)."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,24 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.maps.bank import MapCase, with_use
-from spikecam_env.gap.maps.search import FITTED_SPREADS, LINEAR_PARAMETERS, MapFit, PatternModel, fitted_parameters
-from spikecam_env.gap.result import MOST_CONFIDENCE, Conclusion, Estimate, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.maps.search import (
+    FITTED_SPREADS,
+    LEAST_IMPROVEMENT,
+    LINEAR_PARAMETERS,
+    MapFit,
+    PatternModel,
+    fitted_parameters,
+)
+from spikecam_env.gap.result import (
+    MOST_CONFIDENCE,
+    Conclusion,
+    Estimate,
+    Gap,
+    NamedEffect,
+    Ranked,
+    Statistic,
+    why_rejected,
+)
 from spikecam_env.gap.unit.usual import USUAL
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
@@ -27,6 +43,9 @@ robust deviance: statistics of maps are hundreds of noises off."""
 
 LARGEST_RELATIVE_SD = 0.5
 """Relative standard deviation of a strength below which an effect is significant: two standard deviations."""
+
+MOST_RELATIVE_SD = 10.0
+"""Standard deviation of a parameter's logarithm from which no error is stated: of an effect that does nothing."""
 
 LISTED = 6
 """Statistics that are listed of what is left."""
@@ -71,7 +90,7 @@ def conclude_maps(
         gap=gap_of_maps(case, null, values, predicted),
         statistics=map_statistics(case, null, values, predicted, rho),
         ranking=tuple(
-            ranked_fit(fit, was[0].misfit, fit is r[0] and r is not rejected)
+            ranked_fit(fit, was[0].misfit, r[0].name, fit is r[0] and r is not rejected)
             for was, r in itertools.pairwise([*rounds, rejected])
             for fit in r
         ),
@@ -154,16 +173,17 @@ def has_clear_strength(last: MapFit, name: str) -> bool:
 def fit_estimates(tried: MapFit, name: str) -> dict[str, Estimate]:
     """The parameters of an effect; errors of those that were fitted by their logarithm are relative."""
     values = next(e for e in tried.state.model.effects if e.name == name).parameters()
-    return {
-        p: Estimate(values[p], tried.sd.get(f"{name}.{p}", np.nan) * (1.0 if p in LINEAR_PARAMETERS else values[p]))
-        for p in fitted_parameters(name)
-    }
+    sd = {p: tried.sd.get(f"{name}.{p}", np.nan) for p in fitted_parameters(name)}
+    sd = {p: s if s < MOST_RELATIVE_SD else np.nan for p, s in sd.items()}
+    return {p: Estimate(values[p], s * (1.0 if p in LINEAR_PARAMETERS else values[p])) for p, s in sd.items()}
 
 
-def ranked_fit(t: MapFit, before: float, accepted: bool) -> Ranked:
-    """A row of the ranking."""
+def ranked_fit(t: MapFit, before: float, best: str, accepted: bool) -> Ranked:
+    """A row of the ranking.  best: the candidate of its round that leaves least."""
     worst = float(np.abs(t.rho).max())
-    reason = f"leaves {worst:.1f} noises at worst" if t.misfit < before else "explains nothing"
+    reason = (
+        f"leaves {worst:.1f} noises at worst" if accepted else why_rejected(t.misfit, before, best, LEAST_IMPROVEMENT)
+    )
     return Ranked(t.name, candidate(t.name).family, before, t.misfit, fit_estimates(t, t.name), accepted, reason)
 
 

@@ -85,9 +85,9 @@ def exhibit_parts(exhibit: Exhibit, d: Diagnosis) -> Iterator[str]:
 def maps_parts(maps: PixelMaps) -> Iterator[str]:
     """Measured, before and after in the same colours."""
     limits = plots.map_limits(maps.measured)
-    yield element("p", f"{maps.title}:", class_="caption")
+    yield element("p", f"{maps.title} [{maps.unit}]:", class_="caption")
     yield '<div class="maps">'
     for name, values in (("measured", maps.measured), ("model before", maps.before), ("model after", maps.after)):
         if values is not None:
-            yield picture(plots.pixel_map(values, name, limits), f"{maps.title}, {name}")
+            yield picture(plots.pixel_map(values, name, limits, maps.unit), f"{maps.title}, {name}")
     yield "</div>"

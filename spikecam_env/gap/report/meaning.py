@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from spikecam_env.gap.report.cells import bullets, number, percent, value_in_words
-from spikecam_env.gap.report.quantities import SDS_OF_90_PERCENT, quantity
+from spikecam_env.gap.report.parameters_off import parameters_off
+from spikecam_env.gap.report.quantities import interval_of_90_percent, quantity
 from spikecam_env.gap.report.tables import bounds_tables
 from spikecam_env.gap.report.words import bare, equation_of, human, meaning_of, parameter_unit, sheet
 from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect
 from spikecam_env.page import element, table
-from spikecam_env.sensor import CATALOGUE
 
 
 def meaning_section(d: Diagnosis) -> Iterator[str]:
@@ -143,26 +143,34 @@ def effect_summary(name: str) -> Iterator[str]:
 def parameter_row(effect: str, name: str, e: Estimate) -> tuple[str, ...]:
     """Name, value with error, 90 % interval, meaning."""
     unit = parameter_unit(effect, name)
-    half = SDS_OF_90_PERCENT * e.sd
-    interval = f"{quantity(e.value - half, unit)} … {quantity(e.value + half, unit)}" if half > 0 else "–"
+    interval = interval_of_90_percent(e.value, unit, e.sd) if e.sd > 0 else "–"
     return bare(effect, name), quantity(e.value, unit, e.sd), interval, meaning_of(effect, name)
 
 
 def parameters_table(d: Diagnosis) -> str:
-    """One row an effect: its strength as measured, and as the model has it."""
-    rows = []
-    for name, row in d.parameters.items():
-        key = CATALOGUE[name].strength
-        what, unit = f"{human(name)}: {bare(name, key)}", parameter_unit(name, key)
-        values = (quantity(row["measured"], unit), quantity(row["nominal"], unit))
-        rows.append((what, *values, number(row["ratio"]), meaning_of(name, key)))
+    """A row a number that is off: as measured, and as the model has it."""
+    rows = [
+        (f"{r.name}: {r.parameter}", quantity(r.measured, r.unit), quantity(r.nominal, r.unit), number(r.ratio),
+         r.meaning)
+        for r in parameters_off(d.parameters, d.patched.circuit)
+    ]  # fmt: skip
     return table(("parameter", "measured", "in the model", "ratio", "meaning"), rows, numbers=(1, 2, 3), stack=True)
 
 
 def structure_table(unknown: dict[str, Any]) -> str:
     """`unknown` of diagnosis.json, in words."""
-    rows = [(_STRUCTURE.get(key, human(key)), value_in_words(value)) for key, value in unknown.items()]
+    rows = [(_STRUCTURE.get(key, human(key)), _in_words(key, value)) for key, value in unknown.items()]
     return table(("", ""), rows)
+
+
+def _in_words(key: str, value: Any) -> str:
+    if key == "groups":
+        return ", ".join(f"{human(group)} {percent(share)}" for group, share in value.items())
+    if key == "left":
+        return percent(value)
+    if key == "best_candidate" and value:
+        return human(value)
+    return value_in_words(value)
 
 
 _STRUCTURE = {
@@ -183,4 +191,7 @@ _STRUCTURE = {
     "worst_group": "Statistics that are off most",
     "groups": "Share of what is off, by statistics",
     "patch": "What the patched model holds",
+    "left": "Share of the mean square that is left",
+    "found": "What helps",
+    "worst": "What is left, the largest, in noise",
 }

@@ -15,19 +15,19 @@ from spikecam_env.gap.report.style import STYLE
 from spikecam_env.gap.report.words import HEADINGS
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.page import element, page
-from spikecam_env.version import __version__
 from spikecam_env.whole import write_text_whole
 
 
-def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
-    """Write the page; it appears whole.  Needs nothing beside it."""
-    write_text_whole(path, report(diagnosis))
+def write_report(diagnosis: Diagnosis, path: str | Path, campaign_command: str = "") -> None:
+    """Write the page; it appears whole.  Needs nothing beside it.  campaign_command: as of `report`."""
+    write_text_whole(path, report(diagnosis, campaign_command))
 
 
-def report(diagnosis: Diagnosis) -> str:
-    """The whole page."""
+def report(diagnosis: Diagnosis, campaign_command: str = "") -> str:
+    """The whole page.  campaign_command: what made the campaign, to be shown with the command that made the page."""
     d = diagnosis
-    sections = [(anchor, title, list(make(d))) for anchor, title, make in _SECTIONS]
+    reproduced = ("reproduce", "How to reproduce this page", list(reproduce.reproduce_section(d, campaign_command)))
+    sections = [*((anchor, title, list(make(d))) for anchor, title, make in _SECTIONS), reproduced]
     present = [(anchor, title, parts) for anchor, title, parts in sections if parts]
     links = " · ".join(f'<a href="#{anchor}">{element("span", title)}</a>' for anchor, title, _ in present)
     parts = [
@@ -44,7 +44,7 @@ def report(diagnosis: Diagnosis) -> str:
 
 
 def subject(d: Diagnosis) -> str:
-    """What was compared with what, how long that took, and by which version."""
+    """What was compared with what, how long that took, and by which version of the code."""
     said = f"Recordings of {Path(d.campaign).name} against the model {d.model_name}"
     shape = shape_of(d.evidence) if d.evidence else None
     if d.evidence and shape:
@@ -54,7 +54,7 @@ def subject(d: Diagnosis) -> str:
             f": {shape[0]} × {shape[1]} pixels at {d.patched.frame_rate_hz:g} Hz, {len(shown)} recordings, "
             f"{held} of them held out"
         )
-    return f"{said}. {sum(d.stages.values()):.0f} s, spikecam-env {__version__}."
+    return f"{said}. {sum(d.stages.values()):.0f} s, {reproduce.version_of_code()}."
 
 
 _SECTIONS: tuple[tuple[str, str, Callable[[Diagnosis], Iterator[str]]], ...] = (
@@ -67,5 +67,4 @@ _SECTIONS: tuple[tuple[str, str, Callable[[Diagnosis], Iterator[str]]], ...] = (
     ("not-testable", "What could not be tested", tables.not_testable_section),
     ("audit", "Notes on the data", tables.notes_section),
     ("model", "The model", reproduce.model_section),
-    ("reproduce", "How to reproduce this page", reproduce.reproduce_section),
 )

@@ -29,7 +29,8 @@ Array = NDArray[np.floating[Any]]
 class Panel:
     """One plot.  x, measured, before, sd (N,); after (N,) or None.  log: axes that are logarithmic, "", "x", "y", "xy".
 
-    labels: names of the points instead of numbers on the x axis.
+    xlabel, ylabel: with the unit in brackets, [1] of pure numbers.
+    labels: names of the points instead of numbers on the x axis, which then has no label.
     """
 
     title: str
@@ -56,9 +57,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class PixelMaps:
-    """One picture (H, W) of every pixel, measured and simulated."""
+    """One picture (H, W) of every pixel, measured and simulated.  unit: of all of them."""
 
     title: str
+    unit: str
     measured: Array
     before: Array
     after: Array | None

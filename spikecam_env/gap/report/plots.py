@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spikecam_env.gap.report.panels import Array, Panel
+from spikecam_env.gap.report.quantities import three_digits
 from spikecam_env.gap.result import Gap, Statistic
 
 MEASURED, BEFORE, AFTER, BAND, FLOOR = "#000000", "#D55E00", "#0072B2", "#D9D9D9", "#8C8C8C"
@@ -25,6 +26,9 @@ _FONTS: Any = {"font.size": 10, "axes.titlesize": 10.5, "axes.spines.top": False
           "font.family": "DejaVu Sans", "axes.titlelocation": "left"}  # fmt: skip
 _MANY = 40
 """Points from which measured is drawn as a thin line, not as dots."""
+
+_TICKS_OF_LONG_NUMBERS = 5
+"""Intervals between ticks at most, for numbers of eight characters not to touch."""
 
 _plain = mpl.ticker.FuncFormatter(lambda value, _: f"{value:g}")
 
@@ -94,18 +98,20 @@ def _by_name(axis: Axes, p: Panel) -> None:
     axis.set_yticks(y, p.labels)
     axis.use_sticky_edges = False
     axis.autoscale()
+    axis.xaxis.set_major_locator(mpl.ticker.MaxNLocator(_TICKS_OF_LONG_NUMBERS))
     axis.set(xlabel=p.ylabel)
     axis.grid(axis="y", color="0.93", zorder=-1)
 
 
-def pixel_map(values: Array, title: str, limits: tuple[float, float]) -> Figure:
-    """Every pixel (H, W) in colour, between limits; of large arrays means of 2 x 2 pixels, or more."""
+def pixel_map(values: Array, title: str, limits: tuple[float, float], unit: str) -> Figure:
+    """Every pixel (H, W) in colour, between limits; of large arrays means of several.  unit: of values."""
     values = _shrunk(values)
     with mpl.rc_context(_FONTS):
         figure = Figure((3.4, 2.9))
-        axis = figure.add_axes((0.02, 0.02, 0.74, 0.87))
+        axis = figure.add_axes((0.02, 0.02, 0.7, 0.87))
         image = axis.imshow(values, vmin=limits[0], vmax=limits[1], interpolation="nearest", cmap="viridis")
-        figure.colorbar(image, cax=figure.add_axes((0.78, 0.1, 0.04, 0.7)))
+        bar = figure.colorbar(image, cax=figure.add_axes((0.74, 0.1, 0.04, 0.7)))
+        bar.set_label(f"[{unit}]", fontsize=8)
         axis.set_title(title)
         axis.set(xticks=[], yticks=[])
         return figure
@@ -147,7 +153,7 @@ def strip(statistics: Sequence[Statistic]) -> Figure:
         axis.set_xticks([*(-t for t in ticks), 0, *ticks], [*(f"−{t}" for t in ticks), "0", *map(str, ticks)])
         axis.minorticks_off()
         axis.set_yticks(range(len(groups)), groups)
-        axis.set(xlabel="z: measured less model, in noise", ylim=(-0.6, len(groups) - 0.4))
+        axis.set(xlabel="z: measured less model [standard deviations]", ylim=(-0.6, len(groups) - 0.4))
         axis.grid(axis="y", color="0.93", zorder=-1)
         return figure
 
@@ -169,14 +175,14 @@ def gap_bars(gap: Gap, recordings: Sequence[str]) -> Figure:
             axis.barh(y + up, np.maximum(widths - left, 0), left=left, height=0.25, color=colour)
             for at, value in zip(y + up, widths, strict=True):
                 if np.isfinite(value):
-                    axis.annotate(_short(value), (max(value, left), at), (3, 0), textcoords="offset points",
+                    axis.annotate(three_digits(value), (max(value, left), at), (3, 0), textcoords="offset points",
                                   va="center", fontsize=8)  # fmt: skip
         axis.set_xscale("log")
         axis.set_xlim(left, max(values, default=1.0) * (max(values, default=1.0) / left) ** 0.15)
         axis.xaxis.set_major_formatter(_plain)
         axis.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
         axis.set_yticks(y, names)
-        axis.set(xlabel="mean square distance, in noise")
+        axis.set(xlabel="mean square distance [noise²]")
         return figure
 
 
@@ -203,10 +209,6 @@ def rungs(names: Sequence[str], gaps: Sequence[float], groups: Sequence[dict[str
         axis.set_xlim(low, 4 * max(most, *gaps))
         axis.set_ylim(float(y[-1]) - 0.5, 0.75)
         axis.set_yticks(y, names)
-        axis.set(xlabel="mean square distance, in noise (1: chance)")
+        axis.set(xlabel="mean square distance [noise²]; 1: chance")
         axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8, frameon=False)
         return figure
-
-
-def _short(value: float) -> str:
-    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"

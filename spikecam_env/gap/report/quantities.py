@@ -24,10 +24,43 @@ def quantity(value: float, unit: str, sd: float | None = None) -> str:
     if sd is None or not math.isfinite(sd) or sd <= 0:
         return f"{value:.4g} {unit}".rstrip()
     sd *= scale
-    digits = max(0, 1 - math.floor(math.log10(sd)))
+    digits = _digits(sd)
     if digits > 7:
         return f"{value:.4g} ± {sd:.2g} {unit}".rstrip()
     return f"{value:.{digits}f} ± {sd:.{digits}f} {unit}".rstrip()
+
+
+def interval_of_90_percent(value: float, unit: str, sd: float) -> str:
+    """Where a value is with 90 %, to the digits of `quantity`.
+
+    >>> interval_of_90_percent(0.3023, "relative", 0.0081)
+    '28.90 … 31.56 %'
+    """
+    scale, unit = readable(value, unit)
+    half = SDS_OF_90_PERCENT * sd * scale
+    digits = _digits(sd * scale)
+    low, high = (f"{value * scale + side * half:.{digits}f}" for side in (-1, 1))
+    return f"{low} … {high} {unit}".rstrip()
+
+
+def _digits(sd: float) -> int:
+    """Decimals of a value that leave its standard deviation two digits."""
+    return max(0, 1 - math.floor(math.log10(sd))) if sd > 0 and math.isfinite(sd) else 4
+
+
+def rough(value: float, unit: str) -> str:
+    """A value to three digits, or whole, with its unit.
+
+    >>> rough(0.0218, "relative"), rough(31000.0, "electrons")
+    ('2.18 %', '31000 electrons')
+    """
+    scale, unit = readable(value, unit)
+    return f"{three_digits(value * scale)} {unit}".rstrip()
+
+
+def three_digits(value: float) -> str:
+    """A number to three digits, a large one whole."""
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def readable(value: float, unit: str) -> tuple[float, str]:
@@ -48,8 +81,9 @@ def sizes(parameters: dict[str, Estimate], effect: str) -> str:
 
 def plain_sizes(effect: NamedEffect) -> str:
     """An effect's parameters in a line, to three digits and without errors."""
-    values = [(p, readable(e.value, parameter_unit(effect.name, p)), e.value) for p, e in effect.parameters.items()]
-    return ", ".join(f"{bare(effect.name, p)} {v * scale:.3g} {unit}".rstrip() for p, (scale, unit), v in values)
+    return ", ".join(
+        f"{bare(effect.name, p)} {rough(e.value, parameter_unit(effect.name, p))}" for p, e in effect.parameters.items()
+    )
 
 
 def at_most(bound: Bound) -> str:

@@ -7,27 +7,36 @@ import shlex
 from collections.abc import Iterator
 from importlib import metadata
 
+from spikecam_env.code_version import code_version
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.page import element, table
 from spikecam_env.version import __version__
+
+MADE_BY = ("spikecam_env.gap.diagnose", "spikecam_env.gap.report.page")
+"""Modules that, with all they import, make a diagnosis and its page."""
+
+
+def version_of_code() -> str:
+    """The package's version, and the digest of the code that makes a page."""
+    return f"spikecam-env {__version__}, code {code_version(*MADE_BY)}"
 
 
 def model_section(d: Diagnosis) -> Iterator[str]:
     """The patched model as a file."""
     added = "The model as it was given" if d.verdict in ("none", "data") else "The model with what was found"
     with_files = ", ".join(["", *(f"with {option}" for option in _effect_files(d))])
-    yield element("p", f"{added}: model.toml beside this page. It loads wherever a model is asked for{with_files}.")
+    yield element("p", f"{added}; as a file, model.toml, it loads wherever a model is asked for{with_files}.")
     yield element("pre", d.patched.toml().strip())
 
 
-def reproduce_section(d: Diagnosis) -> Iterator[str]:
-    """Command, seed, versions, seconds."""
-    yield element("pre", command_of(d))
+def reproduce_section(d: Diagnosis, campaign_command: str = "") -> Iterator[str]:
+    """Commands, seed, versions, seconds.  campaign_command: what made the campaign, if it is known."""
+    yield element("pre", "\n".join(filter(None, (campaign_command, command_of(d)))))
     versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy", "numba", "matplotlib"))
     yield element(
         "p",
-        f"Seed {d.seed}: the same seed gives the same result. spikecam-env {__version__}, Python "
+        f"Seed {d.seed}: the same seed gives the same result. {version_of_code()}, Python "
         f"{platform.python_version()}, {versions}.",
     )
     rows = [(name, f"{seconds:.1f}") for name, seconds in d.stages.items()]

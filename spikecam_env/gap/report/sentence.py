@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 
-from spikecam_env.gap.report.quantities import plain_sizes, quantity
-from spikecam_env.gap.report.words import human, listed, parameter_unit
+from spikecam_env.gap.report.parameters_off import parameters_off
+from spikecam_env.gap.report.quantities import plain_sizes, rough, three_digits
+from spikecam_env.gap.report.words import human, listed
 from spikecam_env.gap.result import CHANCE, Conclusion, Gap
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import gap_is_fitted
-from spikecam_env.sensor import CATALOGUE
 
 
 def sentence(found: Conclusion, model_name: str) -> str:
     """The verdict in one sentence; in two, where beside effects parameters are off."""
     said = _SENTENCES[found.verdict](found, model_name)
     if found.verdict in ("named", "class") and found.parameters:
-        said += f" Parameters of the model {model_name} are off as well: {all_off(found.parameters)}."
+        said += f" Parameters of the model {model_name} are off as well: {all_off(found)}."
     return said
 
 
@@ -55,7 +55,7 @@ def unknown_sentence(found: Conclusion, model_name: str) -> str:
 
 def parameter_sentence(found: Conclusion, model_name: str) -> str:
     """Effects of the model that are there in another amount."""
-    return f"No effect is missing, but parameters of the model {model_name} are off: {all_off(found.parameters)}."
+    return f"No effect is missing, but parameters of the model {model_name} are off: {all_off(found)}."
 
 
 def data_sentence(found: Conclusion, model_name: str) -> str:
@@ -74,13 +74,10 @@ _SENTENCES = {
 }
 
 
-def all_off(parameters: dict[str, dict[str, float]]) -> str:
+def all_off(found: Conclusion) -> str:
     """Strengths as measured, beside those of the model."""
-    rows = [(effect, parameter_unit(effect, CATALOGUE[effect].strength), row) for effect, row in parameters.items()]
-    return listed(
-        [f"{human(e)} is {quantity(row['measured'], u)}, not {quantity(row['nominal'], u)}" for e, u, row in rows],
-        "and",
-    )
+    rows = parameters_off(found.parameters, found.patched.circuit)
+    return listed([f"{r.name} is {rough(r.measured, r.unit)}, not {rough(r.nominal, r.unit)}" for r in rows], "and")
 
 
 def removed_phrase(found: Conclusion, what: str) -> str:
@@ -95,13 +92,13 @@ def removed_phrase(found: Conclusion, what: str) -> str:
 
 def gap_line(gap: Gap) -> str:
     """What a model's patch did to the gap."""
-    off = f"statistics are {gap.before:.3g} off the model (mean square, in noise)"
+    off = f"statistics are {three_digits(gap.before)} off the model (mean square, in noise)"
     chance = "1 is chance" if gap.floor == CHANCE else f"chance, by two halves of the measurement, {gap.floor:.3g}"
     said = f"On the recordings held out, {off}; {chance}."
     if not math.isfinite(gap.removed) or gap.before <= HARDLY_A_GAP * gap.floor:
         return said
     removed = f"{100 * min(gap.removed, 1.0):.0f} % of the gap is removed"
-    return f"{said} With the patched model they are {gap.after:.3g} off: {removed}."
+    return f"{said} With the patched model they are {three_digits(gap.after)} off: {removed}."
 
 
 HARDLY_A_GAP = 1.2

@@ -20,7 +20,7 @@ nav {{ font-size: .9em; color: #777; margin: 1em 0 }} a {{ color: #0059a3 }}
 .band {{ color: #bbb }}
 .plots {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 380px), 1fr)); gap: 1em;
           align-items: start }}
-.maps {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 165px), 1fr)); gap: .5em }}
+.maps {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 260px), 1fr)); gap: .5em }}
 .plots img, .maps img, .single img {{ width: 100%; height: auto; display: block }}
 .single {{ max-width: 540px }} .maps {{ max-width: 900px }}
 tr.accepted td {{ background: #eef6fb }} td:last-child, th:last-child {{ padding-right: 0 }}

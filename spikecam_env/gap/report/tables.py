@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from spikecam_env.gap.report import plots
 from spikecam_env.gap.report.cells import bullets, number, signed
 from spikecam_env.gap.report.quantities import at_most, bounded_parameter, sizes
-from spikecam_env.gap.report.words import human
-from spikecam_env.gap.result import SIGNIFICANT, Diagnosis
+from spikecam_env.gap.report.words import group_meaning, human, listed
+from spikecam_env.gap.result import SIGNIFICANT, Diagnosis, Ranked
 from spikecam_env.page import captioned, element, picture, table
 
 MOST_ROWS = 15
@@ -39,6 +40,8 @@ def statistics_section(d: Diagnosis) -> Iterator[str]:
         title = "The largest differences" + (f" ({len(rows)} of {len(found)})" if len(found) > len(rows) else "")
         yield element("h3", title)
         yield table(head, rows, numbers=range(2, 7), optional=range(2, 5))
+        groups = dict.fromkeys(s.group for s in found[:MOST_ROWS])
+        yield table(("group", "what its statistics look at"), [(g, group_meaning(g)) for g in groups], stack=True)
 
 
 def candidates_section(d: Diagnosis) -> Iterator[str]:
@@ -47,20 +50,33 @@ def candidates_section(d: Diagnosis) -> Iterator[str]:
         return
     yield element(
         "p",
-        "Each candidate was fitted with the unit's own parameters free. Misfit: how far what it leaves is from noise; "
-        "the smaller the better. The gate simulates the fitted model anew and looks at its worst group.",
+        "Candidates were fitted step by step, each with the unit's own parameters free. A step adds at most one of "
+        "them, and the next step looks at what is left. Misfit: how far what a candidate leaves is from noise, a sum "
+        "of squares in noise; the smaller the better, within a step. Noise is that of each step's own simulations, so "
+        "that a step need not begin at the very misfit at which the last one ended.",
     )
+    beside: list[str] = []
+    for number_of, (before, tried) in enumerate(groupby(d.ranking, key=lambda r: r.misfit_before), start=1):
+        rows = list(tried)
+        added = f"with {listed(beside, 'and')}" if beside else "the model as given"
+        yield element("h3", f"Step {number_of}: {added} (misfit {number(before)})")
+        yield step_table(d, rows)
+        beside += [human(r.name) for r in rows if r.accepted]
+
+
+def step_table(d: Diagnosis, tried: Sequence[Ranked]) -> str:
+    """The candidates of one step, and what became of each.  Of an unknown effect what is added is a patch."""
+    added = "in the patch" if d.verdict == "unknown" else "accepted"
     rows = [
-        (human(r.name), number(r.misfit_before), number(r.misfit), sizes(r.parameters, r.name),
-         ": ".join(filter(None, ("accepted" if r.accepted else "rejected", r.reason))))
-        for r in d.ranking
+        (human(r.name), number(r.misfit), sizes(r.parameters, r.name),
+         ": ".join(filter(None, (added if r.accepted else "rejected", r.reason))))
+        for r in tried
     ]  # fmt: skip
-    classes = ["accepted" if r.accepted else "" for r in d.ranking]
-    yield table(
-        ("candidate", "misfit before", "misfit", "best fit", "outcome"),
+    return table(
+        ("candidate", "misfit", "best fit", "outcome"),
         rows,
-        numbers=(1, 2),
-        classes=classes,
+        numbers=(1,),
+        classes=["accepted" if r.accepted else "" for r in tried],
         stack=True,
     )
 

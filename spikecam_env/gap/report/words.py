@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import inspect
 from collections.abc import Sequence
 
 from spikecam_env.errors import InputError
+from spikecam_env.gap import statistics
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.effect_sheet import Sheet
 
@@ -61,6 +63,16 @@ def equation_of(effect: str) -> str:
     """The effect's equation, as its file has it."""
     found = sheet(effect)
     return inspect.cleandoc(found.law) if found else ""
+
+
+def group_meaning(group: str) -> str:
+    """What a group of statistics looks at, as its file says; empty where the bank has none of this name."""
+    try:
+        module = importlib.import_module(f"{statistics.__name__}.{group}")
+    except ModuleNotFoundError:
+        return ""
+    opening = (inspect.getdoc(module) or "").partition("\n\n")[0]
+    return " ".join(opening.partition("Reveals ")[0].split())
 
 
 def listed(names: Sequence[str], last: str) -> str:

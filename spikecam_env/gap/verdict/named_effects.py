@@ -11,7 +11,7 @@ import numpy as np
 from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.result import MOST_CONFIDENCE, Estimate, NamedEffect, Ranked
+from spikecam_env.gap.result import MOST_CONFIDENCE, Estimate, NamedEffect
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of
@@ -61,21 +61,6 @@ def removed_instead(comparison: Comparison, turn: Round) -> dict[str, float]:
     case, null, values, given = comparison.case, comparison.null, comparison.values, comparison.given
     confirmed = [f for f in turn.fits[1:] if len(f.prediction.draws) > 1]
     return {f.name: gap_of(case, null, values, given, f.prediction).removed for f in confirmed}
-
-
-def ranking(rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]]) -> tuple[Ranked, ...]:
-    """Every fit of every round.  found: those that were kept, with their rounds."""
-    return tuple(
-        ranked(f, r.misfit, f is r.fits[0] and any(r is turn for _, turn in found)) for r in rounds for f in r.fits
-    )
-
-
-def ranked(found: Fit, before: float, accepted: bool) -> Ranked:
-    """A row of the ranking; the misfit of what was added is beside all that was found, in their noise."""
-    worst = float(np.abs(found.rho).max())
-    reason = f"leaves {worst:.1f} noises at worst" if accepted or found.misfit < before else "explains nothing"
-    own = estimates(found.parameters, found.sd)
-    return Ranked(found.name, candidate(found.name).family, before, found.misfit, own, accepted, reason)
 
 
 def estimates(parameters: Mapping[str, float], sd: Mapping[str, float]) -> dict[str, Estimate]:

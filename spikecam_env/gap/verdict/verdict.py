@@ -21,8 +21,9 @@ from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND, Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of, usable_floor
-from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, ranking
+from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search
 from spikecam_env.gap.verdict.notes import notes_of
+from spikecam_env.gap.verdict.ranking import ranking
 from spikecam_env.gap.verdict.structure import structure
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel

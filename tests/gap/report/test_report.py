@@ -8,21 +8,28 @@ import subprocess
 from dataclasses import replace
 from functools import lru_cache
 from html.parser import HTMLParser
+from itertools import pairwise
 from pathlib import Path
 
 import made_up
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from spikecam_env.code_version import code_version
+from spikecam_env.gap.report import plots
 from spikecam_env.gap.report.exhibits import Exhibit, by_z, exhibits
 from spikecam_env.gap.report.exhibits.spectrum import averaged, panels
 from spikecam_env.gap.report.exhibits.step import free_window
 from spikecam_env.gap.report.page import report, write_report
+from spikecam_env.gap.report.panels import Panel
 from spikecam_env.gap.report.plots import strip
 from spikecam_env.gap.report.quantities import at_most
-from spikecam_env.gap.report.reproduce import command_of
-from spikecam_env.gap.result import NOMINAL_LIGHT, VERDICTS
+from spikecam_env.gap.report.reproduce import MADE_BY, command_of
+from spikecam_env.gap.report.words import group_meaning
+from spikecam_env.gap.result import LABELLED_LIGHT, NOMINAL_LIGHT, VERDICTS, Evidence
 from spikecam_env.sensor import SensorModel
+from spikecam_env.version import __version__
 
 VOID = {"meta", "img", "br", "link"}
 ALWAYS = {"meaning", "evidence", "statistics", "not-testable", "model", "reproduce"}
@@ -112,7 +119,7 @@ def test_a_page_fetches_nothing_runs_nothing_and_is_small(verdict: str) -> None:
 def test_the_page_says_what_the_diagnosis_says() -> None:
     d = made_up.named()
     text = Page(written("named")).text
-    for said in ("6.12 ± 0.12 %", "1.224 ± 0.024 ms", "5.923 % … 6.317 %", "97 % of the gap is removed", "bars-fast",
+    for said in ("6.12 ± 0.12 %", "1.224 ± 0.024 ms", "5.92 … 6.32 %", "97 % of the gap is removed", "bars-fast",
                  command_of(d), "Seed 7", "incomplete reset", "leaves 11 sd in the step response"):  # fmt: skip
         assert said in text
     assert " ".join(d.patched.toml().split()) in text
@@ -179,11 +186,7 @@ def test_without_a_gap_the_panels_stay_within_their_bands() -> None:
 
 def test_recordings_without_spikes_or_labels_leave_out_what_they_cannot_show() -> None:
     d = made_up.named("dead_time")
-    e = d.evidence
-    unlabelled = tuple(replace(c, kind="unknown", level=np.nan, light=None) if c.name == "flat-200" else c
-                       for c in e.conditions)  # fmt: skip
-    bases = [replace(b, residual=b.residual[:5]) for b in (e.free_refit, e.before_base, e.after_base)]
-    e = replace(e, conditions=unlabelled, free_refit=bases[0], before_base=bases[1], after_base=bases[2])
+    e = unlabelled(d.evidence, "flat-200")
     assert {x.name for x in exhibits(e, 40_000.0)} - {"clock"} == {x.name for x in exhibits(d.evidence, 40_000.0)}
     only_rates = (None,) * len(e.conditions)
     e = replace(e, measured=only_rates, before=only_rates, after=only_rates, again=None)
@@ -231,9 +234,69 @@ def test_exhibits_that_differ_by_four_standard_deviations_are_shown(z: float, sh
 
 def test_light_that_was_counted_anew_has_its_own_name_on_the_axes() -> None:
     labelled = made_up.evidence("dead_time")
-    for seen, name in ((labelled, "radiance (label)"), (replace(labelled, light=NOMINAL_LIGHT), "radiance (nominal)")):
+    for seen, name in ((labelled, LABELLED_LIGHT), (replace(labelled, light=NOMINAL_LIGHT), NOMINAL_LIGHT)):
         axes = {p.xlabel for e in exhibits(seen, 40_000.0) for p in e.panels if p.xlabel.startswith("radiance")}
         assert axes == {name}
+
+
+def unlabelled(evidence: Evidence, name: str) -> Evidence:
+    """The evidence with one flat of unknown light, which the refit leaves out."""
+    shown = tuple(replace(c, kind="unknown", level=np.nan, light=None) if c.name == name else c
+                  for c in evidence.conditions)  # fmt: skip
+    kept = evidence.free_refit, evidence.before_base, evidence.after_base
+    bases = [replace(b, residual=b.residual[:5]) for b in kept if b is not None]
+    return replace(evidence, conditions=shown, free_refit=bases[0], before_base=bases[1], after_base=bases[2])
+
+
+def test_every_axis_says_its_unit() -> None:
+    d = made_up.named()
+    made = exhibits(unlabelled(d.evidence, "flat-200"), 40_000.0)
+    assert {e.name for e in made} >= {"clock", "moving", "step", "pattern"}
+    labels = [label for e in made for p in e.panels for label in (p.ylabel, *([] if p.labels else [p.xlabel]))]
+    drawn = [strip(d.statistics), plots.gap_bars(d.gap, list(d.gap.by_recording))]
+    labels += [figure.axes[0].get_xlabel() for figure in (*drawn, plots.rungs(["a"], [2.0], [{"rates": 1.0}]))]
+    labels += [plots.pixel_map(m.measured, "", (0.0, 1.0), m.unit).axes[1].get_ylabel() for e in made for m in e.maps]
+    assert not [label for label in labels if not re.search(r"\[[^]]+\]", label)]
+
+
+def test_numbers_under_a_panel_of_names_do_not_touch() -> None:
+    """Correlations of -0.51 that differ in the fourth digit."""
+    x = np.arange(2.0)
+    values = np.array([-0.5128, -0.5127])
+    figure = plots.panel(Panel("", "", "[1]", x, values, values, None, np.full(2, 1.5e-4), labels=("wall", "held out")))
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(renderer)
+    low, high = figure.axes[0].get_xlim()
+    boxes = [
+        t.get_window_extent(renderer) for t in figure.axes[0].get_xticklabels() if low <= t.get_position()[0] <= high
+    ]
+    assert len(boxes) > 2 and all(a.x1 < b.x0 for a, b in pairwise(boxes))
+
+
+def test_candidates_stand_in_the_steps_of_the_search() -> None:
+    """An accepted candidate of the first step leaves more than rejected ones of the second, which are added to it."""
+    d = made_up.named()
+    (first, *_) = d.ranking
+    later = replace(first, name="optical_blur", misfit_before=3.0, misfit=0.5, accepted=False, reason="")
+    d = replace(d, ranking=(*d.ranking, later), evidence=None)
+    text = Page(report(d)).text
+    assert re.search(r"Step 1: the model as given \(misfit 6.3\).*Step 2: with photodiode lag \(misfit 3\)", text)
+    patched = report(replace(d, verdict="unknown", effects=(), unknown={}))
+    assert "in the patch: passes the gate" in patched and "accepted: " not in patched
+
+
+def test_what_a_group_of_statistics_looks_at_is_said_under_the_largest_differences() -> None:
+    assert group_meaning("rows") == "Noise that rows or columns have in common, in steady light."
+    assert group_meaning("none of these") == ""
+    assert group_meaning("step") in Page(written("named")).text
+
+
+def test_a_page_says_the_code_that_made_it_and_how_the_campaign_was_made() -> None:
+    version = f"spikecam-env {__version__}, code {code_version(*MADE_BY)}"
+    assert Page(written("named")).text.count(version) == 2
+    assert "spikecam campaign import here there" in report(
+        replace(made_up.none(), evidence=None), "spikecam campaign import here there"
+    )
 
 
 def test_groups_as_far_off_as_each_other_are_drawn_in_the_order_of_the_statistics() -> None:

@@ -29,8 +29,8 @@ def sentence_of(d: Diagnosis) -> str:
          "either removes 97 % of the gap on recordings that were not used."),
         ("unknown", "Your camera does something that no candidate explains; adding an empirical patch removes 79 % of "
          "the gap on recordings that were not used."),
-        ("parameter", "No effect is missing, but parameters of the model scsim are off: shot noise is 3.1e+04 "
-         "electrons, not 5e+04 electrons."),
+        ("parameter", "No effect is missing, but parameters of the model scsim are off: shot noise is 31000 electrons, "
+         "not 50000 electrons."),
         ("data", "The recordings contradict their own labels: flat-300: rates are 2.1 % (31 sd) above the line through "
          "the other flats; its label fits 0.3063."),
     ],

@@ -31,7 +31,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         measured, before, after = sides
         assert measured is not None and before is not None
         yield Panel(
-            f"Pixels by interval, {t.shown.name}", "mean interval less a whole number [frames]", "pixels",
+            f"Pixels by interval, {t.shown.name}", "mean interval less a whole number [frames]", "pixels [count]",
             (_COUNTED[1:] + _COUNTED[:-1]) / 2, measured, before, after, np.sqrt(np.maximum(measured + before, 1.0)),
         )  # fmt: skip
         parts = [None if o is None else _excess(o) for o in (t.measured, t.before, t.after)]

@@ -70,7 +70,7 @@ def _over_feature(title: str, feature: Array, films: Sequence[NDArray[np.uint8] 
     scale = 100 / np.maximum(mean(before), 1e-9)
     sd = np.sqrt(np.maximum(mean(off**2) - mean(off) ** 2, 0) / size)
     return Panel(
-        title, "feature over mean light", "spikes over the model's, less 1 [%]", mean(feature.reshape(-1)),
-        scale * mean(off), np.zeros(edges.size - 1), None if after is None else scale * mean(after - before),
-        scale * sd,
+        title, "difference in light, over the mean light [1]", "spikes over the model's, less 1 [%]",
+        mean(feature.reshape(-1)), scale * mean(off), np.zeros(edges.size - 1),
+        None if after is None else scale * mean(after - before), scale * sd,
     )  # fmt: skip

@@ -25,7 +25,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     steps = _noise_by_step(static)
     if steps:
         yield steps
-    lit = [t for t in static if t.shown.level > 0]
+    lit = [t for t in static if t.shown.level > 0 and t.shown.light is not None]
     levels = _noise_by_level(sorted(lit, key=lambda t: t.shown.level), evidence.light)
     if levels:
         yield levels
@@ -36,8 +36,8 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
                               before, after, sd, 100 / before)  # fmt: skip
         measured, before, after, sd = by_recording(enough, lambda o: o.covariance / np.nanmean(o.variance))
         yield Panel(
-            "Correlation of successive intervals", "", "lag-1 correlation", np.arange(len(enough), dtype=np.float64),
-            measured, before, after, sd, labels=names(enough),
+            "Correlation of successive intervals", "", "lag-1 correlation [1]",
+            np.arange(len(enough), dtype=np.float64), measured, before, after, sd, labels=names(enough),
         )  # fmt: skip
 
 
@@ -48,7 +48,7 @@ def _noise_by_step(static: Sequence[Take]) -> Panel | None:
     if measured is None or before is None or not np.array_equal(measured.steps, before.steps):
         return None
     return Panel(
-        "Noise of a spike from A_k, by k", "k [spikes]", "noise², 1e-5 threshold²", measured.steps.astype(np.float64),
+        "Noise of a spike from A_k, by k", "k [spikes]", "noise² [1e-5 threshold²]", measured.steps.astype(np.float64),
         1e5 * measured.by_step, 1e5 * before.by_step, 1e5 * after.by_step if after else None,
         1e5 * np.hypot(measured.by_step_sd, before.by_step_sd), log="x",
     )  # fmt: skip
@@ -63,7 +63,7 @@ def _noise_by_level(lit: Sequence[Take], light: str) -> Panel | None:
     white = np.array([[1e5 * j.white if j else np.nan for j in f] for _, f in whole])
     sd = np.array([1e5 * np.hypot(f[0].white_sd, f[1].white_sd) for _, f in whole])  # type: ignore[union-attr]
     after = None if any(t.after is None for t, _ in whole) else white[:, 2]
-    return Panel("Noise of a spike, by level", light, "noise², 1e-5 threshold²",
+    return Panel("Noise of a spike, by level", light, "noise² [1e-5 threshold²]",
                  np.array([t.shown.level for t, _ in whole]), white[:, 0], white[:, 1], after, sd, log="x")  # fmt: skip
 
 

@@ -19,7 +19,7 @@ CAPTION = (
     "profiles are means over the other direction."
 )
 _TITLES = {"gain": "Response", "dark": "Dark level"}
-_AXIS_UNITS = {"gain": "thresholds a frame at radiance 1", "dark": "thresholds a frame"}
+_UNITS = {"gain": "thresholds a frame at radiance 1", "dark": "thresholds a frame"}
 
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
@@ -41,7 +41,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         measured, before, after = relative
         assert measured is not None and before is not None
         sd = (measured - before).std(axis=axis) / np.sqrt(shape[axis])
-        yield Panel(f"Response by {name}", name, "off the mean [%]", np.arange(sd.size, dtype=np.float64),
+        yield Panel(f"Response by {name}", f"{name} [pixels]", "off the mean [%]", np.arange(sd.size, dtype=np.float64),
                     measured.mean(axis=axis), before.mean(axis=axis),
                     None if after is None else after.mean(axis=axis), sd)  # fmt: skip
 
@@ -52,7 +52,7 @@ def maps(evidence: Evidence) -> Iterator[PixelMaps]:
     for what, title in _TITLES.items() if shape else ():
         measured, before, after = (None if v is None else v.reshape(shape) for v in _values(evidence, what))
         assert measured is not None and before is not None
-        yield PixelMaps(f"{title} [{_AXIS_UNITS[what]}]", measured, before, after)
+        yield PixelMaps(title, _UNITS[what], measured, before, after)
 
 
 def _values(evidence: Evidence, what: str) -> list[Array | None]:
@@ -81,5 +81,6 @@ def _histogram(what: str, values: Sequence[Array | None]) -> Panel | None:
     counts = [None if v is None else np.histogram(v, edges)[0].astype(np.float64) for v in values]
     assert counts[0] is not None and counts[1] is not None
     middle = np.sqrt(edges[1:] * edges[:-1]) if log else (edges[1:] + edges[:-1]) / 2
-    return Panel(f"{_TITLES[what]} of pixels", _AXIS_UNITS[what], "pixels", middle, counts[0], counts[1], counts[2],
+    title, xlabel = f"{_TITLES[what]} of pixels", f"{_TITLES[what].lower()} [{_UNITS[what]}]"
+    return Panel(title, xlabel, "pixels [count]", middle, counts[0], counts[1], counts[2],
                  np.sqrt(np.maximum(counts[0] + counts[1], 1)), log="x" if log else "")  # fmt: skip

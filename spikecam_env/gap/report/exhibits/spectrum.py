@@ -36,7 +36,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             after = averaged(t.after.frame, frame_rate_hz)[1] if t.after else None
             sd = before * np.sqrt(2 / count)
             sd = np.maximum(sd, before * _local_scatter(np.log(np.maximum(measured, NONE) / np.maximum(before, NONE))))
-            made.append(Panel(f"Power spectrum, {t.shown.name}", "frequency [Hz]", "power over white noise's",
+            made.append(Panel(f"Power spectrum, {t.shown.name}", "frequency [Hz]", "power over white noise's [1]",
                                 frequency, measured, before, after, sd, log="xy"))  # fmt: skip
         yield from largest(made, 1)
 

@@ -33,8 +33,8 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             after = around(t.after, mine, window)[1].mean(axis=1) if t.after else None
             ms = x * 1e3 / frame_rate_hz
             sd = (measured - before).std(axis=1) / np.sqrt(measured.shape[1])
-            rates = Panel(f"Rate around a {name} ({t.shown.name})", f"time from the {name} [ms]", "spikes a frame", ms,
-                          measured.mean(axis=1), before.mean(axis=1), after, sd)  # fmt: skip
+            rates = Panel(f"Rate around a {name} ({t.shown.name})", f"time from the {name} [ms]", "rate [spikes/frame]",
+                          ms, measured.mean(axis=1), before.mean(axis=1), after, sd)  # fmt: skip
             height = abs(rates.before[x > 0].mean() - rates.before[x < 0].mean())
             scale = 100 / max(height, 1e-9)
             yield rates
