@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.baseline.motion import Motion
+from spikecam_env.gap.baseline.static_part import static_pixels
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.twins.budget import CAMPAIGNS
@@ -194,7 +196,8 @@ class Diagnosis:
     not_bounded: (name, what is needed) of effects that were not found and that no bound can be stated of.
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
     candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
-    simulated.  simulated: recordings that were, but for the page's own.
+    simulated.  simulated: recordings that were, but for the page's own.  motion: of recordings said to be static;
+    static_only: whether the pixels that move were left out.
     """
 
     verdict: str
@@ -220,6 +223,13 @@ class Diagnosis:
     simulated: int = 0
     effort: float = CAMPAIGNS
     not_bounded: tuple[tuple[str, str], ...] = ()
+    motion: tuple[Motion, ...] = ()
+    static_only: bool = False
+
+    @property
+    def static_share(self) -> float:
+        """Share of pixels of unknown scenes that stand still: 1 where nothing moves."""
+        return float(static_pixels(self.motion).mean()) if self.motion else 1.0
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
@@ -247,6 +257,8 @@ class Diagnosis:
             "not_testable": [{"name": n, "needs": w} for n, w in self.not_testable],
             "bounds": [asdict(b) for b in self.bounds],
             "not_bounded": [{"name": n, "needs": w} for n, w in self.not_bounded],
+            "motion": [m.to_json() for m in self.motion],
+            "static_share": self.static_share,
             "ranking": [asdict(r) for r in self.ranking],
             "model": self.model_name,
             "campaign": self.campaign,
