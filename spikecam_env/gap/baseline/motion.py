@@ -93,7 +93,7 @@ class Motion:
         (r, s), (c, d), (f, g) = self.rows, self.columns, self.frames
         return (
             f"{self.recording}: the scene moves, or the light of a part changes, in rows {r} to {s}, columns {c} to "
-            f"{d} ({100 * self.share:.2g} % of pixels in all), most in frames {f} to {g}"
+            f"{d} ({100 * self.share:.3g} % of pixels in all), most in frames {f} to {g}"
         )
 
     def to_json(self) -> dict[str, Any]:

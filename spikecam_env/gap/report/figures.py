@@ -44,7 +44,7 @@ def motion_section(d: Diagnosis) -> Iterator[str]:
     yield '<div class="plots">'
     for m in d.motion:
         caption = (
-            f"{m.text}. Grey: mean rate; orange: windows of pixels whose counts change together, up to "
+            "Grey: mean rate; orange: windows of pixels whose counts change together, up to "
             f"{100 * m.contrast:.0f} % and {m.z:.0f} standard deviations."
         )
         yield captioned(picture(plots.motion_map(m.rate, m.moving, m.recording), "What moves", form="png"), caption)

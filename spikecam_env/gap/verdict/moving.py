@@ -39,7 +39,7 @@ def what_to_do(motion: tuple[Motion, ...], static_only: bool) -> list[str]:
     if any(m.light_known for m in motion):
         advice.append(TO_DO_IN_KNOWN_LIGHT)
     if static_only and share < LEAST_STATIC:
-        advice.insert(0, f"Static are {100 * share:.2g} % of pixels; --static-only needs {100 * LEAST_STATIC:g} %.")
+        advice.insert(0, f"Static are {100 * share:.3g} % of pixels; --static-only needs {100 * LEAST_STATIC:g} %.")
     return advice
 
 
