@@ -103,7 +103,7 @@ def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -
     begin = times.first + rng.random(n.size) * np.clip(interval - times.first, 0.0, 1.0)
     end = times.frames - after - rng.random(n.size) * np.clip(interval - after, 0.0, 1.0)
     walk = np.sqrt(n * white) * interval * rng.standard_normal(n.size)
-    return n / (end - begin + walk)
+    return n / np.maximum(end - begin + walk, n)  # a pixel fires once a frame at most, however wide the jitter
 
 
 def ideal_second_difference(k: NDArray[np.int64], interval: Array) -> Array:

@@ -40,6 +40,8 @@ class Diagnose:
     """Simulations at a time."""
     effort: Effort = 200.0
     """Times the campaign may be simulated before nothing more is begun that an answer can do without; inf: no end."""
+    static_only: bool = False
+    """Of unknown scenes in which something moves, look at the pixels that stand still."""
     outside: bool = False
     """Read files of the campaign that lie outside of its folder too."""
 
@@ -63,6 +65,7 @@ class Diagnose:
                 seed=self.seed,
                 jobs=self.jobs,
                 effort=self.effort,
+                static_only=self.static_only,
                 progress=True,
             )
             diagnosis.write(folder)

@@ -22,8 +22,10 @@ from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
 from spikecam_env.gap.baseline.label_audit import audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
+from spikecam_env.gap.baseline.motion import Motion
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
+from spikecam_env.gap.baseline.static_part import Observed, looked_at, without_motion
 from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.problem import Problem
@@ -43,6 +45,7 @@ from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import in_nominal_units, label_unit_note, nominal_per_label
 from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
+from spikecam_env.gap.verdict.moving import moves, static_note
 from spikecam_env.gap.verdict.verdict import conclude, with_stand_ins
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.own_effects import files_of
@@ -60,6 +63,7 @@ def diagnose(
     effort: float = CAMPAIGNS,
     twin_count: int = 12,
     templates: Templates | None = None,
+    static_only: bool = False,
     progress: bool = True,
 ) -> Diagnosis:
     """Find where a measured campaign and a model disagree, which effect is missing, and how large it is.
@@ -67,7 +71,8 @@ def diagnose(
     campaign: a folder in the format spikecam-campaign/1.  model: a SensorModel, a preset's name or a TOML path.
     candidates: names to try, default the whole catalogue; exclude: names to leave out.  Same seed, same answer.
     jobs: threads, which change no bit.  effort: times the campaign may be simulated before nothing more is begun that
-    an answer can do without, such as a third effect; infinite for whatever it takes.  Raises InputError for an
+    an answer can do without, such as a third effect; infinite for whatever it takes.  static_only: of unknown scenes
+    that move, look at the pixels that do not.  Raises InputError for an
     unreadable campaign, an unknown name, no effort, or too few static recordings of known light to refit the unit by.
     """
     if not effort > 0:
@@ -78,7 +83,7 @@ def diagnose(
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
-        asked = Asked(tuple(names), seed, jobs, effort, twin_count)
+        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only)
         found = of_spikes(measured, tested, asked, templates, stages)
     else:
         with stages.timed("maps"):
@@ -110,6 +115,8 @@ def diagnose(
         effort=effort,
         not_bounded=found.not_bounded,
         effect_files=files_of((*names, *(effect.name for effect in tested.effects))),
+        motion=found.motion,
+        static_only=static_only,
     )
 
 
@@ -118,11 +125,12 @@ class Findings:
     """What becomes of a campaign and a model.  notes: on labels and on what was left out."""
 
     conclusion: Conclusion
-    evidence: Evidence
+    evidence: Evidence | None
     bounds: tuple[Bound, ...] = ()
     not_bounded: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
     simulated: int = 0
+    motion: tuple[Motion, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -134,6 +142,7 @@ class Asked:
     jobs: int
     effort: float
     twin_count: int
+    static_only: bool = False
 
 
 def of_spikes(
@@ -141,8 +150,14 @@ def of_spikes(
 ) -> Findings:
     """A campaign of spikes, from its files to what a diagnosis says of it: one room after another."""
     with stages.timed("read"):
-        case = read_case(measured, asked.seed, asked.jobs)
-        notes = label_unit_note(case.nominal_per_label, case.base)
+        seen = observed(measured)
+    with stages.timed("motion"):
+        seen, motion = without_motion(seen, static_only=asked.static_only)
+    if motion and not seen.recordings:
+        return Findings(moves(tested, motion, static_only=asked.static_only), None, motion=motion)
+    with stages.timed("refit"):
+        case = case_of_observed(measured, seen, asked.seed, asked.jobs)
+        notes = [*static_note(motion), *label_unit_note(case.nominal_per_label, case.base)]
     comparison = comparison_of(case, tested, asked, stages)
     case, null, values = comparison.case, comparison.null, comparison.values
     rounds: list[Round] = []
@@ -163,11 +178,24 @@ def of_spikes(
             standard = templates or templates_of(comparison.names, jobs=case.jobs, progress=stages.progress)
             bounded, not_bounded = bounds(case, comparison.model, null, values, comparison.names, standard)
     notes += unfinished(case.budget)
-    return Findings(conclusion, evidence, tuple(bounded), tuple(not_bounded), tuple(notes), case.budget.simulated)
+    return Findings(
+        conclusion, evidence, tuple(bounded), tuple(not_bounded), tuple(notes), case.budget.simulated, motion
+    )
 
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
-    """Observe and refit a campaign; recordings at another V_d than most, and rates only, are left to SNEE."""
+    """Observe and refit a campaign; recordings at another V_d than most, and rates only, are left to SNEE.
+
+    Raises InputError where a recording of steady light moves.
+    """
+    seen, motion = without_motion(observed(campaign), static_only=False)
+    if motion:
+        raise InputError(f"{motion[0].text}; a static recording is needed")
+    return case_of_observed(campaign, seen, seed, jobs)
+
+
+def observed(campaign: Campaign) -> Observed:
+    """Observe a campaign; recordings at another V_d than most, and rates only, are left to SNEE."""
     conditions = [condition_of(r) for r in campaign.recordings]
     kept = [i for i, (r, c) in enumerate(zip(campaign.recordings, conditions, strict=True)) if r.spikes]
     voltages = [conditions[i].v_d for i in kept]
@@ -180,10 +208,16 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
             f"{campaign.folder} has fewer than two static recordings of known light to refit the unit by (two of use "
             "fit are needed, or unknown static scenes and nothing else)"
         )
-    seen = [o for o in observe_all(part, conditions) if o is not None]
+    seen = tuple(o for o in observe_all(part, conditions) if o is not None)
+    return Observed(part.recordings, tuple(conditions), seen)
+
+
+def case_of_observed(campaign: Campaign, all_seen: Observed, seed: int, jobs: int) -> Case:
+    """Refit the unit by what was observed; labels in another unit are counted anew."""
+    seen = all_seen.seen
     conditions = [
-        replace(c, level=float(o.rate.mean())) if c.kind == "unknown" else c
-        for c, o in zip(conditions, seen, strict=True)
+        replace(c, level=float(o.rate[looked_at(c)].mean())) if c.kind == "unknown" else c
+        for c, o in zip(all_seen.conditions, seen, strict=True)
     ]
     case = case_of(campaign.shape, conditions, seen, seed, jobs, campaign.frame_rate_hz)
     factor = nominal_per_label(case.base)

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.baseline.motion import Motion
+from spikecam_env.gap.baseline.static_part import static_pixels
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.twins.budget import CAMPAIGNS
@@ -213,7 +215,8 @@ class Diagnosis:
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
     candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
     simulated.  simulated: recordings that were, but for the page's own.  effect_files: of a user's own effects, among
-    the model's and those that were tried.
+    the model's and those that were tried.  motion: of recordings said to be static; static_only: whether the pixels that
+    move were left out.
     """
 
     verdict: str
@@ -240,6 +243,13 @@ class Diagnosis:
     effort: float = CAMPAIGNS
     not_bounded: tuple[tuple[str, str], ...] = ()
     effect_files: tuple[str, ...] = ()
+    motion: tuple[Motion, ...] = ()
+    static_only: bool = False
+
+    @property
+    def static_share(self) -> float:
+        """Share of pixels of unknown scenes that stand still: 1 where nothing moves."""
+        return float(static_pixels(self.motion).mean()) if self.motion else 1.0
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
@@ -267,6 +277,8 @@ class Diagnosis:
             "not_testable": [{"name": n, "needs": w} for n, w in self.not_testable],
             "bounds": [asdict(b) for b in self.bounds],
             "not_bounded": [{"name": n, "needs": w} for n, w in self.not_bounded],
+            "motion": [m.to_json() for m in self.motion],
+            "static_share": self.static_share,
             "ranking": [asdict(r) for r in self.ranking],
             "model": self.model_name,
             "effect_files": list(self.effect_files),

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap import Label, import_campaign
+from spikecam_env.gap.baseline.motion import find_motion
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import adjusted, deviates
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.diagnose import diagnose, read_case
+from spikecam_env.gap.diagnose import diagnose, observed, read_case
 from spikecam_env.sensor import SensorModel
 
 REAL = Path(__file__).parents[2].parent / "shared" / "data" / "real"
@@ -32,6 +33,24 @@ def test_on_the_wall_pixels_follow_the_clock_and_nothing_else_is_off(tmp_path: P
     off = [k.group for k, p in zip(null.keys, adjusted(z), strict=True) if p < 0.001]
     print({f"{k.group} {k.name}": round(float(v), 1) for k, v in zip(null.keys, z, strict=True) if abs(v) > 3})
     assert set(off) == {"clock"}
+
+
+@pytest.mark.parametrize(
+    ("file", "part", "moves"),
+    [
+        ("wall.npz", {"rows": (110, 200), "columns": (15, 355)}, False),
+        ("helicopter_low_light.npz", {}, True),
+    ],
+    ids=["wall", "helicopter"],
+)
+def test_the_helicopter_moves_and_the_wall_does_not(
+    tmp_path: Path, file: str, part: dict[str, tuple[int, int]], moves: bool
+) -> None:
+    made = import_campaign(REAL, tmp_path / "made", [Label(file, "unknown")], frame_rate_hz=20_000.0, **part)
+    seen = observed(made)
+    found = find_motion(seen.conditions[0], seen.seen[0])
+    print(found.text if found else f"{file} stands still")
+    assert (found is not None) == moves
 
 
 def test_the_maps_have_a_dark_tail_shading_and_a_narrower_spread_than_published(tmp_path: Path) -> None:

@@ -152,6 +152,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--seed": SEEDS,
             "--jobs": WORKERS,
             "--effort": ("nan", "-1", "0", "-inf"),
+            "--static-only": ("perhaps",),
             "--candidates": ("", "lag"),
             "--exclude": ("", "lag"),
             "--effect-file": EFFECT_FILES,

@@ -31,7 +31,10 @@ LABEL_ERROR = 2e-5
 
 @dataclass(frozen=True)
 class Condition:
-    """One recording's conditions.  level: mean radiance; light: None where unknown; use: "fit" or "holdout"."""
+    """One recording's conditions.  level: mean radiance; light: None where unknown; use: "fit" or "holdout".
+
+    static: (H, W) bool, the pixels to look at, in this recording and in its twins; None: all.
+    """
 
     name: str
     kind: str
@@ -40,6 +43,7 @@ class Condition:
     frames: int
     use: str
     v_d: float | None = None
+    static: NDArray[np.bool_] | None = None
 
     @property
     def moves(self) -> bool:
@@ -86,4 +90,4 @@ def _condition(name: str, light: Keyframes, frames: int, use: str, v_d: float | 
 def observe_all(campaign: Campaign, conditions: list[Condition], *, progress: bool = False) -> list[Observation | None]:
     """Every recording of spikes in numbers; None for those that are rates only."""
     bar = tqdm(zip(campaign.recordings, conditions, strict=True), "read", len(conditions), disable=not progress)
-    return [observe(r.packed(), campaign.shape, film=c.moves) if r.spikes else None for r, c in bar]
+    return [observe(r.packed(), campaign.shape, film=c.moves, static=c.static) if r.spikes else None for r, c in bar]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from spikecam_env.calibration.spike_times import SpikeTimes
 from spikecam_env.gap.observe.bit_passes import add_rows, through_frames, through_pixels
 from spikecam_env.streams.bits import as_words
-from spikecam_env.streams.packing import unpack_frames
+from spikecam_env.streams.packing import pack_frames, unpack_frames
 
 Array = NDArray[np.float64]
 
@@ -86,8 +86,19 @@ class Observation:
         return some & (some.mean() < MOST_IRREGULAR)
 
 
-def observe(packed: NDArray[np.uint8], shape: tuple[int, int], *, film: bool = False) -> Observation:
-    """Reduce (F, ceil(H W / 8)) uint8 bits; film: keep counts in bins of time."""
+def observe(
+    packed: NDArray[np.uint8],
+    shape: tuple[int, int],
+    *,
+    film: bool = False,
+    static: NDArray[np.bool_] | None = None,
+) -> Observation:
+    """Reduce (F, ceil(H W / 8)) uint8 bits; film: keep counts in bins of time.
+
+    static: (H, W), the pixels to look at; all others count as silent.
+    """
+    if static is not None:
+        packed = packed & pack_frames(static[None])
     pixels = shape[0] * shape[1]
     ends = np.full((pixels, 3), -1, np.int64)
     square, terms = np.zeros((pixels, len(DIFFERENCES))), np.zeros((pixels, len(DIFFERENCES)), np.int64)

@@ -35,6 +35,22 @@ def gap_section(d: Diagnosis) -> Iterator[str]:
     yield table(("recording", "use", "before", "after", "floor"), rows, numbers=(2, 3, 4))
 
 
+def motion_section(d: Diagnosis) -> Iterator[str]:
+    """What moves in recordings that are said to be static, as a picture of each; which pixels were kept."""
+    if not d.motion:
+        return
+    kept = f"{100 * d.static_share:.3g} % of pixels stand still in all of them"
+    yield element("p", f"{kept}; only these were looked at." if d.verdict != "data" and d.static_only else f"{kept}.")
+    yield '<div class="plots">'
+    for m in d.motion:
+        caption = (
+            "Grey: mean rate; orange: windows of pixels whose counts change together, up to "
+            f"{100 * m.contrast:.0f} % and {m.z:.0f} standard deviations."
+        )
+        yield captioned(picture(plots.motion_map(m.rate, m.moving, m.recording), "What moves", form="png"), caption)
+    yield "</div>"
+
+
 def evidence_section(d: Diagnosis) -> Iterator[str]:
     """Exhibits, those with the largest deviates first; the others folded away."""
     if d.evidence is None:

@@ -59,6 +59,7 @@ def subject(d: Diagnosis) -> str:
 
 _SECTIONS: tuple[tuple[str, str, Callable[[Diagnosis], Iterator[str]]], ...] = (
     ("meaning", "What it means", meaning.meaning_section),
+    ("motion", "Where it moves", figures.motion_section),
     ("gap", "The gap, before and after", figures.gap_section),
     ("evidence", "Evidence", figures.evidence_section),
     ("statistics", "All statistics", tables.statistics_section),

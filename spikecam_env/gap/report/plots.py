@@ -14,6 +14,7 @@ import matplotlib.ticker
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from spikecam_env.gap.report.panels import Array, Panel
 from spikecam_env.gap.report.quantities import three_digits
@@ -114,6 +115,19 @@ def pixel_map(values: Array, title: str, limits: tuple[float, float], unit: str)
         bar.set_label(f"[{unit}]", fontsize=8)
         axis.set_title(title)
         axis.set(xticks=[], yticks=[])
+        return figure
+
+
+def motion_map(rate: Array, moving: NDArray[np.bool_], title: str) -> Figure:
+    """A recording (H, W) in grey, what moves in it in orange; axes in pixels of the campaign."""
+    low, high = map_limits(rate)
+    grey = np.repeat(np.clip((rate - low) / (high - low), 0.0, 1.0)[..., None], 3, axis=2)
+    orange = np.array(mpl.colors.to_rgb(BEFORE))
+    with mpl.rc_context(_FONTS):
+        figure = Figure((_WIDTH, max(2.2, 0.6 + min(rate.shape[0] / rate.shape[1], 1.2) * 4.0)))
+        axis = figure.add_axes((0.13, 0.16, 0.84, 0.74))
+        axis.imshow(np.where(moving[..., None], 0.45 * grey + 0.55 * orange, grey), interpolation="nearest")
+        axis.set(title=title, xlabel="column [pixel]", ylabel="row [pixel]")
         return figure
 
 

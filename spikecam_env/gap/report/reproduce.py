@@ -55,6 +55,8 @@ def command_of(d: Diagnosis) -> str:
         words.append(f"--exclude {' '.join(d.exclude)}")
     if d.effort != CAMPAIGNS:
         words.append(f"--effort {d.effort:g}")
+    if d.static_only:
+        words.append("--static-only")
     return " ".join(words)
 
 

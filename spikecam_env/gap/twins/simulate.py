@@ -36,7 +36,12 @@ def simulate(
     """
     unit = unit_from_refit(model, base, shape)
     return [
-        observe(expose(model, with_label_error(unit, seed, take), c, shape, seed, take), shape, film=c.moves)
+        observe(
+            expose(model, with_label_error(unit, seed, take), c, shape, seed, take),
+            shape,
+            film=c.moves,
+            static=c.static,
+        )
         for take, c in zip(takes or range(len(conditions)), conditions, strict=True)
     ]
 

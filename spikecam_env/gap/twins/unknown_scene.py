@@ -31,6 +31,13 @@ FEWEST_SPIKES = 3
 RATE_TOLERANCE = 3e-4
 """Relative error of rates from which light is corrected."""
 
+MOST_AT_ONCE = 2.0
+"""Factor by which light is corrected at once.  Pixels that stay silent in a twin, or fire in every frame whatever the
+light, say nothing of how far it is off."""
+
+BRIGHTEST = 1e4
+"""Radiance of a scene at most: a pixel with a gain of 2e-4 of nominal saturates in it."""
+
 _BINS = 12
 _MOST_CORRECTIONS = 6
 
@@ -65,14 +72,16 @@ def simulate_scene(
 ) -> Observation:
     """One recording of an unknown scene, lit so that its pixels fire as in `seen`."""
     wanted = plausible_true_rates(seen, base.white, np.random.default_rng([seed, take]))
-    light = np.maximum(wanted - base.dark, 0.0) / np.maximum(base.gain, 1e-9)
+    light = np.minimum(np.maximum(wanted - base.dark, 0.0) / np.maximum(base.gain, 1e-9), BRIGHTEST)
+    looked_at = np.ones(light.shape, bool) if scene.static is None else scene.static.reshape(-1)
     for turn in range(_MOST_CORRECTIONS):
         lit = replace(scene, light=Keyframes(np.zeros(1), light.reshape(1, *shape).astype(np.float32)))
         [twin] = simulate(model, base, [lit], shape, seed, [take])
-        factor = correction(twin.rate, wanted)
+        factor = np.ones_like(light)
+        factor[looked_at] = correction(twin.rate[looked_at], wanted[looked_at])
         if turn == _MOST_CORRECTIONS - 1 or np.abs(factor - 1.0).max() < RATE_TOLERANCE:
             break
-        light = light * factor
+        light = np.minimum(light * factor, BRIGHTEST)
     return twin
 
 
@@ -92,10 +101,14 @@ def correction(simulated: Array, wanted: Array) -> Array:
     """(P,) factor by which light misses, a smooth function of the rate: means of pixels of about the same one."""
     edges = np.unique(np.quantile(wanted, np.linspace(0.0, 1.0, _BINS + 1)))
     if edges.size < 3 or simulated.sum() == 0:
-        return np.full(wanted.shape, wanted.mean() / max(float(simulated.mean()), 1e-9))
+        return np.full(wanted.shape, _limited(wanted.mean() / max(float(simulated.mean()), 1e-9)))
     bins = np.clip(np.searchsorted(edges, wanted, "right") - 1, 0, edges.size - 2)
     total = np.bincount(bins, minlength=edges.size - 1)
     there = total > 0
     mean = np.bincount(bins, wanted)[there] / total[there]
     got = np.bincount(bins, simulated)[there] / total[there]
-    return np.interp(wanted, mean, mean / np.maximum(got, 1e-9))
+    return np.interp(wanted, mean, _limited(mean / np.maximum(got, 1e-9)))
+
+
+def _limited(factor: Array) -> Array:
+    return np.clip(factor, 1.0 / MOST_AT_ONCE, MOST_AT_ONCE)

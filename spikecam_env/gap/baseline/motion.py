@@ -1,0 +1,240 @@
+"""Motion in a recording that is said to be static: regions whose pixels change together, beyond what all pixels do.
+
+    z = sum (c - e) / sqrt(sum v),   v = f (1 - f) + noise        c: a pixel's count in a block of frames
+
+f is the fractional part of the expected count e: an integrator that carries its charge over fires a whole number of
+times, and where it begins is uniform (DESIGN: variance 1/6 on average, 1/4 at most; not Poisson's e).  e is the
+pixel's mean times what its level does in that block (`common_mode`): lamp drift, flicker and ripple are in all pixels,
+dark-current drift in all by their dark level, so neither is motion.  A single pixel counts three standard deviations at
+most, so telegraph noise and hot pixels are none either.  Rows are no regions: windows are as high as wide, and even, in
+which what alternates from row to row cancels.
+
+Blind to: what changes in all pixels of a level by the same share, regions below LEAST_PIXELS of a side, and contrast
+below LEAST_CONTRAST, which local effects of a camera reach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import label
+from scipy.special import ndtri
+
+from spikecam_env.gap.observe.conditions import STEADY, Condition
+from spikecam_env.gap.observe.observation import TIME_BLOCKS, Observation
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FALSE_ALARM = 1e-3
+"""Chance of calling a static recording moving, over all windows of it together (Bonferroni); measured:
+`python -m benchmarks.motion_limits`."""
+
+LEAST_CONTRAST = 0.05
+"""Relative change of a region's rate from which it is motion: local effects of a camera in the blind trial, at forty
+times their limit, change the rate of a corner by 1 %."""
+
+SIDES = (4, 8, 16)
+"""Sides of the windows [pixels]: what is smaller is not found, what is larger in several."""
+
+SPANS = (1, 4, 8)
+"""Lengths of the windows [sixteenths of a recording]."""
+
+LEAST_SPIKES = 20.0
+"""Spikes expected in a window from which it is looked at: below, counts are no normal deviates."""
+
+MOST_OF_A_PIXEL = 3.0
+"""Standard deviations that a single pixel counts at most."""
+
+OWN_NOISE = 0.1
+"""Variance of a count beside f (1 - f): jitter of single spikes rounds the corners of f (1 - f), where it is 0."""
+
+SLOW_NOISE = 0.01
+"""Standard deviation of a pixel's rate in a block, relative: slow noise of single pixels (1/f, telegraph)."""
+
+_ROUNDS = 20
+"""Times at most that a recording is looked at again without what moved."""
+
+_TRIMS = 4
+"""Times that a common mode is fitted anew without the pixels that are off it."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What moves in a recording.
+
+    moving: (H, W) bool.  rows, columns: first and last of the largest connected region.  frames: first and last in
+    which it differs most.  rate: (H, W) of the recording [spikes/frame].  light_known: by its label.
+    contrast: largest relative change of a window, of either sign; z: largest deviate.
+    """
+
+    recording: str
+    moving: Mask
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+    frames: tuple[int, int]
+    contrast: float
+    z: float
+    rate: Array
+    light_known: bool = False
+
+    @property
+    def share(self) -> float:
+        """Share of pixels that move."""
+        return float(self.moving.mean())
+
+    @property
+    def text(self) -> str:
+        """The finding, in words."""
+        (r, s), (c, d), (f, g) = self.rows, self.columns, self.frames
+        return (
+            f"{self.recording}: the scene moves, or the light of a part changes, in rows {r} to {s}, columns {c} to "
+            f"{d} ({100 * self.share:.3g} % of pixels in all), most in frames {f} to {g}"
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """The documented format: no pictures."""
+        shown = ("recording", "rows", "columns", "frames", "contrast", "z")
+        return {**{key: getattr(self, key) for key in shown}, "share": self.share}
+
+
+def find_motion(condition: Condition, seen: Observation) -> Motion | None:
+    """What moves in a recording of steady light; None where nothing does, or the light is known to change."""
+    if condition.kind not in STEADY:
+        return None
+    counts, frames = whole_blocks(seen)
+    kept = np.ones(seen.shape, bool) if condition.static is None else condition.static
+    found: list[_Window] = []
+    for _ in range(_ROUNDS):
+        more = list(_moving_windows(counts, seen.shape, kept))
+        if not more:
+            break
+        found += more
+        kept = kept & ~_union(more, seen.shape)
+    return _described(condition, found, seen, frames) if found else None
+
+
+def whole_blocks(seen: Observation) -> tuple[Array, int]:
+    """(n, P) counts of the blocks that are whole, and their frames."""
+    frames = -(-seen.frames // TIME_BLOCKS)
+    return seen.blocks[: seen.frames // frames].astype(np.float64), frames
+
+
+def expected_variance(expected: Array) -> Array:
+    """Variance of a static pixel's count, of which `expected` are expected."""
+    part = np.mod(expected, 1.0)
+    return part * (1.0 - part) + OWN_NOISE * np.minimum(expected, 1.0) + (SLOW_NOISE * expected) ** 2 + 1e-6
+
+
+def common_mode(counts: Array, mean: Array, use: Mask) -> Array:
+    """(P,) counts that the level `mean` of a pixel lets expect in a block: the parabola through all pixels in `use`,
+    fitted without those off it, since what moves is not common."""
+    level = mean / max(float(mean[use].mean()), 1e-9)
+    design = np.stack([np.ones_like(level), level, level**2], axis=1)
+    expected, inside = mean, use
+    for _ in range(_TRIMS):
+        weight = 1.0 / np.sqrt(expected_variance(np.maximum(expected, 0.0))[inside])
+        line, *_ = np.linalg.lstsq(design[inside] * weight[:, None], counts[inside] * weight, rcond=1e-6)
+        expected = np.maximum(design @ line, 0.0)
+        off = np.abs(counts - expected) / np.sqrt(expected_variance(expected))
+        usual = max(1.0, 1.4826 * float(np.median(off[use])))
+        inside = use & (off < MOST_OF_A_PIXEL * usual)
+        if not inside.any():
+            break
+    return expected
+
+
+@dataclass(frozen=True)
+class _Window:
+    """A part of the array in a part of the time that is off: slices, blocks (first, stop), deviate and contrast."""
+
+    row: int
+    column: int
+    height: int
+    width: int
+    blocks: tuple[int, int]
+    z: float
+    contrast: float
+
+
+def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask) -> Iterator[_Window]:
+    """Windows in space and time whose pixels, of those `kept`, are off together beyond chance."""
+    use = kept.reshape(-1)
+    if len(counts) < 2 or not use.any():
+        return
+    mean = counts.mean(axis=0)
+    expected = np.stack([common_mode(block, mean, use) for block in counts])
+    sizes = [(min(side, shape[0]), min(side, shape[1])) for side in SIDES]
+    sizes = [s for s in dict.fromkeys(sizes) if s != shape]
+    spans = [s for s in SPANS if s <= len(counts) // 2]
+    tests = sum((len(counts) // span) * len(_starts(shape[0], h)) * len(_starts(shape[1], w))
+                for span in spans for h, w in sizes)  # fmt: skip
+    limit = -float(ndtri(FALSE_ALARM / (2 * max(tests, 1))))
+    for span in spans:
+        for first in range(0, len(counts) - span + 1, span):
+            part = slice(first, first + span)
+            hoped = expected[part].sum(axis=0)
+            sd = np.sqrt(expected_variance(hoped))
+            off = np.clip(counts[part].sum(axis=0) - hoped, -MOST_OF_A_PIXEL * sd, MOST_OF_A_PIXEL * sd)
+            planes = [np.where(kept, a.reshape(shape), 0.0) for a in (off, sd**2, hoped)]
+            for size in sizes:
+                yield from _beyond(planes, size, (first, first + span), limit)
+
+
+def _beyond(planes: list[Array], size: tuple[int, int], blocks: tuple[int, int], limit: float) -> Iterator[_Window]:
+    """Windows of one size in one part of the time.  planes: (H, W) off, variance, expected."""
+    rows, columns = (_starts(n, s) for n, s in zip(planes[0].shape, size, strict=True))
+    off, variance, expected = (_window_sums(plane, rows, columns, size) for plane in planes)
+    z = off / np.sqrt(np.maximum(variance, 1e-9))
+    contrast = off / np.maximum(expected, 1e-9)
+    enough = np.maximum(expected, expected + off) >= LEAST_SPIKES
+    for i, j in np.argwhere(enough & (np.abs(z) > limit) & (np.abs(contrast) > LEAST_CONTRAST)):
+        yield _Window(int(rows[i]), int(columns[j]), *size, blocks, float(z[i, j]), float(contrast[i, j]))
+
+
+def _starts(length: int, side: int) -> NDArray[np.int64]:
+    """Where windows begin: they overlap by half, and the last one ends with the array."""
+    return np.unique(np.append(np.arange(0, length - side + 1, max(side // 2, 1)), length - side))
+
+
+def _window_sums(plane: Array, rows: NDArray[np.int64], columns: NDArray[np.int64], size: tuple[int, int]) -> Array:
+    """(rows, columns) sums of a plane (H, W) over windows."""
+    total = np.pad(plane.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    top, bottom, left, right = rows, rows + size[0], columns, columns + size[1]
+    return total[np.ix_(bottom, right)] - total[np.ix_(top, right)] - total[np.ix_(bottom, left)] + total[
+        np.ix_(top, left)
+    ]  # fmt: skip
+
+
+def _union(windows: list[_Window], shape: tuple[int, int]) -> Mask:
+    moving = np.zeros(shape, bool)
+    for w in windows:
+        moving[w.row : w.row + w.height, w.column : w.column + w.width] = True
+    return moving
+
+
+def _described(condition: Condition, found: list[_Window], seen: Observation, frames: int) -> Motion:
+    """The largest connected region, and when its windows are off."""
+    moving = _union(found, seen.shape)
+    regions, _ = label(moving)
+    largest = int(np.argmax(np.bincount(regions.ravel())[1:])) + 1
+    row, column = np.nonzero(regions == largest)
+    mine = [w for w in found if regions[w.row, w.column] == largest]
+    worst = max(mine, key=lambda w: abs(w.z))
+    shortest = min(w.blocks[1] - w.blocks[0] for w in mine)
+    when = [w.blocks for w in mine if w.blocks[1] - w.blocks[0] == shortest]
+    return Motion(
+        recording=condition.name,
+        moving=moving,
+        rows=(int(row.min()), int(row.max())),
+        columns=(int(column.min()), int(column.max())),
+        frames=(min(w[0] for w in when) * frames, max(w[1] for w in when) * frames - 1),
+        contrast=max(abs(w.contrast) for w in mine),
+        z=abs(worst.z),
+        rate=(seen.times.count / seen.frames).reshape(seen.shape),
+        light_known=condition.light is not None,
+    )

@@ -1,0 +1,56 @@
+"""What of a campaign stands still: recordings without the pixels of unknown scenes that move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.campaign.reading import CampaignRecording
+from spikecam_env.gap.baseline.motion import Motion, find_motion
+from spikecam_env.gap.observe.conditions import Condition
+from spikecam_env.gap.observe.observation import Observation, observe
+
+LEAST_STATIC = 0.25
+"""Share of pixels that has to be static for these alone to be diagnosed: a choice."""
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Recordings of spikes at one V_d, their conditions, and what was seen in them; all empty where none is usable."""
+
+    recordings: tuple[CampaignRecording, ...]
+    conditions: tuple[Condition, ...]
+    seen: tuple[Observation, ...]
+
+
+def without_motion(observed: Observed, *, static_only: bool) -> tuple[Observed, tuple[Motion, ...]]:
+    """What was observed without what moves, and what moves.
+
+    Without recordings where that cannot be left out: it is not to be (`static_only`), light said to be known changes,
+    or too few pixels are static.  All unknown scenes keep the same pixels.
+    """
+    motion = tuple(m for c, o in zip(observed.conditions, observed.seen, strict=True) if (m := find_motion(c, o)))
+    if not motion:
+        return observed, ()
+    static, moving = static_pixels(motion), {m.recording for m in motion}
+    known = any(c.light is not None for c in observed.conditions if c.name in moving)
+    if not static_only or known or static.mean() < LEAST_STATIC:
+        return Observed((), (), ()), motion
+    conditions = [replace(c, static=static) if c.kind == "unknown" else c for c in observed.conditions]
+    seen = [
+        o if c.static is None else observe(r.packed(), o.shape, static=c.static)
+        for r, c, o in zip(observed.recordings, conditions, observed.seen, strict=True)
+    ]
+    return Observed(observed.recordings, tuple(conditions), tuple(seen)), motion
+
+
+def static_pixels(motion: tuple[Motion, ...]) -> NDArray[np.bool_]:
+    """(H, W) bool: pixels that move in none of the recordings."""
+    return ~np.logical_or.reduce([m.moving for m in motion])
+
+
+def looked_at(condition: Condition) -> NDArray[np.bool_] | slice:
+    """Index of the pixels of a recording that are looked at, of (P,)."""
+    return slice(None) if condition.static is None else condition.static.reshape(-1)

@@ -1,0 +1,51 @@
+"""The verdict on recordings that are said to be static and are not, and what a user does about it."""
+
+from __future__ import annotations
+
+from spikecam_env.gap.baseline.motion import Motion
+from spikecam_env.gap.baseline.static_part import LEAST_STATIC, static_pixels
+from spikecam_env.gap.result import Conclusion
+from spikecam_env.sensor import SensorModel
+
+TO_DO = (
+    "What to do: crop to what stands still (spikecam campaign import with --rows and --columns), or keep the static "
+    "pixels alone (spikecam diagnose --static-only)."
+)
+
+TO_DO_IN_KNOWN_LIGHT = "What to do in known light: give the light over time (an .npz) as the label, or leave it out."
+
+
+def moves(model: SensorModel, motion: tuple[Motion, ...], *, static_only: bool) -> Conclusion:
+    """The verdict `data`: nothing was compared."""
+    return Conclusion(
+        verdict="data",
+        effects=(),
+        unknown=None,
+        class_=None,
+        parameters={},
+        notes=(*(m.text for m in motion), *what_to_do(motion, static_only)),
+        gap=None,
+        statistics=(),
+        ranking=(),
+        not_testable=(),
+        patched=model,
+    )
+
+
+def what_to_do(motion: tuple[Motion, ...], static_only: bool) -> list[str]:
+    """What would make the campaign usable."""
+    share = float(static_pixels(motion).mean())
+    advice = [TO_DO] if any(not m.light_known for m in motion) else []
+    if any(m.light_known for m in motion):
+        advice.append(TO_DO_IN_KNOWN_LIGHT)
+    if static_only and share < LEAST_STATIC:
+        advice.insert(0, f"Static are {100 * share:.3g} % of pixels; --static-only needs {100 * LEAST_STATIC:g} %.")
+    return advice
+
+
+def static_note(motion: tuple[Motion, ...]) -> list[str]:
+    """What was left out because it moves; nothing where nothing does."""
+    if not motion:
+        return []
+    share = 100 * float(static_pixels(motion).mean())
+    return [f"Only static pixels of unknown scenes were looked at, {share:.3g} % of all.", *(m.text for m in motion)]
