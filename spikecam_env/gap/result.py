@@ -215,8 +215,8 @@ class Diagnosis:
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
     candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
     simulated.  simulated: recordings that were, but for the page's own.  effect_files: of a user's own effects, among
-    the model's and those that were tried.  motion: of recordings said to be static; static_only: whether the pixels that
-    move were left out.
+    the model's and those that were tried.  motion: of recordings said to be static; static_only: whether the pixels
+    that move were left out.
     """
 
     verdict: str
