@@ -109,8 +109,9 @@ def wants_rise(effects: Sequence[Effect]) -> bool:
 
 
 def intervals(first: Exposure, effects: Sequence[Effect]) -> int:
-    """Parts of a frame between the nodes of `Sway`; 0 where no reference moves within a frame."""
-    return max((effect.intervals(first) for effect in effects), default=0)
+    """Parts of a frame between the nodes of `Sway`; 0 where no reference moves and nobody is kicked within a frame."""
+    kicked = any(effect.feedback(first).kick_at_once for effect in effects)
+    return max((effect.intervals(first) for effect in effects), default=0) or int(kicked)
 
 
 def lead(first: Exposure, effects: Sequence[Effect]) -> Array:

@@ -43,6 +43,15 @@ MOST_GRAINS = 128 * GRAINS
 """Charge of a frame at most, whatever effects add to light and dark: below twice that, sums on the fast engine's grid
 are exact, and a frame's crossings are few."""
 
+
+def on_grid(charge: Any) -> Any:
+    """Charge [grains] to 2^-20 of a grain: sums of such, below 256 thresholds, are exact in whatever order."""
+    return (charge + _ROUNDS) - _ROUNDS
+
+
+_ROUNDS = 1.5 * 2.0**32
+"""Added to a number below 2^31 and taken off again, it rounds to 2^-20."""
+
 LEAST_LIMIT = GRAINS // 64
 """Charge at which a comparator trips at least, however far noise moves its reference down: each crossing takes some."""
 

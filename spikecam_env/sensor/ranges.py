@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.checked import as_number
-from spikecam_env.errors import InputError, shown
+from spikecam_env.errors import InputError, shown, unknown_name
 
 
 def parameter(
@@ -26,6 +26,7 @@ def parameter(
     unit: str,
     bounds: tuple[float, float] | None = None,
     largest: float | None = None,
+    choices: tuple[str, ...] = (),
     doc: str,
 ) -> Any:
     """Declare a field: its default, unit, allowed range and meaning.
@@ -33,12 +34,16 @@ def parameter(
     A default that is True or False makes a switch, a whole number a whole number, anything else a number.
     bounds: lowest and highest value, both allowed; None for a switch.
     largest: where the upper bound is infinite, the largest value besides infinity.
+    choices: of a name, those that it may be.
     """
-    return dataclasses.field(default=default, metadata={"unit": unit, "bounds": bounds, "largest": largest, "doc": doc})
+    return dataclasses.field(
+        default=default,
+        metadata={"unit": unit, "bounds": bounds, "largest": largest, "choices": choices, "doc": doc},
+    )
 
 
 def check_parameters(owner: Any, name: str) -> None:
-    """Check every declared field of a frozen dataclass, and keep its value as plain bool, int or float.
+    """Check every declared field of a frozen dataclass, and keep its value as plain bool, int, float or str.
 
     Raises InputError, `name.field = value ...`, for a value of another kind or outside its range.
     """
@@ -49,15 +54,21 @@ def check_parameters(owner: Any, name: str) -> None:
 
 
 def range_text(field: dataclasses.Field[Any]) -> str:
-    """The allowed range of a declared field in words, without its unit: `0 .. 1`, `2 .. 1e+12 or inf`; empty for a
-    switch."""
+    """The allowed range of a declared field in words, without its unit: `0 .. 1`, `2 .. 1e+12 or inf`, `this or that`;
+    empty for a switch."""
+    if field.metadata["choices"]:
+        return " or ".join(field.metadata["choices"])
     bounds, largest = field.metadata["bounds"], field.metadata["largest"]
     if bounds is None:
         return ""
     return f"{bounds[0]:g} .. {bounds[1]:g}" if largest is None else f"{bounds[0]:g} .. {largest:g} or {bounds[1]:g}"
 
 
-def _checked(value: Any, field: dataclasses.Field[Any], place: str) -> bool | int | float:
+def _checked(value: Any, field: dataclasses.Field[Any], place: str) -> bool | int | float | str:
+    if field.metadata["choices"]:
+        if value not in field.metadata["choices"]:
+            raise unknown_name(place, value, field.metadata["choices"])
+        return str(value)
     if isinstance(field.default, bool):
         if not isinstance(value, (bool, np.bool_)):
             raise InputError(f"{place} = {shown(value)} must be true or false")

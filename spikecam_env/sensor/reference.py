@@ -15,14 +15,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from heapq import heappop, heappush
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
-from spikecam_env.sensor.crossing import first_crossing
+from spikecam_env.sensor.crossing import NEVER, first_crossing
 from spikecam_env.sensor.effects.base import Effect, Exposure, having
-from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Segment, ramp
+from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Segment, on_grid, ramp
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 
@@ -83,12 +84,12 @@ def step(
     missed = np.minimum(state.missed, mean)
     state.missed -= missed
     gained = collect(now.unit, mean, dark_grains, missed, state.rng)
-    state.charge += gained
     law = drive.comparators(now, effects, state.memory)
     if law.sway is None:
+        state.charge += gained
         fired = fire(now, effects, state, mean, references(now, effects, state, law)).reshape(now.shape)
     else:
-        fired = fire_within(now, effects, state, mean, gained, law).reshape(now.shape)
+        fired = fire_in_turn(now, effects, state, mean, gained, law).reshape(now.shape)
     for effect in having("spiked", effects):
         charge, rate = thresholds(state.charge, now), thresholds(mean, now)
         charge, state.memory[effect.name] = effect.spiked(charge, fired, rate, now, state.memory[effect.name])
@@ -145,49 +146,98 @@ def fire(
 ) -> NDArray[np.bool_]:
     """Reset every pixel that is at its threshold until none is; returns which fired (P,)."""
     fired = np.zeros(mean.size, dtype=np.bool_)
-    acting = having("after_reset", effects)
     limit = compared_with(state.threshold)
     crossed = np.flatnonzero(state.charge >= limit)
     while crossed.size:
         fired[crossed] = True
-        residual = (state.charge[crossed] - limit[crossed]) / GRAINS
-        for effect in acting:
-            residual = effect.after_reset(residual, mean[crossed] / GRAINS, now)
-            state.missed[crossed] += effect.feedback(now).lost(mean[crossed] / GRAINS) * GRAINS
-        state.charge[crossed] = residual * GRAINS
-        state.threshold[crossed] = draw_threshold(now.unit.kappa[crossed], state.rng)
+        reset(now, effects, state, mean, limit[crossed], crossed)
         limit = compared_with(state.threshold)
         crossed = crossed[state.charge[crossed] >= limit[crossed]]
     return fired
 
 
-def fire_within(
+def fire_in_turn(
     now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array, gained: Array, law: drive.Comparators
 ) -> NDArray[np.bool_]:
-    """As `fire`, where references move within the frame, over which the charge gained (P,) comes evenly."""
+    """As `fire`, in the order of the moments at which pixels are at their references, which may move within the frame.
+
+    The charge gained (P,) comes evenly over the frame.  Each spike kicks its neighbours at its moment (`Feedback`).
+    Charge is put on a grid on which sums are the same in any order.
+    """
+    state.charge, gained = on_grid(state.charge), on_grid(gained)
+    state.charge += gained
+    kick = on_grid(sum(effect.feedback(now).kick_at_once for effect in effects) * GRAINS)
+    at, limits_of = nodes(now, effects, state, law)
+    limits = limits_of(state.threshold)
+    moment, taken = np.full((2, mean.size), NEVER)
+    last, fired = np.full(mean.size, -1.0), np.zeros(mean.size, dtype=np.bool_)
+    turns: list[tuple[float, int]] = []
+
+    def look(pixel: int, since: float) -> None:
+        moment[pixel], of_pixel, charge = NEVER, limits[:, pixel].tolist(), float(state.charge[pixel])
+        if charge < min(of_pixel):
+            return
+        more = float(gained[pixel])
+        moment[pixel], taken[pixel] = first_crossing(charge - more, more, since, at[pixel // now.shape[1]], of_pixel)
+        if moment[pixel] != NEVER:
+            heappush(turns, (moment[pixel], pixel))
+
+    for near in np.flatnonzero(state.charge >= limits.min(axis=0)):
+        look(int(near), 0.0)
+    while turns:
+        u, pixel = heappop(turns)
+        if u != moment[pixel]:
+            continue
+        fired[pixel], last[pixel], before = True, u, state.threshold[pixel]
+        reset(now, effects, state, mean, taken[pixel], np.array([pixel]))
+        state.charge[pixel] = on_grid(state.charge[pixel])
+        if state.threshold[pixel] != before:
+            limits[:, pixel] = limits_of(state.threshold)[:, pixel]
+        look(pixel, u)
+        for other in neighbours(pixel, now.shape) if kick else ():
+            state.charge[other] += kick
+            planned = moment[other], taken[other]
+            look(other, u)
+            if moment[other] == u == last[other]:
+                state.charge[other] -= kick
+                moment[other], taken[other] = planned
+    return fired
+
+
+def nodes(
+    now: Exposure, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
+) -> tuple[list[list[float]], Callable[[Array], Array]]:
+    """Moments of each row at which the references are known, n each, and what thresholds (P,) [grains] are compared
+    with at each (n, P)."""
     sway = law.sway
     assert sway is not None
-    pixels, columns = mean.size, now.shape[1]
-    at = np.broadcast_to(np.repeat(sway.at.T, columns if len(sway.at) > 1 else 1, axis=1), (sway.at.shape[1], pixels))
-    nodes = [(sway.factor[0, :, k, None], sway.common[0, :, k, None]) for k in range(len(at))]
-    fired, since = np.zeros(pixels, dtype=np.bool_), np.zeros(pixels)
-    acting = having("after_reset", effects)
-    left = np.arange(pixels)
-    while left.size:
-        limits = np.stack([compared_with(now, effects, state, law, *node, state.threshold)[left] for node in nodes])
-        begin = state.charge[left] - gained[left]
-        moment, taken = first_crossing(begin, gained[left], since[left], at[:, left], limits)
-        crosses = moment <= 1.0
-        crossed, since[left] = left[crosses], moment
-        fired[crossed] = True
-        residual = (state.charge[crossed] - taken[crosses]) / GRAINS
-        for effect in acting:
-            residual = effect.after_reset(residual, mean[crossed] / GRAINS, now)
-            state.missed[crossed] += effect.feedback(now).lost(mean[crossed] / GRAINS) * GRAINS
-        state.charge[crossed] = residual * GRAINS
-        state.threshold[crossed] = draw_threshold(now.unit.kappa[crossed], state.rng)
-        left = crossed
-    return fired
+    moves = [(sway.factor[0, :, k, None], sway.common[0, :, k, None]) for k in range(sway.at.shape[1])]
+    at = np.broadcast_to(sway.at, (now.shape[0], sway.at.shape[1])).tolist()
+    return at, lambda threshold: np.stack([compared_with(now, effects, state, law, *m, threshold) for m in moves])
+
+
+def neighbours(pixel: int, shape: tuple[int, int]) -> list[int]:
+    """The four pixels beside one; beyond the edge there are none."""
+    row, column = divmod(pixel, shape[1])
+    beside = ((row - 1, column), (row, column - 1), (row, column + 1), (row + 1, column))
+    return [r * shape[1] + c for r, c in beside if 0 <= r < shape[0] and 0 <= c < shape[1]]
+
+
+def reset(
+    now: Exposure,
+    effects: Sequence[Effect],
+    state: ReferenceState,
+    mean: Array,
+    taken: Array | float,
+    pixels: NDArray[np.intp],
+) -> None:
+    """Take that charge [grains] from pixels that fire, and draw their next thresholds; light on a held node is missed."""
+    residual = (state.charge[pixels] - taken) / GRAINS
+    for effect in having("after_reset", effects):
+        residual = effect.after_reset(residual, mean[pixels] / GRAINS, now)
+        state.missed[pixels] += effect.feedback(now).lost(mean[pixels] / GRAINS) * GRAINS
+    state.charge[pixels] = residual * GRAINS
+    state.threshold[pixels] = draw_threshold(now.unit.kappa[pixels], state.rng)
 
 
 def draw_threshold(kappa: Array, rng: np.random.Generator) -> Array:

@@ -16,9 +16,9 @@ from laws import jittered, with_effects
 
 from benchmarks.agreement import compare, observe
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, decay, random_fields
+from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, crossing, decay, random_fields
 from spikecam_env.sensor.effects.base import Array, Charge, Exposure, Spikes, parameter
-from spikecam_env.sensor.kernels import block, block_loop, draws, loop, within
+from spikecam_env.sensor.kernels import block, block_loop, draws, loop
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.random_fields import octave_field, white_field, words
@@ -280,8 +280,8 @@ def test_the_kernel_names_the_decay_that_it_is_compiled_with() -> None:
 
 
 def test_the_kernel_names_the_crossings_that_it_is_compiled_with() -> None:
-    now = zlib.crc32(inspect.getsource(within).encode())
-    assert now == block_loop.WITHIN, f"crossings have changed: write WITHIN = {now:#x} in {block_loop.__file__}"
+    now = zlib.crc32(inspect.getsource(crossing).encode())
+    assert now == block_loop.CROSSING, f"crossings have changed: write CROSSING = {now:#x} in {block_loop.__file__}"
 
 
 def test_kernels_name_the_draws_that_they_are_compiled_with() -> None:

@@ -27,7 +27,7 @@ def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
     for key, f in CATALOGUE[name].__dataclass_fields__.items():
         if key not in parameters:
             continue
-        if isinstance(f.default, bool):
+        if isinstance(f.default, (bool, str)):
             out[key] = parameters[key]
             continue
         low, high = f.metadata["bounds"] or (-np.inf, np.inf)

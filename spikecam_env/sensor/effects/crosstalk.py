@@ -1,11 +1,16 @@
 """Crosstalk: the reset of a pixel couples into its four neighbours.
 
-    charge += k for each neighbour that fired;   uniform light, away from the edge: rate = x / (1 - 4 k)
+    charge += k for each neighbour that fires;   uniform light, away from the edge: rate = x / (1 - 4 k) + O(k^2)
 
-Stage: reset.  Seen in: coincidences of neighbours' spikes at lag 0 and 1; spots of light (a halo).
+when = "at_spike": at the moment of the spike, within the frame: a neighbour that is lifted over its threshold fires at
+that moment, and its reset takes what was too much; pixels that would fire later in the frame do so the earlier.
+when = "frame_end": at the end of the frame, for all that fired in it, and nothing is lost: exactly x / (1 - 4 k).
+
+Stage: reset.  Seen in: coincidences of neighbours' spikes, at lag 0 more and at lag 1 fewer (frame_end: the other way
+round); spots of light (a halo).
 Twins: optical_blur (no coincidence), blooming (only beside saturated pixels).
-Within a frame: at the end of the frame.
-Source: capacitive coupling between nodes, k = C_coupling / C; the kick arrives at the end of the frame by assumption.
+Within a frame: at the crossing; the kick of frame_end at the end of the frame.
+Source: capacitive coupling between nodes, k = C_coupling / C, which acts at once; frame_end is a simulator's short cut.
 """
 
 from __future__ import annotations
@@ -33,13 +38,17 @@ from spikecam_env.sensor.effects.identification import Identification, Needs
 class Crosstalk(Effect):
     kick: float = parameter(0.002, unit="thresholds", bounds=(-0.2, 0.2), doc="charge k to each neighbour a spike")
 
+    when: str = parameter("at_spike", unit="", choices=("at_spike", "frame_end"), doc="when the charge arrives")
+
     stage = Stage.RESET
-    within = Within.END
+    within = Within.CROSSING
     strength = "kick"
     identification = Identification(family="coupling", mixed=True, needs=Needs.STEADY)
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
+        if self.when == "at_spike":
+            return charge, memory
         return charge + self.kick * neighbour_sum(spikes.astype(np.float64)), memory
 
     def feedback(self, first: Exposure) -> Feedback:
-        return Feedback(kick=self.kick)
+        return Feedback(kick_at_once=self.kick) if self.when == "at_spike" else Feedback(kick=self.kick)

@@ -237,7 +237,7 @@ def _block(
         state.crossing,
         spikes,
     )
-    rows = 1 if feedback.kick else now.shape[0]
+    rows = 1 if feedback.kick or feedback.kick_at_once else now.shape[0]
     parts = as_many_as_pay(threads, rows, spikes.size)
     cuts = [now.shape[0] * part // parts for part in range(parts + 1)]
     together([partial(block_loop.advance, top, bottom, *work) for top, bottom in pairwise(cuts)])
@@ -286,5 +286,6 @@ def _sum(feedbacks: Sequence[Feedback]) -> Feedback:
             total.left + one.left,
             one.left_tau if one.left else total.left_tau,
             total.droop + one.droop,
+            total.kick_at_once + one.kick_at_once,
         )
     return total

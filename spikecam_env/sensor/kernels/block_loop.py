@@ -7,7 +7,8 @@
 The same operations in the same order, in float64, so that without noise the bits are the reference's.  With noise the
 electrons still to come are drawn once a spike, as in the jump kernel (`fast`).  No fastmath.
 
-Where references move within the frame, limits are their least, and who reaches that is looked at again (`within`).
+Where references move within the frame, limits are their least, and who reaches that is looked at again (`crossing`).
+Where spikes kick neighbours at once, a frame's spikes are taken in turn (`fire_in_turn`).
 Where nothing moves from frame to frame, or only what single pixels get, a pixel goes from spike to spike instead
 (`jump`).  Charge is held on a grid (`on_grid`) on which sums are exact: so many frames at once are so many one by one.
 
@@ -19,14 +20,16 @@ than to gather, one by one, the few that fired.
 from __future__ import annotations
 
 import math
+from heapq import heappop, heappush
 
 import numpy as np
 
 from spikecam_env.compiled import njit
+from spikecam_env.sensor.crossing import NEVER, first_crossing
 from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
-from spikecam_env.sensor.kernels.within import between, first_crossing, stands
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
+from spikecam_env.sensor.light import on_grid as rounded
 
 BAND = 1024
 """Pixels of a band: what is worked on frame after frame stays in the processor's cache."""
@@ -38,11 +41,13 @@ WORTH, SPARSE = 4, 0.5
 """Frames of a block from which on, and spikes a pixel and frame up to which, going from spike to spike is faster than
 going from frame to frame."""
 
-DRAWS, DECAY, WITHIN = 0x3BD9BCE3, 0xFDEE1FA, 0xAABA32C
+DRAWS, DECAY, CROSSING = 0x3BD9BCE3, 0xFDEE1FA, 0x37EDD6BF
 """Checksums of the draws, the decay and the crossings within a frame compiled in: numba's cache sees a change of this
 file, not of those it imports from."""
 
 decay = njit(inline="always")(decayed)
+on_grid = njit(inline="always")(rounded)
+crossing = njit(nogil=True, error_model="numpy", boundscheck=False)(first_crossing)
 
 _U = np.uint32
 _Q = np.uint64
@@ -59,7 +64,6 @@ _PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _DUE, _AWAKE, _AGAIN, _EXTRA = (
 )  # of 32 bits
 _HIT = 8 * 19 * BAND  # of 8 bits
 _SCRATCH = 20 * BAND
-_ROUNDS = 1.5 * 2.0**32  # added to a number below 2^31 and taken off again, it rounds to 2^-20
 _NONE = 0xFFFFFFFF
 _LEAST = 1e-30  # what arrives where nothing does, to divide by
 _INSIDE = BAND - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
@@ -124,7 +128,8 @@ def advance(  # type: ignore[no-untyped-def]
     charge, threshold: (P,) [grains], fired: (P,) uint32, activity: (H,), crossing: (P,) [frames]; updated.
     spikes: (F, P) uint8, overwritten.  What is not said to be otherwise is float64.
     """
-    kick, left, left_tau, droop = feedback[3:]
+    kick, left, left_tau, droop, at_once = feedback[3:]
+    at_once = on_grid(at_once * _G)
     reset = feedback[:3]
     frames = spikes.shape[0]
     light_moves, dark_moves, field_moves = light.shape[0] > 1, dark.shape[0] > 1, field.shape[0] > 1
@@ -134,13 +139,15 @@ def advance(  # type: ignore[no-untyped-def]
     at_moves, f_moves, f_rolls = at.shape[0] > 1, swayed_factor.shape[0] > 1, swayed_factor.shape[1] > 1
     c_moves, c_rolls = swayed_common.shape[0] > 1, swayed_common.shape[1] > 1
     alone = not moves and not sways and kick == 0.0 and frames >= WORTH
+    whole = kick != 0.0 or at_once != 0.0
     jumps = False
     pieces = (columns + BAND - 1) // BAND
     pitch = (min(columns, BAND) + 7) // 8 * 8
     lines = BAND // pitch
     bands = ((bottom - top) * pieces + lines - 1) // lines
-    together = bands if kick != 0.0 or (droop != 0.0 and pieces > 1) else 1
+    together = bands if whole or (droop != 0.0 and pieces > 1) else 1
     row_of, pixel_of, width_of, slot_of = laid_out(top, bottom, columns, pieces, lines, pitch)
+    lay = np.stack((pixel_of, width_of, np.arange(row_of.size) // lines * _SCRATCH, slot_of))
     scratch = np.zeros((together, _SCRATCH))
     scratch[:, _LIMIT : _LIMIT + BAND] = np.inf  # what fills up a line never fires
     stood = np.empty((together, lines, 5))
@@ -230,6 +237,13 @@ def advance(  # type: ignore[no-untyped-def]
                     break
                 collect(x[_HELD:], x[_ARRIVES:], x[_LIMIT:], used, hit)
                 groups = find_live(hit.view(np.uint64), (used + GROUP - 1) // GROUP, live)
+                if at_once != 0.0:
+                    if t == 0:
+                        groups = (used + GROUP - 1) // GROUP
+                        for g in range(groups):
+                            live[g] = g * GROUP
+                        wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_high)
+                    continue
                 wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_high)
                 if sways and groups:
                     for line in range(begin, end):
@@ -239,7 +253,6 @@ def advance(  # type: ignore[no-untyped-def]
                             words,
                             hit,
                             h0,
-                            n,
                             at[r * at_moves],
                             (swayed_factor[t * f_moves, r * f_rolls], swayed_common[t * c_moves, r * c_rolls]),
                             fields[p0 : p0 + n],
@@ -256,6 +269,10 @@ def advance(  # type: ignore[no-untyped-def]
                     copy(hit[h0 : h0 + n], bits[p0 : p0 + n])
             if jumps:
                 break
+            if at_once != 0.0:
+                waves = swayed_factor[t * f_moves], swayed_common[t * c_moves]
+                loads = 1.0 + droop * activity
+                fire_in_turn(scratch, bits, lay, at, waves, fields, grains_per_mV, loads, at_once, reset, polynomial)
             if kick != 0.0:
                 for r in range(top, bottom):
                     count_neighbours(bits, r, columns, around)
@@ -278,12 +295,6 @@ def advance(  # type: ignore[no-untyped-def]
             copy(x[_PHI + h0 : _PHI + h0 + n], threshold[p0 : p0 + n])
             copy(x[_CROSSED + h0 : _CROSSED + h0 + n], crossing[p0 : p0 + n])
             copy(words[_FIRED + h0 : _FIRED + h0 + n], fired[p0 : p0 + n])
-
-
-@njit(inline="always")
-def on_grid(charge):  # type: ignore[no-untyped-def]
-    """Charge [grains] to 2^-20 of a grain: below 256 thresholds, sums and multiples of such are exact."""
-    return (charge + _ROUNDS) - _ROUNDS
 
 
 @njit(inline="always")
@@ -432,39 +443,126 @@ def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-un
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire_within(x, words, hit, h0, n, at, waves, field, grains_per_mV, load, reset, polynomial):  # type: ignore[no-untyped-def]
+def fire_within(x, words, hit, h0, at, waves, field, grains_per_mV, load, reset, polynomial):  # type: ignore[no-untyped-def]
     """As `fire` and `fire_again`, of a line whose references move within the frame; hit: of those that came near, those
     that fired."""
-    per_root_rate, per_rate, kept = reset
-    whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
-    floats = words.view(np.float32)
-    for i in range(n):
+    limits = np.empty(at.size)
+    for i in range(field.size):
         j = h0 + i
         if hit[j] == 0:
             continue
-        held, gained, phi, since = x[_HELD + j], x[_ARRIVES + j], x[_PHI + j], 0.0
-        hit[j] = 0
+        moment, hit[j] = 0.0, 0
         while True:
-            since, taken, k = first_crossing(
-                held - gained, gained, since, phi, at, waves, field[i], grains_per_mV[i], load
-            )
-            if since > 1.0:
+            of_pixel = at, waves, field[i], grains_per_mV[i], load
+            moment, taken = next_crossing(x, 0, j, moment, of_pixel, limits)
+            if moment == NEVER:
                 break
             hit[j] = 1
-            low = stands(k - 1, _G, waves, field[i], grains_per_mV[i], load)
-            high = stands(k, _G, waves, field[i], grains_per_mV[i], load)
-            stood = between(k, since, at, low, high) if at[k] > at[k - 1] else high
-            held, electrons = on_grid(held - taken), stood * (1.0 / _G)
-            if not whole:
-                held, electrons = after_reset(held, gained / _G, stood, per_root_rate, per_rate, kept)
-            draw = drawn(words[_FIRST + j], words[_SECOND + j], words[_FIRED + j], polynomial)
-            words[_FIRED + j] = _U(words[_FIRED + j] + _U(1))
-            phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], draw)
-            floats[_DRAW + j] = draw
-            x[_ELECTRONS + j] = electrons
-        if hit[j] != 0:
-            x[_HELD + j], x[_PHI + j] = held, phi
-            x[_LIMIT + j] = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
+            spike(x, words, 0, j, moment, taken, of_pixel, reset, polynomial)
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def fire_in_turn(  # type: ignore[no-untyped-def]
+    scratch, bits, lines, at, waves, field, grains_per_mV, loads, kick, reset, polynomial
+):
+    """As `fire_within`, of all lines, in the order of moments: each spike kicks its neighbours [grains] at its own.
+
+    lines: first pixel, width, band and place of each, (4, L) int64; loads: of each.  bits: (P,), overwritten.
+    """
+    x, words, hits = scratch.reshape(-1), scratch.reshape(-1).view(np.uint32), scratch.reshape(-1).view(np.uint8)
+    rows, columns = loads.size, bits.size // loads.size
+    pieces = lines.shape[1] // rows
+    limits = np.empty(at.shape[1])
+    moments, takes, last = np.full(bits.size, NEVER), np.zeros(bits.size), np.full(bits.size, -1.0)
+    turns = [(0.0, 0) for _ in range(0)]
+    bits[:] = 0
+    for line in range(lines.shape[1]):
+        p0, n, o, h0 = lines[:, line]
+        for i in range(n):
+            if hits[8 * o + _HIT + h0 + i] == 0:
+                continue
+            hits[8 * o + _HIT + h0 + i] = 0
+            of_pixel = pixel_law(p0 + i, columns, at, waves, field, grains_per_mV, loads)
+            moments[p0 + i], takes[p0 + i] = next_crossing(x, o, h0 + i, 0.0, of_pixel, limits)
+            if moments[p0 + i] != NEVER:
+                heappush(turns, (moments[p0 + i], p0 + i))
+    while len(turns) > 0:
+        u, p = heappop(turns)
+        if u != moments[p]:
+            continue
+        row, column = p // columns, p % columns
+        o, j = place_of(row, column, pieces, lines)
+        of_pixel = pixel_law(p, columns, at, waves, field, grains_per_mV, loads)
+        bits[p], hits[8 * o + _HIT + j], last[p] = 1, 1, u
+        spike(x, words, o, j, u, takes[p], of_pixel, reset, polynomial)
+        moments[p], takes[p] = next_crossing(x, o, j, u, of_pixel, limits)
+        if moments[p] != NEVER:
+            heappush(turns, (moments[p], p))
+        for down, right in ((-1, 0), (0, -1), (0, 1), (1, 0)):
+            if row + down < 0 or row + down >= rows or column + right < 0 or column + right >= columns:
+                continue
+            q = p + down * columns + right
+            o, j = place_of(row + down, column + right, pieces, lines)
+            of_pixel = pixel_law(q, columns, at, waves, field, grains_per_mV, loads)
+            x[o + _HELD + j] += kick
+            moment, taken = next_crossing(x, o, j, u, of_pixel, limits)
+            if moment == u and last[q] == u:
+                x[o + _HELD + j] -= kick
+                continue
+            moments[q], takes[q] = moment, taken
+            if moment != NEVER:
+                heappush(turns, (moment, q))
+
+
+@njit(inline="always")
+def place_of(row, column, pieces, lines):  # type: ignore[no-untyped-def]
+    """A pixel's band, where its scratch begins, and its place in it."""
+    line = row * pieces + column // BAND
+    return lines[2, line], lines[3, line] + column % BAND
+
+
+@njit(inline="always")
+def pixel_law(p, columns, at, waves, field, grains_per_mV, loads):  # type: ignore[no-untyped-def]
+    """How one pixel's reference moves: nodes, waves (factor, common) there, field, grains_per_mV, load."""
+    row = p // columns
+    factor, common = waves
+    of_row = factor[row if len(factor) > 1 else 0], common[row if len(common) > 1 else 0]
+    return at[row if len(at) > 1 else 0], of_row, field[p], grains_per_mV[p], loads[row]
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def next_crossing(x, o, j, since, of_pixel, limits):  # type: ignore[no-untyped-def]
+    """`crossing.first_crossing` of place j of the scratch that begins at o; limits: (n,), overwritten."""
+    held, gained, phi = x[o + _HELD + j], x[o + _ARRIVES + j], x[o + _PHI + j]
+    if held < x[o + _LIMIT + j]:
+        return NEVER, 0.0
+    at, (factor, common), field, grains_per_mV, load = of_pixel
+    for k in range(at.size):
+        limits[k] = max((phi * factor[k] + grains_per_mV * (common[k] + field)) * load, _TRIPS)
+    return crossing(held - gained, gained, since, at, limits)
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def spike(x, words, o, j, moment, taken, of_pixel, reset, polynomial):  # type: ignore[no-untyped-def]
+    """Reset a pixel that fires at that moment, and draw its next threshold; the law is that of `fire`."""
+    per_root_rate, per_rate, kept = reset
+    at, (factor, common), field, grains_per_mV, load = of_pixel
+    k, w = 1, 2 * o
+    while k < at.size - 1 and at[k] <= moment:
+        k += 1
+    share = (moment - at[k - 1]) / (at[k] - at[k - 1]) if at[k] > at[k - 1] else 1.0
+    low = (_G * factor[k - 1] + grains_per_mV * (common[k - 1] + field)) * load
+    high = (_G * factor[k] + grains_per_mV * (common[k] + field)) * load
+    stands = low + (high - low) * share
+    over, electrons = on_grid(x[o + _HELD + j] - taken), stands * (1.0 / _G)
+    if not (per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0):
+        over, electrons = after_reset(over, x[o + _ARRIVES + j] / _G, stands, per_root_rate, per_rate, kept)
+    draw = drawn(words[w + _FIRST + j], words[w + _SECOND + j], words[w + _FIRED + j], polynomial)
+    phi = needed(electrons, x[o + _NOISE + j], x[o + _JITTER + j], draw)
+    words[w + _FIRED + j] = _U(words[w + _FIRED + j] + _U(1))
+    words.view(np.float32)[w + _DRAW + j] = draw
+    x[o + _ELECTRONS + j], x[o + _HELD + j], x[o + _PHI + j] = electrons, over, phi
+    x[o + _LIMIT + j] = max((phi * x[o + _FACTOR + j] + x[o + _MOVED + j]) * x[o + _LOAD + j], _TRIPS)
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
