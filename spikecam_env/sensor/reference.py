@@ -231,7 +231,7 @@ def reset(
     taken: Array | float,
     pixels: NDArray[np.intp],
 ) -> None:
-    """Take that charge [grains] from pixels that fire, and draw their next thresholds; light on a held node is missed."""
+    """Take that charge [grains] from pixels that fire, and draw their next thresholds; a held node misses light."""
     residual = (state.charge[pixels] - taken) / GRAINS
     for effect in having("after_reset", effects):
         residual = effect.after_reset(residual, mean[pixels] / GRAINS, now)

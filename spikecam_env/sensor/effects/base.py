@@ -201,9 +201,8 @@ class Feedback(NamedTuple):
         residual <- (residual - lost_per_root_rate sqrt(x) - lost_per_rate x) kept
 
     At the moment of a spike each of its four neighbours gets `kick_at_once`, and fires where that is enough, but not
-    twice at one moment: what would make it is lost.  At the end of the frame every pixel gets `kick` for each of its four
-    neighbours that fired, and one that fired gets
-    left (1 - exp(-T/left_tau)), T the interval that has ended.  Thresholds of a row are times 1 + droop a, a the share
+    twice at one moment: what would make it is lost.  At the end of the frame every pixel gets `kick` for each of its
+    four neighbours that fired, and one that fired gets left (1 - exp(-T/left_tau)), T the interval that has ended.  Thresholds of a row are times 1 + droop a, a the share
     of it that fired in the frame before.
     """
 
