@@ -38,7 +38,7 @@ Bits: TypeAlias = NDArray[np.uint8]
 class Mechanism:
     """name: as in limits.toml.  law: one line.  describe: what a right description of it says (outside the catalogue).
 
-    shape: draws every parameter but the strength.
+    shape: draws every parameter but the strength.  signed: the strength has either sign.
     """
 
     name: str
@@ -49,6 +49,7 @@ class Mechanism:
     physics: Callable[[Physics, Camera, int, Parameters, Rng], None] | None = None
     bits: Callable[[Bits, Parameters, Rng], Bits] | None = None
     describe: str = ""
+    signed: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,5 @@ def limits() -> dict[str, Limit]:
 def draw(mechanism: Mechanism, times_limit: float, rng: Rng) -> Hidden:
     """The mechanism at a strength, its other parameters drawn."""
     limit = limits()[mechanism.name]
-    return Hidden(
-        mechanism.name, {limit.parameter: limit.strength(times_limit), **mechanism.shape(rng)}, float(times_limit)
-    )
+    strength = limit.strength(times_limit) * (rng.choice([-1.0, 1.0]) if mechanism.signed else 1.0)
+    return Hidden(mechanism.name, {limit.parameter: float(strength), **mechanism.shape(rng)}, float(times_limit))
