@@ -148,7 +148,8 @@ def _supply_ripple(ph: Physics, camera: Camera, frames: int, p: Parameters, rng:
 
 
 def _clock_feedthrough(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.clock = Clock(p["amplitude_mV"], p["phase"], p["tau"])
+    """Falls by -amplitude_mV."""
+    ph.clock = Clock(-p["amplitude_mV"], p["phase_frames"], frames_of(p["tau_us"]))
 
 
 def _add_rows(ph: Physics, millivolt: Array) -> None:
@@ -361,7 +362,8 @@ CATALOGUE = {
         Mechanism(
             "clock_feedthrough",
             "the reference of all falls at one moment of the array's clock, and recovers",
-            _shape(phase=_between(0.0, 1.0), tau=_between(0.1, 0.4)),
+            _shape(phase_frames=_between(0.0, 1.0), tau_us=_between(2.5, 10.0)),
+            signs=(-1.0,),
             physics=_clock_feedthrough,
         ),
         Mechanism("common_threshold_noise", "one draw a frame for all", physics=_common_threshold_noise),
@@ -405,7 +407,7 @@ CATALOGUE = {
             physics=_blooming,
         ),
         Mechanism("ir_drop", "phi (1 + d a), a: share of the row that fired in the frame before", physics=_ir_drop),
-        Mechanism("readout_skew", "row r is read |s| (1 - r/(H-1)) early, or from the last row on", signed=True, physics=_readout_skew),
+        Mechanism("readout_skew", "row r is read |s| (1 - r/(H-1)) early, or from the last row on", signs=(-1.0, 1.0), physics=_readout_skew),
         Mechanism("missed_spikes", "a spike is not reported", bits=_missed_spikes),
         Mechanism("spurious_spikes", "a report without a spike", bits=_spurious_spikes),
         Mechanism(

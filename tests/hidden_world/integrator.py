@@ -30,6 +30,7 @@ from tests.hidden_world.pixels import (
     Window,
     coast,
     cross,
+    cross_plainly,
     cross_together,
     give,
     lagged,
@@ -45,6 +46,8 @@ Whole = NDArray[np.int64]
 
 BLOCK = 64
 """Frames whose windows are made at once."""
+NO_LAWS = Laws(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+"""A crossing takes the threshold away, and no more."""
 
 
 def _no_events() -> tuple[Array, Whole, Array]:
@@ -125,7 +128,7 @@ class Physics:
     outlier_kappa: float = 0.0
 
     substeps: int = 1
-    """pieces that a frame is cut into at least"""
+    """pieces that a frame is cut into at least, where light moves or sensitivity does"""
     dead: float = 0.0
     delay: float = 0.0
     """c of a delay c / sqrt(x)"""
@@ -201,7 +204,8 @@ class Windows:
         light_moves = bool(self.light) or ph.light_leak is not None
         self.alike = not light_moves and not ph.threshold_waves and ph.edge is None
         within = self.moving_threshold or ph.substeps > 1
-        self.pieces = max(ph.substeps, *(_pieces(w.cycles) for w in ph.threshold_waves), 1, 1)
+        even = ph.substeps if ph.ramp_loss or not ph.light_is_steady else 1
+        self.pieces = max([even, *(_pieces(w.cycles) for w in ph.threshold_waves)])
         self.light_within = light_moves and (within or bool(ph.lags))
         self.first = self.stop = -1
 
@@ -338,6 +342,8 @@ class Recording:
                 near, n, come, window, self.pixels, laws, self.work, to_rows, to_columns, ph.kick_wraps, ph.shape[1],
                 self.random, bits,
             )  # fmt: skip
+        elif not self.windows.moving_threshold and laws == NO_LAWS:  # when in the frame it crosses is all one
+            cross_plainly(near, come, self.pixels, self.random, bits)
         else:
             cross(near, n, come, window, self.pixels, laws, self.work, ph.shape[1], self.random, bits)
         for rows, columns in ph.kick_to if ph.kick and not ph.kick_at_spike else ():

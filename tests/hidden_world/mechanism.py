@@ -38,7 +38,7 @@ Bits: TypeAlias = NDArray[np.uint8]
 class Mechanism:
     """name: as in limits.toml.  law: one line.  describe: what a right description of it says (outside the catalogue).
 
-    shape: draws every parameter but the strength.  signed: the strength has either sign.
+    shape: draws every parameter but the strength.  signs: of the strength.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Mechanism:
     physics: Callable[[Physics, Camera, int, Parameters, Rng], None] | None = None
     bits: Callable[[Bits, Parameters, Rng], Bits] | None = None
     describe: str = ""
-    signed: bool = False
+    signs: tuple[float, ...] = (1.0,)
 
 
 @dataclass(frozen=True)
@@ -92,5 +92,5 @@ def limits() -> dict[str, Limit]:
 def draw(mechanism: Mechanism, times_limit: float, rng: Rng) -> Hidden:
     """The mechanism at a strength, its other parameters drawn."""
     limit = limits()[mechanism.name]
-    strength = limit.strength(times_limit) * (rng.choice([-1.0, 1.0]) if mechanism.signed else 1.0)
+    strength = limit.strength(times_limit) * (rng.choice(mechanism.signs) if len(mechanism.signs) > 1 else mechanism.signs[0])
     return Hidden(mechanism.name, {limit.parameter: float(strength), **mechanism.shape(rng)}, float(times_limit))

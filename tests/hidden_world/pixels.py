@@ -10,7 +10,6 @@ Near its threshold only: a pixel leaps over all cuts that no noise of seven devi
 
 from __future__ import annotations
 
-import heapq
 from typing import NamedTuple
 
 import numpy as np
@@ -77,7 +76,9 @@ class Window(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Pixels under way in a frame: their window's row, piece, moment, charge, what is to come in the piece; (P,) each."""
+    """Pixels under way in a frame, (P,) each: their window's row; the piece, what is to come in it from `begin` to `end`;
+    the moment of their next event, and their seat in the queue of these; the place of a pixel among those near.
+    """
 
     row: Whole
     piece: Whole
@@ -88,7 +89,9 @@ class Work(NamedTuple):
     rest: Array
     kept: Array
     open: Array
-    version: Whole
+    moment: Array
+    queue: Whole
+    seat: Whole
     place: Whole
 
 
@@ -108,8 +111,7 @@ def new_work(pixels: int) -> Work:
     whole, real = (lambda: np.zeros(pixels, np.int64)), (lambda: np.zeros(pixels))
     return Work(
         whole(), whole(), np.zeros(pixels, np.bool_), real(), real(), real(), real(), real(), real(),
-        whole(),
-        np.full(pixels, -1, np.int64),
+        real(), whole(), whole(), np.full(pixels, -1, np.int64),
     )  # fmt: skip
 
 
@@ -122,7 +124,7 @@ NORMAL = _normal_table()
 """Half quantiles of a normal law: the sum of four, picked at random, has variance one and is normal to 1e-3."""
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def _bits(random):
     random[0] += np.uint64(0x9E3779B97F4A7C15)
     z = random[0]
@@ -131,19 +133,19 @@ def _bits(random):
     return z ^ (z >> np.uint64(31))
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def _gauss(random):
     z, low = _bits(random), np.uint64(1023)
     a, b = NORMAL[(z >> np.uint64(54)) & low], NORMAL[(z >> np.uint64(44)) & low]
     return a + b + NORMAL[(z >> np.uint64(34)) & low] + NORMAL[(z >> np.uint64(24)) & low]
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def _uniform(random):
     return (np.float64(_bits(random) >> np.uint64(11)) + 0.5) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def _collected(mean, quiet, random):
     """Charge that arrives as electrons, given its mean."""
     if quiet == 0.0 or mean <= 0.0:
@@ -158,7 +160,7 @@ def _collected(mean, quiet, random):
     return count * quiet
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def steady(pixels, x, random, spikes):
     """All frames of every pixel, one after the other, x (P,) its charge a frame; leaps while far from the threshold."""
     frames, charge, owed, quiet = spikes.shape[0], pixels.charge, pixels.owed, pixels.quiet
@@ -187,7 +189,7 @@ def steady(pixels, x, random, spikes):
         charge[p], pixels.threshold[p] = q, bar
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def coast(pixels, ramp_tau, margin, light, dark, near):
     """Advance pixels that cannot fire in this frame; `near` lists the others, their number is returned."""
     count, left = 0, np.exp(-1.0 / ramp_tau)
@@ -205,7 +207,7 @@ def coast(pixels, ramp_tau, margin, light, dark, near):
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def slow_noise(near, n, slow, slow_at, kept, sd, random, total):
     """Add the slow noise of the pixels `near` in frame n; it moves on over all frames since the last look."""
     for i in range(near.size):
@@ -218,7 +220,7 @@ def slow_noise(near, n, slow, slow_at, kept, sd, random, total):
             total[i] += sd[j] * slow[p, j]
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def give(to, what, factor, rows, columns, wraps):
     """Add factor * what to the pixel so many rows and columns away; beyond the edge on the other side, or nowhere."""
     height, width = what.shape
@@ -233,7 +235,7 @@ def give(to, what, factor, rows, columns, wraps):
                 to[i, j] += factor * what[r, c]
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def window_light(keys, light, start, length, columns, first, mean, tilt):
     """Mean, and half the change over the mean, of light between keys in each row's window [start, start + length).
 
@@ -271,7 +273,7 @@ def window_light(keys, light, start, length, columns, first, mean, tilt):
             tilt[p] = min(max(0.5 * (there - here) / mean[p], -1.0), 1.0) if mean[p] > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def _between(keys, t, first):
     """The key before a time and how far from it to the next, 0 .. 1."""
     k, last = first, keys.size - 1
@@ -282,7 +284,7 @@ def _between(keys, t, first):
     return k, (t - keys[k]) / (keys[k + 1] - keys[k])
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def lagged(x, tilt, late, share, tau, window, rows_of, total):
     """Add to `total` the charge of a late part, share h_tau * x, of this frame; late (P,) is its rate, moved on.
 
@@ -299,7 +301,26 @@ def lagged(x, tilt, late, share, tau, window, rows_of, total):
             late[p] = rate + (late[p] - rate) * kept
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
+def cross_plainly(near, come, pixels, random, bits):
+    """A frame of the pixels `near` within which nothing moves, and a reset only takes the threshold away."""
+    light, dark, stretch, shift = come.light, come.dark, come.stretch, come.shift
+    charge, owed, threshold, quiet = pixels.charge, pixels.owed, pixels.threshold, pixels.quiet
+    for i in range(near.size):
+        p = near[i]
+        x = light[p] + dark[p]
+        q = charge[p] - owed[p] + _collected(owed[p], quiet[p], random) + _collected(x, quiet[p], random)
+        owed[p] = 0.0
+        bar = threshold[p] * stretch[i] + shift[i]
+        while q >= bar:
+            bits[p] = 1
+            q -= bar
+            threshold[p] = 1.0 + pixels.kappa[p] * _gauss(random)
+            bar = threshold[p] * stretch[i] + shift[i]
+        charge[p] = q
+
+
+@njit(cache=True, _nrt=False)
 def cross(near, n, come, window, pixels, laws, work, columns, random, bits):
     """Frame n of the pixels `near`, each by itself."""
     for i in range(near.size):
@@ -316,30 +337,36 @@ def cross(near, n, come, window, pixels, laws, work, columns, random, bits):
         _close(i, p, pixels, work)
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
 def cross_together(near, n, come, window, pixels, laws, work, to_rows, to_columns, wraps, columns, random, bits):
     """Frame n of the pixels `near` in the order of time: each crossing kicks others at once."""
-    height = pixels.charge.size // columns
-    heap = [(0.0, 0, 0)]
-    heap.pop()
+    height, waiting = pixels.charge.size // columns, 0
     for i in range(near.size):
         work.place[near[i]] = i
         _open(i, near[i], pixels, window, work, columns, random)
-    for i in range(near.size):
-        at, _ = _next(i, near[i], come, window, pixels, laws, work, random, bits)
+        at, crosses = _next(i, near[i], come, window, pixels, laws, work, random, bits)
+        work.moment[i] = at + window.start[work.row[i]]
         if at != NEVER:
-            heapq.heappush(heap, (window.start[work.row[i]] + at, i, work.version[i]))
-    while len(heap) > 0:
-        moment, i, version = heapq.heappop(heap)
-        if version != work.version[i]:
-            continue
-        p = near[i]
+            work.seat[i] = waiting
+            work.queue[waiting] = i
+            waiting += 1
+            _rise(work.queue, work.seat, work.moment, waiting - 1)
+    while waiting > 0:
+        i = work.queue[0]
+        p, moment = near[i], work.moment[i]
         at, crosses = _meets(i, p, come, window, pixels, work)
         if crosses:
             _reset(i, p, n, at, come, window, pixels, laws, work, random, bits)
         else:
             _leave_piece(i, work)
-        _plan(heap, i, p, come, window, pixels, laws, work, random, bits)
+        at, _ = _next(i, p, come, window, pixels, laws, work, random, bits)
+        if at == NEVER:
+            waiting -= 1
+            last = work.queue[waiting]
+            work.queue[0], work.seat[last], work.seat[i] = last, 0, -1
+        else:
+            work.moment[i] = at + window.start[work.row[i]]
+        _sink(work.queue, work.seat, work.moment, 0, waiting)
         for k in range(to_rows.size if crosses else 0):
             r, c = p // columns + to_rows[k], p % columns + to_columns[k]
             if wraps:
@@ -351,24 +378,47 @@ def cross_together(near, n, come, window, pixels, laws, work, to_rows, to_column
             if j < 0:
                 pixels.charge[other] += laws.kick
             elif _kicked(j, moment - window.start[work.row[j]], laws.kick, work):
-                _plan(heap, j, other, come, window, pixels, laws, work, random, bits)
+                at, _ = _meets(j, other, come, window, pixels, work)
+                work.moment[j] = at + window.start[work.row[j]]
+                _rise(work.queue, work.seat, work.moment, work.seat[j])
+                _sink(work.queue, work.seat, work.moment, work.seat[j], waiting)
     for i in range(near.size):
         work.place[near[i]] = -1
         _close(i, near[i], pixels, work)
 
 
-@njit(cache=True)
-def _plan(heap, i, p, come, window, pixels, laws, work, random, bits):
-    """Put the pixel's next event into the heap in place of the one that is there."""
-    work.version[i] += 1
-    at, _ = _next(i, p, come, window, pixels, laws, work, random, bits)
-    if at != NEVER:
-        heapq.heappush(heap, (window.start[work.row[i]] + at, i, work.version[i]))
+@njit(cache=True, _nrt=False)
+def _rise(queue, seat, moment, k):
+    """Restore the heap `queue` of pixels by `moment`, that of seat k having become earlier."""
+    i = queue[k]
+    while k > 0 and moment[queue[(k - 1) // 2]] > moment[i]:
+        queue[k] = queue[(k - 1) // 2]
+        seat[queue[k]] = k
+        k = (k - 1) // 2
+    queue[k], seat[i] = i, k
 
 
-@njit(cache=True)
+@njit(cache=True, _nrt=False)
+def _sink(queue, seat, moment, k, size):
+    """Restore the heap `queue` of pixels by `moment`, that of seat k having become later."""
+    if size == 0:
+        return
+    i = queue[k]
+    while 2 * k + 1 < size:
+        below = 2 * k + 1
+        if below + 1 < size and moment[queue[below + 1]] < moment[queue[below]]:
+            below += 1
+        if moment[queue[below]] >= moment[i]:
+            break
+        queue[k] = queue[below]
+        seat[queue[k]] = k
+        k = below
+    queue[k], seat[i] = i, k
+
+
+@njit(inline="always", _nrt=False)
 def _kicked(i, at, kick, work):
-    """Give a pixel charge at a moment of its window; whether its plan changes.  A held node takes none."""
+    """Give a pixel charge at a moment of its window; whether its next event moves.  A held node takes none."""
     if at < work.open[i]:
         return False
     under_way = work.entered[i] and at > work.begin[i]
@@ -381,24 +431,24 @@ def _kicked(i, at, kick, work):
     return work.entered[i]
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _open(i, p, pixels, window, work, columns, random):
     """Begin a window."""
     work.row[i] = p // columns if window.u.shape[0] > 1 else 0
-    work.piece[i], work.entered[i], work.kept[i], work.version[i] = 0, False, 1.0, 0
+    work.piece[i], work.entered[i], work.kept[i] = 0, False, 1.0
     work.open[i] = pixels.blind[p]
     work.charge[i] = pixels.charge[p] + _collected(pixels.owed[p], pixels.quiet[p], random) - pixels.owed[p]
     pixels.owed[p] = 0.0
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _close(i, p, pixels, work):
     """End a window."""
     pixels.charge[p] = work.charge[i]
     pixels.blind[p] = max(work.open[i] - 1.0, 0.0)
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _bar(i, p, side, come, window, pixels, work):
     """The threshold at one end of the pixel's piece."""
     r, s = work.row[i], work.piece[i]
@@ -406,7 +456,7 @@ def _bar(i, p, side, come, window, pixels, work):
     return level + pixels.per_mv[p] * window.millivolt[r, s, side]
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _mean(i, p, come, window, work):
     """Mean charge that comes in the pixel's piece."""
     r, s = work.row[i], work.piece[i]
@@ -415,7 +465,7 @@ def _mean(i, p, come, window, work):
     return max(come.light[p] * light + come.dark[p] * (b - a), 0.0)
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _next(i, p, come, window, pixels, laws, work, random, bits):
     """The moment of the pixel's next crossing, or the end of a piece near its threshold; (NEVER, False) at the end."""
     pieces = window.light.shape[1]
@@ -433,7 +483,7 @@ def _next(i, p, come, window, pixels, laws, work, random, bits):
     return _meets(i, p, come, window, pixels, work)
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _leap(i, p, come, window, pixels, laws, work, random):
     """Pass pieces in which the pixel cannot cross, with one draw of their noise."""
     total = come.light[p] + come.dark[p]
@@ -449,14 +499,14 @@ def _leap(i, p, come, window, pixels, laws, work, random):
     work.charge[i] += _collected(mean, pixels.quiet[p], random)
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _decay_ramp(i, p, window, pixels, laws, work):
     if laws.ramp_loss > 0.0:
         r, s = work.row[i], work.piece[i]
         pixels.ramp[p] *= np.exp(-(window.u[r, s + 1] - window.u[r, s]) / laws.ramp_tau)
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _enter_piece(i, p, come, window, pixels, laws, work, random):
     """Draw what comes between the piece's beginning, or the moment that the node is let go, and its end."""
     r, s = work.row[i], work.piece[i]
@@ -469,14 +519,14 @@ def _enter_piece(i, p, come, window, pixels, laws, work, random):
     work.rest[i] = _collected(mean, pixels.quiet[p], random)
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _leave_piece(i, work):
     work.charge[i] += work.rest[i]
     work.rest[i], work.entered[i] = 0.0, False
     work.piece[i] += 1
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _meets(i, p, come, window, pixels, work):
     """When charge meets the threshold in the pixel's piece, and whether it does (else the piece's end)."""
     r, s = work.row[i], work.piece[i]
@@ -493,7 +543,7 @@ def _meets(i, p, come, window, pixels, work):
     return begin + (end - begin) * now / (now - then), True
 
 
-@njit(cache=True)
+@njit(inline="always", _nrt=False)
 def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
     """A spike at the moment `at`: the cycle begins anew, with what comes after the node is let go."""
     begin, end = work.begin[i], work.end[i]
