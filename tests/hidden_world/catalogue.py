@@ -13,8 +13,8 @@ from scipy.ndimage import convolve1d
 from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light
 from tests.hidden_world.mechanism import Bits, Mechanism, Parameters, Rng
-from tests.hidden_world.waves import Clock, Polygon, Rise, Sine
 from tests.hidden_world.unit import FRAME_S, SWING_V, Camera
+from tests.hidden_world.waves import Clock, Polygon, Rise, Sine
 
 Array = NDArray[np.float64]
 RESET_SUBSTEPS = 4
@@ -148,7 +148,7 @@ def _supply_ripple(ph: Physics, camera: Camera, frames: int, p: Parameters, rng:
 
 
 def _clock_feedthrough(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    """Falls by -amplitude_mV."""
+    """Just after its edge the reference is off by amplitude_mV, below 0 where it falls."""
     ph.clock = Clock(-p["amplitude_mV"], p["phase_frames"], frames_of(p["tau_us"]))
 
 
@@ -407,7 +407,12 @@ CATALOGUE = {
             physics=_blooming,
         ),
         Mechanism("ir_drop", "phi (1 + d a), a: share of the row that fired in the frame before", physics=_ir_drop),
-        Mechanism("readout_skew", "row r is read |s| (1 - r/(H-1)) early, or from the last row on", signs=(-1.0, 1.0), physics=_readout_skew),
+        Mechanism(
+            "readout_skew",
+            "row r is read |s| (1 - r/(H-1)) early, or from the last row on",
+            signs=(-1.0, 1.0),
+            physics=_readout_skew,
+        ),
         Mechanism("missed_spikes", "a spike is not reported", bits=_missed_spikes),
         Mechanism("spurious_spikes", "a report without a spike", bits=_spurious_spikes),
         Mechanism(

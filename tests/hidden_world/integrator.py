@@ -182,7 +182,7 @@ class Physics:
         """What a crossing does."""
         return Laws(
             self.dead, self.delay, self.hold_loss, self.left_fraction, self.left_tau, self.ramp_loss, self.ramp_tau,
-            self.alternate, self.outlier_share, self.outlier_kappa, self.kick,
+            self.alternate, self.outlier_share, self.outlier_kappa, self.kick if self.kick_at_spike else 0.0,
         )  # fmt: skip
 
 
@@ -442,9 +442,7 @@ def _events(events: tuple[Array, Whole, Array], target: Array) -> Callable[[int]
     return upto
 
 
-def _steps(
-    steps: tuple[Array, Whole, Array], early: Array, columns: int, dark: Array
-) -> Callable[[int], Array | None]:
+def _steps(steps: tuple[Array, Whole, Array], early: Array, columns: int, dark: Array) -> Callable[[int], Array | None]:
     """A function of the frame that changes `dark` (P,) by the steps before its end.
 
     It returns what of the frame's charge is too much by, or nothing: a step counts from its moment on.

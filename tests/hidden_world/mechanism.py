@@ -92,5 +92,10 @@ def limits() -> dict[str, Limit]:
 def draw(mechanism: Mechanism, times_limit: float, rng: Rng) -> Hidden:
     """The mechanism at a strength, its other parameters drawn."""
     limit = limits()[mechanism.name]
-    strength = limit.strength(times_limit) * (rng.choice(mechanism.signs) if len(mechanism.signs) > 1 else mechanism.signs[0])
+    strength = limit.strength(times_limit) * _sign(mechanism.signs, rng)
     return Hidden(mechanism.name, {limit.parameter: float(strength), **mechanism.shape(rng)}, float(times_limit))
+
+
+def _sign(signs: tuple[float, ...], rng: Rng) -> float:
+    """One of them; nothing is drawn where there is one only."""
+    return signs[0] if len(signs) == 1 else float(rng.choice(signs))

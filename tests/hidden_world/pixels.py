@@ -3,7 +3,7 @@
 A frame of a pixel is its window from one read-out to the next, 0 <= u <= 1, cut at `Window.u` where something moves
 within it; between two cuts light and threshold are straight lines, charge a Brownian path.
 
-    q >= bar at u_c  ->  spike; q is what came after u_c.  Light that comes while the node is held is lost, with its noise.
+    q >= bar at u_c  ->  spike; q is what came after u_c.  Light that comes while the node is held is lost, noise too.
 
 Near its threshold only: a pixel leaps over all cuts that no noise of seven deviations can make it cross.
 """
@@ -27,8 +27,8 @@ NEVER = 2.0
 class Pixels(NamedTuple):
     """What each pixel remembers, (P,) each.
 
-    charge [thresholds]; owed: mean charge of which the noise has not been drawn; threshold: of this cycle; blind: frames
-    that the node is held from now; late: whether a spike is due when it is let go; last: its last crossing [frames];
+    charge [thresholds]; owed: mean charge of which the noise has not been drawn; threshold: of this cycle; blind:
+    frames that the node is held from now; late: whether a spike is due when it is let go; last: its last crossing;
     ramp: sensitivity lost; parity: of its cycle.
     """
 
@@ -76,8 +76,8 @@ class Window(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Pixels under way in a frame, (P,) each: their window's row; the piece, what is to come in it from `begin` to `end`;
-    the moment of their next event, and their seat in the queue of these; the place of a pixel among those near.
+    """Pixels under way in a frame, (P,) each: their window's row; the piece, what is to come in it from `begin` to
+    `end`; the moment of their next event, and their seat in the queue of these; the place of a pixel among those near.
     """
 
     row: Whole

@@ -36,10 +36,10 @@ class Sine:
     cycles: float
     phase: float
 
-    def value(self, t: Array) -> Array:  # noqa: D102
+    def value(self, t: Array) -> Array:
         return 1.0 + self.amplitude * np.sin(2.0 * np.pi * (self.cycles * t + self.phase))
 
-    def area(self, t: Array) -> Array:  # noqa: D102
+    def area(self, t: Array) -> Array:
         if self.cycles == 0.0:
             return t * self.value(np.zeros(1))[0]
         turns = 2.0 * np.pi * (self.cycles * t + self.phase)
@@ -54,10 +54,10 @@ class Pulses:
     shut: float
     phase: float
 
-    def value(self, t: Array) -> Array:  # noqa: D102
+    def value(self, t: Array) -> Array:
         return ((t + self.phase) % self.period >= self.shut).astype(np.float64)
 
-    def area(self, t: Array) -> Array:  # noqa: D102
+    def area(self, t: Array) -> Array:
         whole, into = np.divmod(t + self.phase, self.period)
         return t - whole * self.shut - np.minimum(into, self.shut)
 
@@ -69,10 +69,10 @@ class Rise:
     rise: float
     tau: float
 
-    def value(self, t: Array) -> Array:  # noqa: D102
+    def value(self, t: Array) -> Array:
         return 1.0 - self.rise * np.expm1(-np.maximum(t, 0.0) / self.tau)
 
-    def area(self, t: Array) -> Array:  # noqa: D102
+    def area(self, t: Array) -> Array:
         gone = np.maximum(t, 0.0)
         return t + self.rise * (gone + self.tau * np.expm1(-gone / self.tau))
 
@@ -85,13 +85,13 @@ class Flashes:
     height: float
     tau: float
 
-    def value(self, t: Array) -> Array:  # noqa: D102
+    def value(self, t: Array) -> Array:
         total = np.zeros(np.shape(t))
         for at in self.at:
             total += np.where(t >= at, self.height * np.exp(-np.maximum(t - at, 0.0) / self.tau), 0.0)
         return total
 
-    def area(self, t: Array) -> Array:  # noqa: D102
+    def area(self, t: Array) -> Array:
         total = np.zeros(np.shape(t))
         for at in self.at:
             total -= self.height * self.tau * np.expm1(-np.maximum(t - at, 0.0) / self.tau)
@@ -106,21 +106,22 @@ class Polygon:
         below = 0.5 * (self.height[1:] + self.height[:-1]) * np.diff(self.time)
         self.below = np.concatenate([[0.0], np.cumsum(below)])
 
-    def value(self, t: Array) -> Array:  # noqa: D102
+    def value(self, t: Array) -> Array:
         return np.interp(t, self.time, self.height)
 
-    def area(self, t: Array) -> Array:  # noqa: D102
+    def area(self, t: Array) -> Array:
         i = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.time) - 1)
         return self.below[i] + 0.5 * (self.height[i] + self.value(t)) * (t - self.time[i])
 
 
 @dataclass(frozen=True)
 class Clock:
-    """A line that falls by `amplitude` at the moment `phase` of every frame and recovers with `tau`, for ever:
+    """A line that falls at the moment `phase` of every frame to -amplitude and recovers with `tau`, for ever:
 
-        c(w) = -amplitude exp(-w / tau) / (1 - exp(-1 / tau)),   w: frames since the last edge
+        c(w) = -amplitude exp(-w / tau),   w: frames since the last edge
 
-    the sum of the tails of all edges so far.  Its jumps are where whoever uses it must cut (`nodes`).
+    the sum of the tails of all edges so far, each of amplitude (1 - exp(-1 / tau)): a square wave through a capacitor.
+    It jumps at the edge: whoever uses it must cut there, and at `nodes` after.
     """
 
     amplitude: float
@@ -135,7 +136,7 @@ class Clock:
 
     def height(self, since: Array) -> Array:
         """Value `since` frames (0 .. 1) after an edge; 1: just before the next one."""
-        return self.amplitude * np.exp(-since / self.tau) / np.expm1(-1.0 / self.tau)
+        return -self.amplitude * np.exp(-since / self.tau)
 
 
 def means(waves: Sequence[Wave], t: Array) -> Array:
