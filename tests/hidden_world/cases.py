@@ -69,11 +69,12 @@ class Counts:
     outside_each: int
     left_out_each: int
     pairs: int
+    clock_pairs: int
     tricky_each: int
     severe_each: int
 
 
-COUNTS = {"full": Counts(60, 3, 2, 2, 3, 1, 30, 2, 1), "quick": Counts(6, 1, 1, 1, 1, 1, 4, 1, 1)}
+COUNTS = {"full": Counts(60, 3, 2, 2, 3, 1, 30, 6, 2, 1), "quick": Counts(6, 1, 1, 1, 1, 1, 4, 1, 1, 1)}
 QUICK_SHARE = 4
 """Of the groups that go through mechanisms, `quick` takes every fourth."""
 
@@ -82,8 +83,8 @@ MILLION = {
     ("quick", "report"): 2,
     ("full", "tune"): 3,
     ("full", "report"): 4,
-    ("quick", "verify"): 5,
-    ("full", "verify"): 10,
+    ("quick", "verify"): 11,
+    ("full", "verify"): 12,
 }
 """Where the seeds of a set and part begin, in millions; `verify` goes on to others once its cases were looked at,
 or the code has changed."""
@@ -135,6 +136,7 @@ def cases(which: str, part: str) -> list[Case]:
     made += [_single("outside", name, next(seeds), 4, 10) for name in outside for _ in range(counts.outside_each)]
     made += [_left_out(name, next(seeds)) for name in left_out for _ in range(counts.left_out_each)]
     made += [_pair(next(seeds)) for _ in range(counts.pairs)]
+    made += [_clock_by_rows(next(seeds)) for _ in range(counts.clock_pairs)]
     made += [trick(next(seeds)) for trick in TRICKY[:: max(1, every // 2)] for _ in range(counts.tricky_each)]
     made += [_single("severe", name, next(seeds), 30, 100) for name in known for _ in range(counts.severe_each)]
     return made
@@ -201,6 +203,15 @@ def _pair(seed: int) -> Case:
     base = "physical" if "excess_threshold_noise" in (first, second) else str(rng.choice(BASE_CAMERAS))
     recipe = Recipe(seed, base, (_drawn(first, 3, 10, rng), _drawn(second, 3, 10, rng)))
     return _case("pair", f"{first} + {second}", recipe, truth=(first, second))
+
+
+def _clock_by_rows(seed: int) -> Case:
+    """One clock, and rows that see it each at another moment of their frame: they are read over most of it."""
+    rng = stream(seed, "case")
+    span = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.6, 1.0))
+    skew = Hidden("readout_skew", {"span": span}, abs(span) / limits()["readout_skew"].limit)
+    recipe = Recipe(seed, str(rng.choice(BASE_CAMERAS)), (_drawn("clock_feedthrough", 3, 10, rng), skew))
+    return _case("pair", "clock_feedthrough + readout_skew", recipe, truth=("clock_feedthrough", "readout_skew"))
 
 
 # ---- tricky

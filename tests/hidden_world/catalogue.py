@@ -14,10 +14,13 @@ from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light
 from tests.hidden_world.mechanism import Bits, Mechanism, Parameters, Rng
 from tests.hidden_world.unit import FRAME_S, SWING_V, Camera
+from tests.hidden_world.waves import Clock, Polygon, Rise, Sine
 
 Array = NDArray[np.float64]
 RESET_SUBSTEPS = 4
-"""Sub-steps of a frame where it matters when in a frame a pixel was reset."""
+"""Pieces of a frame where it matters when in a frame a pixel was reset."""
+LAG_SUBSTEPS = 4
+"""Pieces of a frame in which light that changes is filtered as if it were constant."""
 
 
 def frames_of(us: float) -> float:
@@ -25,23 +28,11 @@ def frames_of(us: float) -> float:
     return us * 1e-6 / FRAME_S
 
 
-def sine(frames: int, frequency_hz: float, cycles: float) -> Array:
-    """(frames,) mean over each frame of sin(2 pi (f t + cycles)), by eight points."""
-    t = (np.arange(8 * frames) + 0.5) / 8.0 * FRAME_S
-    wave = np.sin(2.0 * np.pi * (frequency_hz * t + cycles))
-    return wave.reshape(frames, 8).mean(axis=1)
-
-
-def times(wave: Array | None, factor: Array) -> Array:
-    """A wave with another factor on it."""
-    return factor if wave is None else wave * factor
-
-
-def event_arrays(events: list[tuple[int, int, float]]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Frame, pixel and size of events, in the order of time."""
+def event_arrays(events: list[tuple[float, int, float]]) -> tuple[Array, NDArray[np.int64], Array]:
+    """Time, pixel and size of events, in the order of time."""
     ordered = sorted(events, key=lambda event: event[0])
-    frame, pixel, size = zip(*ordered, strict=True) if ordered else ((), (), ())
-    return np.array(frame, np.int64), np.array(pixel, np.int64), np.array(size, np.float64)
+    time, pixel, size = zip(*ordered, strict=True) if ordered else ((), (), ())
+    return np.array(time, np.float64), np.array(pixel, np.int64), np.array(size, np.float64)
 
 
 def some_pixels(camera: Camera, fraction: float, rng: Rng) -> NDArray[np.int64]:
@@ -54,13 +45,13 @@ def some_pixels(camera: Camera, fraction: float, rng: Rng) -> NDArray[np.int64]:
 
 
 def _lamp_drift(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    walk = np.cumsum(rng.standard_normal(frames)) * p["sigma_per_root_s"] * np.sqrt(FRAME_S)
-    ph.light_wave = times(ph.light_wave, np.maximum(1.0 + walk, 0.0))
+    """Known at whole frames, straight between them."""
+    walk = np.cumsum(rng.standard_normal(frames + 1)) * p["sigma_per_root_s"] * np.sqrt(FRAME_S)
+    ph.light_waves += (Polygon(np.arange(frames + 1), np.maximum(1.0 + walk, 0.0)),)
 
 
 def _light_flicker(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    wave = sine(frames, p["frequency_hz"], rng.random())
-    ph.light_wave = times(ph.light_wave, 1.0 + p["modulation"] * wave)
+    ph.light_waves += (Sine(p["modulation"], p["frequency_hz"] * FRAME_S, rng.random()),)
 
 
 def _optical_blur(light: Light, shape: tuple[int, int], p: Parameters) -> Light:
@@ -90,8 +81,7 @@ def _blooming(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng)
 
 
 def _dark_current_drift(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    t_ms = (np.arange(frames) + 0.5) * FRAME_S * 1e3
-    ph.dark_wave = times(ph.dark_wave, 1.0 + p["rise"] * (1.0 - np.exp(-t_ms / p["tau_ms"])))
+    ph.dark_waves += (Rise(p["rise"], p["tau_ms"] * 1e-3 / FRAME_S),)
 
 
 def _dark_current_tail(camera: Camera, p: Parameters, rng: Rng) -> Camera:
@@ -109,22 +99,22 @@ def _nonlinearity(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: 
 
 
 def _lag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.lags = ((p["fraction"], frames_of(p["tau_us"])),)
+    ph.lags, ph.substeps = ((p["fraction"], frames_of(p["tau_us"])),), max(ph.substeps, LAG_SUBSTEPS)
 
 
 def _telegraph(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    """Each trap leaves its state after exponential times; which pixels have one is in the camera's key."""
+    """Each trap leaves its state after exponential times, at any moment; which pixels have one is in the key."""
     at = some_pixels(camera, p["fraction"], np.random.default_rng(int(p["traps"])))
     dwell = p["dwell_ms"] * 1e-3 / FRAME_S
-    events: list[tuple[int, int, float]] = []
+    events: list[tuple[float, int, float]] = []
     for pixel in at:
         charge = p["amplitude_pA"] * camera.charge_of(1.0).flat[pixel]
         up, time = rng.random() < 0.5, 0.0
         if up:
-            events.append((0, pixel, charge))
+            events.append((-1.0, pixel, charge))  # since before the first window, of whatever row
         while (time := time + rng.exponential(dwell)) < frames:
             up = not up
-            events.append((int(time), pixel, charge if up else -charge))
+            events.append((time, pixel, charge if up else -charge))
     ph.dark_steps = event_arrays(events)
 
 
@@ -154,8 +144,12 @@ def swung(camera: Camera, factor: Array) -> Camera:
 
 
 def _supply_ripple(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    wave = sine(frames, p["frequency_hz"], rng.random())
-    ph.threshold_wave = times(ph.threshold_wave, 1.0 + p["ripple"] * wave)
+    ph.threshold_waves += (Sine(p["ripple"], p["frequency_hz"] * FRAME_S, rng.random()),)
+
+
+def _clock_feedthrough(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    """Just after its edge the reference is off by amplitude_mV, below 0 where it falls."""
+    ph.clock = Clock(-p["amplitude_mV"], p["phase_frames"], frames_of(p["tau_us"]))
 
 
 def _add_rows(ph: Physics, millivolt: Array) -> None:
@@ -192,31 +186,33 @@ def _ir_drop(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) 
 
 
 def _dead_time(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.dead, ph.substeps = frames_of(p["tau_us"]), RESET_SUBSTEPS
+    ph.dead, ph.substeps = frames_of(p["tau_us"]), max(ph.substeps, RESET_SUBSTEPS)
 
 
 def _comparator_delay(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.delay, ph.substeps = frames_of(p["delay_us"]), RESET_SUBSTEPS
+    ph.delay, ph.substeps = frames_of(p["delay_us"]), max(ph.substeps, RESET_SUBSTEPS)
 
 
 def _synchronous_reset(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.hold_loss, ph.substeps = p["fraction"], RESET_SUBSTEPS
+    ph.hold_loss, ph.substeps = p["fraction"], max(ph.substeps, RESET_SUBSTEPS)
 
 
 def _incomplete_reset(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.left_fraction, ph.left_tau, ph.substeps = p["fraction"], frames_of(p["tau_us"]), RESET_SUBSTEPS
+    ph.left_fraction, ph.left_tau = p["fraction"], frames_of(p["tau_us"])
+    ph.substeps = max(ph.substeps, RESET_SUBSTEPS)
 
 
 def _crosstalk(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+    """Capacitive: at the spike (`at_spike` 1); or as if the neighbours took notice at the frame's end."""
     ph.kick, ph.kick_to = p["kick"], ((-1, 0), (1, 0), (0, -1), (0, 1))
+    ph.kick_at_spike = bool(p.get("at_spike", 1.0))
 
 
 # ---- read-out
 
 
 def _clock_jitter(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    edge = frames_of(1e-3 * p["sigma_ns"]) * rng.standard_normal(frames + 1)
-    ph.frame_length = times(ph.frame_length, 1.0 + np.diff(edge))
+    ph.edge = frames_of(1e-3 * p["sigma_ns"]) * rng.standard_normal(frames + 1)
 
 
 def _dead_pixels(camera: Camera, p: Parameters, rng: Rng) -> Camera:
@@ -226,8 +222,9 @@ def _dead_pixels(camera: Camera, p: Parameters, rng: Rng) -> Camera:
 
 
 def _readout_skew(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    rows = camera.shape[0]
-    ph.skew = p["span"] * (1.0 - np.arange(rows) / (rows - 1))
+    """From the first row to the last, which is read at the frame's end; upwards where span is negative."""
+    early = abs(p["span"]) * (1.0 - np.arange(camera.shape[0]) / (camera.shape[0] - 1))
+    ph.skew = early if p["span"] >= 0.0 else early[::-1].copy()
 
 
 def _missed_spikes(bits: Bits, p: Parameters, rng: Rng) -> Bits:
@@ -316,6 +313,16 @@ def _whole(low: int, high: int) -> Callable[[Rng], float]:
     return lambda rng: float(rng.integers(low, high + 1))
 
 
+def _mostly(rng: Rng) -> float:
+    """1 in three cases of four, else 0."""
+    return float(rng.random() < 0.75)
+
+
+def _lines(low: float, high: float) -> Callable[[Rng], float]:
+    """Hertz: in one case of four up to 18 kHz, near half the frame rate, as a switched supply or a dimmed lamp has."""
+    return lambda rng: _log_uniform(low, high)(rng) if rng.random() < 0.75 else _log_uniform(high, 18e3)(rng)
+
+
 def _between(low: float, high: float) -> Callable[[Rng], float]:
     return lambda rng: float(rng.uniform(low, high))
 
@@ -342,15 +349,22 @@ CATALOGUE = {
         Mechanism(
             "light_flicker",
             "L (1 + m sin), the phase new in every recording",
-            _shape(frequency_hz=_log_uniform(100.0, 2000.0)),
+            _shape(frequency_hz=_lines(100.0, 2000.0)),
             physics=_light_flicker,
         ),
         Mechanism("lamp_drift", "L (1 + w), w a random walk", physics=_lamp_drift),
         Mechanism(
             "supply_ripple",
             "phi (1 + rho sin), the phase new in every recording",
-            _shape(frequency_hz=_log_uniform(100.0, 3000.0)),
+            _shape(frequency_hz=_lines(100.0, 3000.0)),
             physics=_supply_ripple,
+        ),
+        Mechanism(
+            "clock_feedthrough",
+            "the reference of all falls at one moment of the array's clock, and recovers",
+            _shape(phase_frames=_between(0.0, 1.0), tau_us=_between(2.5, 10.0)),
+            signs=(-1.0,),
+            physics=_clock_feedthrough,
         ),
         Mechanism("common_threshold_noise", "one draw a frame for all", physics=_common_threshold_noise),
         Mechanism("clock_jitter", "each read-out early or late by itself", physics=_clock_jitter),
@@ -380,7 +394,12 @@ CATALOGUE = {
         Mechanism("column_fixed_pattern", "V_d of a column", camera=_row_or_column_pattern(1)),
         Mechanism("vignetting", "alpha (1 - v r^2/r_corner^2)", camera=_vignetting),
         Mechanism("optical_blur", "light diffuses: heat equation of variance s^2", light=_optical_blur),
-        Mechanism("crosstalk", "a spike kicks its four neighbours, at the end of the frame", physics=_crosstalk),
+        Mechanism(
+            "crosstalk",
+            "a spike kicks its four neighbours, at once; in a quarter of the cases at the end of the frame",
+            _shape(at_spike=_mostly),
+            physics=_crosstalk,
+        ),
         Mechanism(
             "blooming",
             "share of what is beyond `full` goes to four neighbours",
@@ -388,7 +407,12 @@ CATALOGUE = {
             physics=_blooming,
         ),
         Mechanism("ir_drop", "phi (1 + d a), a: share of the row that fired in the frame before", physics=_ir_drop),
-        Mechanism("readout_skew", "row r is read s (1 - r/(H-1)) early", physics=_readout_skew),
+        Mechanism(
+            "readout_skew",
+            "row r is read |s| (1 - r/(H-1)) early, or from the last row on",
+            signs=(-1.0, 1.0),
+            physics=_readout_skew,
+        ),
         Mechanism("missed_spikes", "a spike is not reported", bits=_missed_spikes),
         Mechanism("spurious_spikes", "a report without a spike", bits=_spurious_spikes),
         Mechanism(

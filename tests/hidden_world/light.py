@@ -1,4 +1,4 @@
-"""What the hidden camera is shown: radiance at whole frames, linear between them, constant outside.
+"""What the hidden camera is shown: radiance at keys of any times, linear between them, constant outside.
 
 A plan is a list of recordings; each holds exactly the numbers that its radiance file will hold.
 """
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Light:
-    """key_frame: (K,) float64, whole.  radiance: (K, rows, columns) or (K, 1, 1) float32."""
+    """key_frame: (K,) float64, rising.  radiance: (K, rows, columns) or (K, 1, 1) float32."""
 
     key_frame: NDArray[np.float64]
     radiance: NDArray[np.float32]
@@ -30,6 +30,8 @@ class Shot:
 
 FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
 HOLDOUT_LEVELS = (0.018, 0.13, 0.52)
+EDGE_FRAMES = 0.1
+"""How long an edge of the square wave takes: 2.5 us."""
 
 
 def plan(shape: tuple[int, int], frames: int, rng: np.random.Generator) -> list[Shot]:
@@ -52,13 +54,16 @@ def flat(level: float) -> Light:
 
 
 def square_wave(frames: int, rng: np.random.Generator) -> Light:
-    """Uniform light between two levels, changing within a frame, half period a few hundred frames."""
-    low, high, half = rng.uniform(0.04, 0.1), rng.uniform(0.4, 0.6), int(rng.integers(200, 400))
-    edges = np.arange(half, frames, half)
+    """Uniform light between two levels, half period a few hundred frames, its own clock: edges anywhere in a frame.
+
+    An edge takes a tenth of a frame.
+    """
+    low, high, half = rng.uniform(0.04, 0.1), rng.uniform(0.4, 0.6), rng.uniform(200.0, 400.0)
+    edges = np.arange(half, frames - 1, half)
     frame, value = [0.0], [low]
     for i, edge in enumerate(edges):
         before, after = (low, high) if i % 2 == 0 else (high, low)
-        frame += [float(edge), float(edge + 1)]
+        frame += [float(edge), float(edge + EDGE_FRAMES)]
         value += [before, after]
     return Light(np.array(frame), np.array(value, np.float32)[:, None, None])
 

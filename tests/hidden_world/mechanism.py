@@ -38,7 +38,7 @@ Bits: TypeAlias = NDArray[np.uint8]
 class Mechanism:
     """name: as in limits.toml.  law: one line.  describe: what a right description of it says (outside the catalogue).
 
-    shape: draws every parameter but the strength.
+    shape: draws every parameter but the strength.  signs: of the strength.
     """
 
     name: str
@@ -49,6 +49,7 @@ class Mechanism:
     physics: Callable[[Physics, Camera, int, Parameters, Rng], None] | None = None
     bits: Callable[[Bits, Parameters, Rng], Bits] | None = None
     describe: str = ""
+    signs: tuple[float, ...] = (1.0,)
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,10 @@ def limits() -> dict[str, Limit]:
 def draw(mechanism: Mechanism, times_limit: float, rng: Rng) -> Hidden:
     """The mechanism at a strength, its other parameters drawn."""
     limit = limits()[mechanism.name]
-    return Hidden(
-        mechanism.name, {limit.parameter: limit.strength(times_limit), **mechanism.shape(rng)}, float(times_limit)
-    )
+    strength = limit.strength(times_limit) * _sign(mechanism.signs, rng)
+    return Hidden(mechanism.name, {limit.parameter: float(strength), **mechanism.shape(rng)}, float(times_limit))
+
+
+def _sign(signs: tuple[float, ...], rng: Rng) -> float:
+    """One of them; nothing is drawn where there is one only."""
+    return signs[0] if len(signs) == 1 else float(rng.choice(signs))

@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tests.hidden_world.catalogue import (
+    LAG_SUBSTEPS,
     RESET_SUBSTEPS,
     _between,
     _log_uniform,
@@ -19,12 +20,12 @@ from tests.hidden_world.catalogue import (
     _whole,
     chosen,
     event_arrays,
-    times,
 )
 from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light
 from tests.hidden_world.mechanism import Bits, Mechanism, Parameters, Rng
 from tests.hidden_world.unit import FRAME_S, Camera
+from tests.hidden_world.waves import Flashes, Pulses
 
 # ---- to tune on
 
@@ -36,6 +37,7 @@ def _ping_pong(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng
 def _two_component_lag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
     fast = p["fraction"] * p["fast_share"]
     ph.lags = ((fast, p["fast_frames"]), (p["fraction"] - fast, p["slow_frames"]))
+    ph.substeps = max(ph.substeps, LAG_SUBSTEPS)
 
 
 def _column_clock(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -59,11 +61,9 @@ def _amp_glow(camera: Camera, p: Parameters, rng: Rng) -> Camera:
 
 
 def _shutter(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    """Shut for `closed` of the time, once a period; what of a shut frame is open counts."""
-    period = int(p["period_frames"])
-    shut = p["closed"] * period
-    at = (np.arange(frames) + rng.integers(period)) % period
-    ph.light_wave = times(ph.light_wave, 1.0 - np.clip(shut - at, 0.0, 1.0))
+    """Shut for `closed` of the time, once a period, at any moments."""
+    period = p["period_frames"]
+    ph.light_waves += (Pulses(period, p["closed"] * period, rng.uniform(0.0, period)),)
 
 
 def _even_rows(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -79,14 +79,12 @@ def _array_sag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng
 
 
 def _recovery_ramp(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.ramp_loss, ph.ramp_tau, ph.substeps = p["loss"], p["tau_frames"], RESET_SUBSTEPS
+    ph.ramp_loss, ph.ramp_tau, ph.substeps = p["loss"], p["tau_frames"], max(ph.substeps, RESET_SUBSTEPS)
 
 
 def _flashes(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    leak, t = np.zeros(frames), np.arange(frames)
-    for at in rng.uniform(0, frames, rng.poisson(p["per_second"] * frames * FRAME_S)):
-        leak += np.where(t >= at, p["radiance"] * np.exp(-np.maximum(t - at, 0.0) / p["tau_frames"]), 0.0)
-    ph.light_leak = leak
+    at = rng.uniform(0, frames, rng.poisson(p["per_second"] * frames * FRAME_S))
+    ph.light_leak = Flashes(at, p["radiance"], p["tau_frames"])
 
 
 # ---- to report on
@@ -127,7 +125,7 @@ def _hot_band(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng)
 
 def _streaks(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
     rows, columns = camera.shape
-    hits: list[tuple[int, int, float]] = []
+    hits: list[tuple[float, int, float]] = []
     for _ in range(rng.poisson(p["per_second"] * frames * FRAME_S)):
         frame, angle, length = int(rng.integers(frames)), rng.uniform(0, np.pi), rng.uniform(8, 30)
         along = np.arange(0.0, length, 0.5) - length / 2
@@ -246,7 +244,7 @@ TUNE = {
         Mechanism(
             "duty_cycled_shutter",
             "light shut off for a moment every period",
-            _shape(period_frames=_whole(20, 60)),
+            _shape(period_frames=_between(20.0, 60.0)),
             physics=_shutter,
             describe="light: common, periodic, with harmonics (pulses, not a sine)",
         ),

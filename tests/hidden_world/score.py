@@ -35,7 +35,9 @@ FAMILIES = {
         "dark_current", "dark_current_spread", "dark_current_tail", "dark_current_drift", "hot_pixels",
         "random_telegraph_noise",
     ),
-    "common noise": ("supply_ripple", "common_threshold_noise", "row_temporal_noise", "clock_jitter"),
+    "common noise": (
+        "supply_ripple", "clock_feedthrough", "common_threshold_noise", "row_temporal_noise", "clock_jitter",
+    ),
     "pixel noise": (
         "shot_noise", "reset_noise", "excess_threshold_noise", "frame_threshold_noise", "threshold_flicker_noise",
     ),

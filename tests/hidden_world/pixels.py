@@ -1,0 +1,582 @@
+"""The hidden world's pixel in continuous time, compiled.
+
+A frame of a pixel is its window from one read-out to the next, 0 <= u <= 1, cut at `Window.u` where something moves
+within it; between two cuts light and threshold are straight lines, charge a Brownian path.
+
+    q >= bar at u_c  ->  spike; q is what came after u_c.  Light that comes while the node is held is lost, noise too.
+
+Near its threshold only: a pixel leaps over all cuts that no noise of seven deviations can make it cross.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+NEVER = 2.0
+"""Later than any moment of a window."""
+
+
+class Pixels(NamedTuple):
+    """What each pixel remembers, (P,) each.
+
+    charge [thresholds]; owed: mean charge of which the noise has not been drawn; threshold: of this cycle; blind:
+    frames that the node is held from now; late: whether a spike is due when it is let go; last: its last crossing;
+    ramp: sensitivity lost; parity: of its cycle.
+    """
+
+    charge: Array
+    owed: Array
+    threshold: Array
+    blind: Array
+    late: NDArray[np.uint8]
+    last: Array
+    ramp: Array
+    parity: Whole
+    quiet: Array
+    kappa: Array
+    per_mv: Array
+
+
+class Laws(NamedTuple):
+    """What a crossing does, as in `integrator.Physics`."""
+
+    dead: float
+    delay: float
+    hold_loss: float
+    left_fraction: float
+    left_tau: float
+    ramp_loss: float
+    ramp_tau: float
+    alternate: float
+    outlier_share: float
+    outlier_kappa: float
+    kick: float
+
+
+class Window(NamedTuple):
+    """A frame within: R rows, or 1 for all alike, S pieces.
+
+    start: (R,) its beginning, from the frame's.  u: (R, S + 1) cuts.  light: (R, S) share of the frame's light in
+    each piece.  stretch, millivolt: (R, S, 2) factor on, and addition to, the threshold at both ends of each piece.
+    """
+
+    start: Array
+    u: Array
+    light: Array
+    stretch: Array
+    millivolt: Array
+
+
+class Work(NamedTuple):
+    """Pixels under way in a frame, (P,) each: their window's row; the piece, what is to come in it from `begin` to
+    `end`; the moment of their next event, and their seat in the queue of these; the place of a pixel among those near.
+    """
+
+    row: Whole
+    piece: Whole
+    entered: NDArray[np.bool_]
+    begin: Array
+    end: Array
+    charge: Array
+    rest: Array
+    kept: Array
+    open: Array
+    moment: Array
+    queue: Whole
+    seat: Whole
+    place: Whole
+
+
+class Come(NamedTuple):
+    """What comes in this frame.  light, dark: (P,) charge.  tilt: (P,) half the light's change over its mean.
+    stretch, shift: (P near,) on and to the thresholds, for the whole frame."""
+
+    light: Array
+    tilt: Array
+    dark: Array
+    stretch: Array
+    shift: Array
+
+
+def new_work(pixels: int) -> Work:
+    """Room for so many pixels."""
+    whole, real = (lambda: np.zeros(pixels, np.int64)), (lambda: np.zeros(pixels))
+    return Work(
+        whole(), whole(), np.zeros(pixels, np.bool_), real(), real(), real(), real(), real(), real(),
+        real(), whole(), whole(), np.full(pixels, -1, np.int64),
+    )  # fmt: skip
+
+
+def _normal_table() -> Array:
+    table = ndtri((np.arange(1024) + 0.5) / 1024)
+    return table / table.std() / 2.0
+
+
+NORMAL = _normal_table()
+"""Half quantiles of a normal law: the sum of four, picked at random, has variance one and is normal to 1e-3."""
+
+
+@njit(cache=True, _nrt=False)
+def _bits(random):
+    random[0] += np.uint64(0x9E3779B97F4A7C15)
+    z = random[0]
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@njit(cache=True, _nrt=False)
+def _gauss(random):
+    z, low = _bits(random), np.uint64(1023)
+    a, b = NORMAL[(z >> np.uint64(54)) & low], NORMAL[(z >> np.uint64(44)) & low]
+    return a + b + NORMAL[(z >> np.uint64(34)) & low] + NORMAL[(z >> np.uint64(24)) & low]
+
+
+@njit(cache=True, _nrt=False)
+def _uniform(random):
+    return (np.float64(_bits(random) >> np.uint64(11)) + 0.5) * (1.0 / 9007199254740992.0)
+
+
+@njit(cache=True, _nrt=False)
+def _collected(mean, quiet, random):
+    """Charge that arrives as electrons, given its mean."""
+    if quiet == 0.0 or mean <= 0.0:
+        return mean
+    electrons = mean / quiet
+    if electrons > 16.0:
+        return mean + np.sqrt(mean * quiet) * _gauss(random)
+    limit, product, count = np.exp(-electrons), _uniform(random), 0
+    while product > limit:
+        product *= _uniform(random)
+        count += 1
+    return count * quiet
+
+
+@njit(cache=True, _nrt=False)
+def steady(pixels, x, random, spikes):
+    """All frames of every pixel, one after the other, x (P,) its charge a frame; leaps while far from the threshold."""
+    frames, charge, owed, quiet = spikes.shape[0], pixels.charge, pixels.owed, pixels.quiet
+    for p in range(charge.size):
+        if x[p] <= 0.0:
+            continue
+        q, bar, n = charge[p] + _collected(owed[p], quiet[p], random) - owed[p], pixels.threshold[p], 0
+        owed[p] = 0.0
+        reserve = 0.005 + 7.0 * np.sqrt(quiet[p])
+        many, spread = x[p] > 16.0 * quiet[p], np.sqrt(x[p] * quiet[p])
+        while n < frames:
+            if q + x[p] + reserve < bar:
+                leap = min(int((bar - q - reserve) / x[p]), frames - n)
+                q += _collected(leap * x[p], quiet[p], random)
+                n += leap
+                continue
+            if many:
+                q += x[p] + spread * _gauss(random)
+            else:
+                q += _collected(x[p], quiet[p], random)
+            while q >= bar:
+                spikes[n, p] = 1
+                q -= bar
+                bar = 1.0 + pixels.kappa[p] * _gauss(random)
+            n += 1
+        charge[p], pixels.threshold[p] = q, bar
+
+
+@njit(cache=True, _nrt=False)
+def coast(pixels, ramp_tau, margin, light, dark, near):
+    """Advance pixels that cannot fire in this frame; `near` lists the others, their number is returned."""
+    count, left = 0, np.exp(-1.0 / ramp_tau)
+    charge, ramp = pixels.charge, pixels.ramp
+    for p in range(charge.size):
+        x = light[p] + dark[p]
+        if charge[p] + x < pixels.threshold[p] - margin and pixels.blind[p] == 0.0:
+            come = x * (1.0 - ramp[p] * ramp_tau * (1.0 - left))
+            charge[p] += come
+            pixels.owed[p] += come
+            ramp[p] = ramp[p] * left if ramp[p] > 1e-9 else 0.0
+        else:
+            near[count] = p
+            count += 1
+    return count
+
+
+@njit(cache=True, _nrt=False)
+def slow_noise(near, n, slow, slow_at, kept, sd, random, total):
+    """Add the slow noise of the pixels `near` in frame n; it moves on over all frames since the last look."""
+    for i in range(near.size):
+        p = near[i]
+        gone = min(n - slow_at[p], kept.shape[0] - 1)
+        slow_at[p] = n
+        for j in range(sd.size):
+            k = kept[gone, j]
+            slow[p, j] = k * slow[p, j] + np.sqrt(1.0 - k * k) * _gauss(random)
+            total[i] += sd[j] * slow[p, j]
+
+
+@njit(cache=True, _nrt=False)
+def give(to, what, factor, rows, columns, wraps):
+    """Add factor * what to the pixel so many rows and columns away; beyond the edge on the other side, or nowhere."""
+    height, width = what.shape
+    for r in range(height):
+        for c in range(width):
+            if what[r, c] == 0:
+                continue
+            i, j = r + rows, c + columns
+            if wraps:
+                i, j = i % height, j % width
+            if 0 <= i < height and 0 <= j < width:
+                to[i, j] += factor * what[r, c]
+
+
+@njit(cache=True, _nrt=False)
+def window_light(keys, light, start, length, columns, first, mean, tilt):
+    """Mean, and half the change over the mean, of light between keys in each row's window [start, start + length).
+
+    keys (K,), light (K, P) linear between them; start (rows,).  first: a key at or before all windows, or 0.
+    """
+    last = keys.size - 1
+    for r in range(start.size):
+        a, b = start[r], start[r] + length
+        for p in range(r * columns, (r + 1) * columns):
+            mean[p] = 0.0
+        t, k = a, first
+        while t < b:
+            while k < last and keys[k + 1] <= t:
+                k += 1
+            before, after = t < keys[0], k == last
+            end = b
+            if before:
+                end = min(b, keys[0])
+            elif not after:
+                end = min(b, keys[k + 1])
+            share = (end - t) / length
+            if before or after:
+                for p in range(r * columns, (r + 1) * columns):
+                    mean[p] += share * light[k, p]
+            else:
+                w = (0.5 * (t + end) - keys[k]) / (keys[k + 1] - keys[k])
+                for p in range(r * columns, (r + 1) * columns):
+                    mean[p] += share * (light[k, p] + w * (light[k + 1, p] - light[k, p]))
+            t = end
+        i, v = _between(keys, a, first)
+        j, w = _between(keys, b, first)
+        for p in range(r * columns, (r + 1) * columns):
+            here = light[i, p] + v * (light[min(i + 1, last), p] - light[i, p])
+            there = light[j, p] + w * (light[min(j + 1, last), p] - light[j, p])
+            tilt[p] = min(max(0.5 * (there - here) / mean[p], -1.0), 1.0) if mean[p] > 0.0 else 0.0
+
+
+@njit(cache=True, _nrt=False)
+def _between(keys, t, first):
+    """The key before a time and how far from it to the next, 0 .. 1."""
+    k, last = first, keys.size - 1
+    while k < last and keys[k + 1] <= t:
+        k += 1
+    if k == last or t <= keys[0]:
+        return k, 0.0
+    return k, (t - keys[k]) / (keys[k + 1] - keys[k])
+
+
+@njit(cache=True, _nrt=False)
+def lagged(x, tilt, late, share, tau, window, rows_of, total):
+    """Add to `total` the charge of a late part, share h_tau * x, of this frame; late (P,) is its rate, moved on.
+
+    Within a piece light is constant, and the part relaxes towards it: exact.
+    """
+    pieces = window.light.shape[1]
+    for p in range(x.size):
+        r = rows_of[p]
+        for s in range(pieces):
+            a, b = window.u[r, s], window.u[r, s + 1]
+            rate = x[p] * (window.light[r, s] + tilt[p] * ((b * b - b) - (a * a - a))) / (b - a)
+            kept = np.exp(-(b - a) / tau)
+            total[p] += share * (rate * (b - a) + (late[p] - rate) * tau * (1.0 - kept))
+            late[p] = rate + (late[p] - rate) * kept
+
+
+@njit(cache=True, _nrt=False)
+def cross_plainly(near, come, pixels, random, bits):
+    """A frame of the pixels `near` within which nothing moves, and a reset only takes the threshold away."""
+    light, dark, stretch, shift = come.light, come.dark, come.stretch, come.shift
+    charge, owed, threshold, quiet = pixels.charge, pixels.owed, pixels.threshold, pixels.quiet
+    for i in range(near.size):
+        p = near[i]
+        x = light[p] + dark[p]
+        q = charge[p] - owed[p] + _collected(owed[p], quiet[p], random) + _collected(x, quiet[p], random)
+        owed[p] = 0.0
+        bar = threshold[p] * stretch[i] + shift[i]
+        while q >= bar:
+            bits[p] = 1
+            q -= bar
+            threshold[p] = 1.0 + pixels.kappa[p] * _gauss(random)
+            bar = threshold[p] * stretch[i] + shift[i]
+        charge[p] = q
+
+
+@njit(cache=True, _nrt=False)
+def cross(near, n, come, window, pixels, laws, work, columns, random, bits):
+    """Frame n of the pixels `near`, each by itself."""
+    for i in range(near.size):
+        p = near[i]
+        _open(i, p, pixels, window, work, columns, random)
+        while True:
+            at, crosses = _next(i, p, come, window, pixels, laws, work, random, bits)
+            if at == NEVER:
+                break
+            if crosses:
+                _reset(i, p, n, at, come, window, pixels, laws, work, random, bits)
+            else:
+                _leave_piece(i, work)
+        _close(i, p, pixels, work)
+
+
+@njit(cache=True, _nrt=False)
+def cross_together(near, n, come, window, pixels, laws, work, to_rows, to_columns, wraps, columns, random, bits):
+    """Frame n of the pixels `near` in the order of time: each crossing kicks others at once."""
+    height, waiting = pixels.charge.size // columns, 0
+    for i in range(near.size):
+        work.place[near[i]] = i
+        _open(i, near[i], pixels, window, work, columns, random)
+        at, crosses = _next(i, near[i], come, window, pixels, laws, work, random, bits)
+        work.moment[i] = at + window.start[work.row[i]]
+        if at != NEVER:
+            work.seat[i] = waiting
+            work.queue[waiting] = i
+            waiting += 1
+            _rise(work.queue, work.seat, work.moment, waiting - 1)
+    while waiting > 0:
+        i = work.queue[0]
+        p, moment = near[i], work.moment[i]
+        at, crosses = _meets(i, p, come, window, pixels, work)
+        if crosses:
+            _reset(i, p, n, at, come, window, pixels, laws, work, random, bits)
+        else:
+            _leave_piece(i, work)
+        at, _ = _next(i, p, come, window, pixels, laws, work, random, bits)
+        if at == NEVER:
+            waiting -= 1
+            last = work.queue[waiting]
+            work.queue[0], work.seat[last], work.seat[i] = last, 0, -1
+        else:
+            work.moment[i] = at + window.start[work.row[i]]
+        _sink(work.queue, work.seat, work.moment, 0, waiting)
+        for k in range(to_rows.size if crosses else 0):
+            r, c = p // columns + to_rows[k], p % columns + to_columns[k]
+            if wraps:
+                r, c = r % height, c % columns
+            if not (0 <= r < height and 0 <= c < columns):
+                continue
+            other = r * columns + c
+            j = work.place[other]
+            if j < 0:
+                pixels.charge[other] += laws.kick
+            elif _kicked(j, moment - window.start[work.row[j]], laws.kick, work):
+                at, _ = _meets(j, other, come, window, pixels, work)
+                work.moment[j] = at + window.start[work.row[j]]
+                _rise(work.queue, work.seat, work.moment, work.seat[j])
+                _sink(work.queue, work.seat, work.moment, work.seat[j], waiting)
+    for i in range(near.size):
+        work.place[near[i]] = -1
+        _close(i, near[i], pixels, work)
+
+
+@njit(cache=True, _nrt=False)
+def _rise(queue, seat, moment, k):
+    """Restore the heap `queue` of pixels by `moment`, that of seat k having become earlier."""
+    i = queue[k]
+    while k > 0 and moment[queue[(k - 1) // 2]] > moment[i]:
+        queue[k] = queue[(k - 1) // 2]
+        seat[queue[k]] = k
+        k = (k - 1) // 2
+    queue[k], seat[i] = i, k
+
+
+@njit(cache=True, _nrt=False)
+def _sink(queue, seat, moment, k, size):
+    """Restore the heap `queue` of pixels by `moment`, that of seat k having become later."""
+    if size == 0:
+        return
+    i = queue[k]
+    while 2 * k + 1 < size:
+        below = 2 * k + 1
+        if below + 1 < size and moment[queue[below + 1]] < moment[queue[below]]:
+            below += 1
+        if moment[queue[below]] >= moment[i]:
+            break
+        queue[k] = queue[below]
+        seat[queue[k]] = k
+        k = below
+    queue[k], seat[i] = i, k
+
+
+@njit(inline="always", _nrt=False)
+def _kicked(i, at, kick, work):
+    """Give a pixel charge at a moment of its window; whether its next event moves.  A held node takes none."""
+    if at < work.open[i]:
+        return False
+    under_way = work.entered[i] and at > work.begin[i]
+    if under_way:
+        gone = work.rest[i] * (at - work.begin[i]) / (work.end[i] - work.begin[i])
+        work.charge[i] += gone
+        work.rest[i] -= gone
+        work.begin[i] = at
+    work.charge[i] += kick
+    return work.entered[i]
+
+
+@njit(inline="always", _nrt=False)
+def _open(i, p, pixels, window, work, columns, random):
+    """Begin a window."""
+    work.row[i] = p // columns if window.u.shape[0] > 1 else 0
+    work.piece[i], work.entered[i], work.kept[i] = 0, False, 1.0
+    work.open[i] = pixels.blind[p]
+    work.charge[i] = pixels.charge[p] + _collected(pixels.owed[p], pixels.quiet[p], random) - pixels.owed[p]
+    pixels.owed[p] = 0.0
+
+
+@njit(inline="always", _nrt=False)
+def _close(i, p, pixels, work):
+    """End a window."""
+    pixels.charge[p] = work.charge[i]
+    pixels.blind[p] = max(work.open[i] - 1.0, 0.0)
+
+
+@njit(inline="always", _nrt=False)
+def _bar(i, p, side, come, window, pixels, work):
+    """The threshold at one end of the pixel's piece."""
+    r, s = work.row[i], work.piece[i]
+    level = pixels.threshold[p] * come.stretch[i] * window.stretch[r, s, side] + come.shift[i]
+    return level + pixels.per_mv[p] * window.millivolt[r, s, side]
+
+
+@njit(inline="always", _nrt=False)
+def _mean(i, p, come, window, work):
+    """Mean charge that comes in the pixel's piece."""
+    r, s = work.row[i], work.piece[i]
+    a, b = window.u[r, s], window.u[r, s + 1]
+    light = window.light[r, s] + come.tilt[p] * ((b * b - b) - (a * a - a))
+    return max(come.light[p] * light + come.dark[p] * (b - a), 0.0)
+
+
+@njit(inline="always", _nrt=False)
+def _next(i, p, come, window, pixels, laws, work, random, bits):
+    """The moment of the pixel's next crossing, or the end of a piece near its threshold; (NEVER, False) at the end."""
+    pieces = window.light.shape[1]
+    if not work.entered[i]:
+        if work.piece[i] < pieces and pieces > 1 and laws.ramp_loss == 0.0:
+            _leap(i, p, come, window, pixels, laws, work, random)
+        while work.piece[i] < pieces and work.open[i] >= window.u[work.row[i], work.piece[i] + 1]:
+            _decay_ramp(i, p, window, pixels, laws, work)
+            work.piece[i] += 1
+        if pixels.late[p] and work.open[i] < 1.0:
+            pixels.late[p], bits[p] = 0, 1
+        if work.piece[i] >= pieces:
+            return NEVER, False
+        _enter_piece(i, p, come, window, pixels, laws, work, random)
+    return _meets(i, p, come, window, pixels, work)
+
+
+@njit(inline="always", _nrt=False)
+def _leap(i, p, come, window, pixels, laws, work, random):
+    """Pass pieces in which the pixel cannot cross, with one draw of their noise."""
+    total = come.light[p] + come.dark[p]
+    reserve = 0.005 + 7.0 * np.sqrt(pixels.quiet[p] * total) + 8.0 * abs(laws.kick)
+    mean = 0.0
+    while work.piece[i] < window.light.shape[1] and work.open[i] <= window.u[work.row[i], work.piece[i]]:
+        here = _mean(i, p, come, window, work) * work.kept[i]
+        low = min(_bar(i, p, 0, come, window, pixels, work), _bar(i, p, 1, come, window, pixels, work))
+        if work.charge[i] + mean + here + reserve >= low:
+            break
+        mean += here
+        work.piece[i] += 1
+    work.charge[i] += _collected(mean, pixels.quiet[p], random)
+
+
+@njit(inline="always", _nrt=False)
+def _decay_ramp(i, p, window, pixels, laws, work):
+    if laws.ramp_loss > 0.0:
+        r, s = work.row[i], work.piece[i]
+        pixels.ramp[p] *= np.exp(-(window.u[r, s + 1] - window.u[r, s]) / laws.ramp_tau)
+
+
+@njit(inline="always", _nrt=False)
+def _enter_piece(i, p, come, window, pixels, laws, work, random):
+    """Draw what comes between the piece's beginning, or the moment that the node is let go, and its end."""
+    r, s = work.row[i], work.piece[i]
+    a, b = window.u[r, s], window.u[r, s + 1]
+    work.begin[i], work.end[i], work.entered[i] = max(a, work.open[i]), b, True
+    mean = _mean(i, p, come, window, work) * work.kept[i] * (b - work.begin[i]) / (b - a)
+    if laws.ramp_loss > 0.0:
+        mean *= 1.0 - pixels.ramp[p] * laws.ramp_tau / (b - a) * (1.0 - np.exp(-(b - a) / laws.ramp_tau))
+        _decay_ramp(i, p, window, pixels, laws, work)
+    work.rest[i] = _collected(mean, pixels.quiet[p], random)
+
+
+@njit(inline="always", _nrt=False)
+def _leave_piece(i, work):
+    work.charge[i] += work.rest[i]
+    work.rest[i], work.entered[i] = 0.0, False
+    work.piece[i] += 1
+
+
+@njit(inline="always", _nrt=False)
+def _meets(i, p, come, window, pixels, work):
+    """When charge meets the threshold in the pixel's piece, and whether it does (else the piece's end)."""
+    r, s = work.row[i], work.piece[i]
+    a, begin, end = window.u[r, s], work.begin[i], work.end[i]
+    first, last = _bar(i, p, 0, come, window, pixels, work), _bar(i, p, 1, come, window, pixels, work)
+    if begin >= end:
+        return end, False
+    now = first + (last - first) * (begin - a) / (end - a) - work.charge[i]
+    if now <= 0.0:
+        return begin, True
+    then = last - work.charge[i] - work.rest[i]
+    if then > 0.0:
+        return end, False
+    return begin + (end - begin) * now / (now - then), True
+
+
+@njit(inline="always", _nrt=False)
+def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
+    """A spike at the moment `at`: the cycle begins anew, with what comes after the node is let go."""
+    begin, end = work.begin[i], work.end[i]
+    after = end - at
+    over = max(work.rest[i], 0.0) * after / (end - begin)
+    r, s = work.row[i], work.piece[i]
+    rate = _mean(i, p, come, window, work) / (window.u[r, s + 1] - window.u[r, s])
+    delay = laws.delay / np.sqrt(max(rate, 1e-9)) if laws.delay > 0.0 else 0.0
+    if at + delay < 1.0:
+        bits[p] = 1
+    else:
+        pixels.late[p] = 1
+    held = laws.dead + delay
+    if held > 0.0:
+        if held < after:  # of a Brownian path's piece, given its sum, a part: mean in proportion, variance of a bridge
+            spread = np.sqrt(pixels.quiet[p] * rate * held * (after - held) / after)
+            over = max(over * (1.0 - held / after) + spread * _gauss(random), 0.0)
+        else:
+            over = 0.0
+        work.open[i] = at + held
+    if laws.hold_loss > 0.0 and work.kept[i] == 1.0:
+        work.kept[i] = 1.0 - laws.hold_loss
+        over *= work.kept[i]
+    left = 0.0
+    if laws.left_fraction != 0.0:
+        left = -laws.left_fraction * np.expm1(-(n + at - pixels.last[p]) / laws.left_tau)
+    pixels.last[p] = n + at
+    if laws.ramp_loss > 0.0:
+        pixels.ramp[p] = laws.ramp_loss * np.exp(-after / laws.ramp_tau)
+    work.charge[i], work.rest[i], work.begin[i] = left, over, min(at + held, end)
+    pixels.threshold[p] = 1.0 + pixels.kappa[p] * _gauss(random)
+    if laws.outlier_share > 0.0 and _uniform(random) < laws.outlier_share:
+        pixels.threshold[p] += laws.outlier_kappa * _gauss(random)
+    if laws.alternate != 0.0:
+        pixels.parity[p] ^= 1
+        pixels.threshold[p] += laws.alternate * (pixels.parity[p] - 0.5)
