@@ -32,6 +32,7 @@ class Candidate:
     shape_step: step of a shape's logarithm to take a derivative by: a time constant needs a long one, to show above
     what twins scatter; a level of light from which something begins leads elsewhere by it.
     needs: says what recordings are lacking to see it, or None.
+    acts_through: effects of a model through which it shows in recordings that could not show it by itself.
     experiment: what would distinguish it from others that do the same.
     """
 
@@ -42,6 +43,7 @@ class Candidate:
     square: bool = False
     mixed: bool = False
     needs: Needs = lambda shown: None
+    acts_through: tuple[str, ...] = ()
     only_contrast: bool = False
     random_course: bool = False
     events: bool = False
@@ -164,6 +166,7 @@ _ALL = (
         ("amplitude_mV", "phase_frames", "tau_us"),
         {"phase_frames": (0.1, 0.35, 0.6, 0.85), "tau_us": (2.0, 6.0, 18.0)},
         needs=_steady,
+        shape_step=-0.15,
         experiment="flats whose intervals are whole numbers of frames, and a hundredth more and less",
     ),
     Candidate("threshold_flicker_noise", "noise", ("sigma_mV",), square=True, needs=_steady),
@@ -200,7 +203,14 @@ _ALL = (
     Candidate("optical_blur", "optics", ("sigma_pixels",), square=True, needs=_edges, only_contrast=True),
     Candidate("crosstalk", "coupling", ("kick",), mixed=True, needs=_steady),
     Candidate("blooming", "coupling", ("share", "full"), {"full": (0.75, 0.85, 1.0)}, needs=_bright, shape_step=-0.1),
-    Candidate("readout_skew", "readout", ("span",), needs=_moving, only_contrast=True),
+    Candidate(
+        "readout_skew",
+        "readout",
+        ("span",),
+        needs=_moving,
+        acts_through=("clock_feedthrough", "supply_ripple"),
+        only_contrast=True,
+    ),
     Candidate(
         "missed_spikes", "readout", ("probability",), share=("probability", "spikes"), needs=_steady, events=True
     ),
@@ -281,6 +291,15 @@ def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str
 
 
 def testable(names: Sequence[str], shown: Sequence[Condition]) -> tuple[list[str], list[tuple[str, str]]]:
-    """Candidates that these recordings can reveal, and the others with what each would need."""
-    lacks = [(n, candidate(n).needs(shown)) for n in names]
-    return [n for n, why in lacks if why is None], [(n, why) for n, why in lacks if why is not None]
+    """Candidates that these recordings can reveal, and the others with what each would need; those that act through one
+    that they can reveal are among the first."""
+    lacks = {n: candidate(n).needs(shown) for n in names}
+    reveals = {n for n, why in lacks.items() if why is None}
+    reveals |= {n for n in names if reveals & {*candidate(n).acts_through}}
+    return [n for n in names if n in reveals], [(n, str(why)) for n, why in lacks.items() if n not in reveals]
+
+
+def acting_through(names: Sequence[str], model: SensorModel) -> list[str]:
+    """Of the candidates, those that act through an effect of the model."""
+    has = {e.name for e in model.effects}
+    return [n for n in names if has & {*candidate(n).acts_through}]

@@ -50,8 +50,8 @@ class Observation:
     late: (F,) sum over the `timed` (F,) intervals that end in a frame of what they are longer than the pixel's mean
     [frames], of pixels without short or long ones; scatter: (F,) of the variances of those pixels' intervals.
     odd: (F,) short and long intervals that end in a frame.
-    flips: (P, 2) spikes a frame late with the next one back on time, and a frame early, of pixels whose mean interval is
-    within BESIDE_WHOLE of a whole number; 0 elsewhere.
+    flips: (P, 2) spikes a frame late with the next one back on time, and a frame early, of pixels whose mean interval
+    is within BESIDE_WHOLE of a whole number; 0 elsewhere.
     """
 
     shape: tuple[int, int]

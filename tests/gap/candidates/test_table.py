@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from spikecam_env.gap.candidates.table import CANDIDATES, Candidates, candidate
-from spikecam_env.sensor import CATALOGUE
+from spikecam_env.gap.candidates.table import CANDIDATES, Candidates, acting_through, candidate, testable
+from spikecam_env.gap.observe.conditions import Condition
+from spikecam_env.sensor import CATALOGUE, SensorModel
 
 
 def test_a_candidate_knows_its_name():
@@ -36,3 +37,20 @@ def test_noise_and_what_scatters_is_not_linear_in_its_strength():
     linear = {name for name in CATALOGUE if candidate(name).is_linear}
     assert {"dead_time", "photodiode_lag", "readout_skew"} < linear
     assert not linear & {"crosstalk", "threshold_flicker_noise", "lamp_drift", "missed_spikes", "row_fixed_pattern"}
+
+
+SCENE = Condition("wall", "unknown", 0.2, None, 500, "fit")
+
+
+def test_skew_is_tried_on_a_static_scene_where_the_clock_may_be_in_the_light_or_the_threshold():
+    names = ["clock_feedthrough", "readout_skew", "photodiode_lag"]
+    kept, lacking = testable(names, [SCENE])
+    assert kept == ["clock_feedthrough", "readout_skew"] and [n for n, _ in lacking] == ["photodiode_lag"]
+    assert testable(["dead_time", "readout_skew"], [SCENE])[0] == []
+
+
+def test_skew_acts_through_an_edge_of_the_clock_that_the_model_has():
+    plain = SensorModel.preset("scsim")
+    with_edge = plain.with_effect(CATALOGUE["clock_feedthrough"]())
+    assert acting_through(["readout_skew", "dead_time"], with_edge) == ["readout_skew"]
+    assert acting_through(["readout_skew", "dead_time"], plain) == []
