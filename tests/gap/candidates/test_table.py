@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from spikecam_env.gap.candidates.table import CANDIDATES, Candidates, acting_through, candidate, testable
+from spikecam_env.gap.candidates.table import CANDIDATES, Candidates, acting_through, candidate
+from spikecam_env.gap.candidates.table import testable as split_testable
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
@@ -44,9 +45,9 @@ SCENE = Condition("wall", "unknown", 0.2, None, 500, "fit")
 
 def test_skew_is_tried_on_a_static_scene_where_the_clock_may_be_in_the_light_or_the_threshold():
     names = ["clock_feedthrough", "readout_skew", "photodiode_lag"]
-    kept, lacking = testable(names, [SCENE])
+    kept, lacking = split_testable(names, [SCENE])
     assert kept == ["clock_feedthrough", "readout_skew"] and [n for n, _ in lacking] == ["photodiode_lag"]
-    assert testable(["dead_time", "readout_skew"], [SCENE])[0] == []
+    assert split_testable(["dead_time", "readout_skew"], [SCENE])[0] == []
 
 
 def test_skew_acts_through_an_edge_of_the_clock_that_the_model_has():
