@@ -38,11 +38,16 @@ QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99)
 
 def read_wall(folder: str | Path) -> NDArray[np.uint8]:
     """(T, rows, columns) uint8 spikes of the bare wall."""
+    return np.ascontiguousarray(read_spikes(folder)[:, WALL[0], WALL[1]])
+
+
+def read_spikes(folder: str | Path) -> NDArray[np.uint8]:
+    """(T, 250, 400) uint8 spikes of the wall's recording, moving parts included."""
     path = Path(folder) / "wall.npz"
     spikes = read_arrays(path, ("arr_0",))["arr_0"]
     if spikes.ndim != 3 or spikes.dtype not in (np.uint8, np.int8, np.bool_):
         raise InputError(f"{path}: arr_0 is {spikes.dtype} of shape {spikes.shape}; it must be spikes, time last")
-    return np.ascontiguousarray(np.moveaxis(spikes, 2, 0)[:, WALL[0], WALL[1]])
+    return np.moveaxis(spikes, 2, 0)
 
 
 def read_response_and_dark(folder: str | Path) -> tuple[Array, Array]:

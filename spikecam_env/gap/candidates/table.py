@@ -184,6 +184,17 @@ def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str
 
 
 def testable(names: Sequence[str], shown: Sequence[Condition]) -> tuple[list[str], list[tuple[str, str]]]:
-    """Candidates that these recordings can reveal, and the others with what each would need."""
-    lacks = [(n, LACKING[candidate(n).needs](shown)) for n in names]
-    return [n for n, why in lacks if why is None], [(n, why) for n, why in lacks if why is not None]
+    """Candidates that these recordings can reveal, and the others with what each would need; those that act through one
+    that they can reveal are among the first."""
+    lacks = {n: LACKING[candidate(n).needs](shown) for n in names}
+    reveals = {n for n, why in lacks.items() if why is None}
+    reveals |= {n for n in names if reveals & {*candidate(n).acts_through}}
+    return [n for n in names if n in reveals], [(n, str(why)) for n, why in lacks.items() if n not in reveals]
+
+
+def acting_through(names: Sequence[str], model: SensorModel, shown: Sequence[Condition]) -> list[str]:
+    """Of the candidates that these recordings could not reveal by themselves, those that act through an effect of the
+    model."""
+    has = {e.name for e in model.effects}
+    lacking = [n for n in names if LACKING[candidate(n).needs](shown) is not None]
+    return [n for n in lacking if has & {*candidate(n).acts_through}]

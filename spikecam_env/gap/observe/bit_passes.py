@@ -14,9 +14,12 @@ SPARSE = 0.05
 FEW_LENGTHS = 8
 """Different lengths of a pixel's intervals below which each is counted in its own pass: faster, the same counts."""
 
+BESIDE_WHOLE = 0.04
+"""Distance of a mean interval from a whole number, up to which a pixel's late and early spikes are counted [frames]."""
+
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd):  # type: ignore[no-untyped-def]
+def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd, flips):  # type: ignore[no-untyped-def]
     frames = words.shape[0]
     bits = np.empty((64, (frames + 63) // 64), np.uint64)
     t = np.empty(frames + 1, np.int32)
@@ -64,6 +67,11 @@ def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, 
             # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2
             inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
             moments[p, 0], moments[p, 1] = variance, (products - mean * inner) / (n - 2) + mean * mean
+            whole = np.int32(np.round(mean))
+            if abs(mean - whole) < BESIDE_WHOLE:
+                for i in range(n - 2):
+                    flips[p, 0] += (d[i] == whole + 1) & (d[i + 1] == whole - 1)
+                    flips[p, 1] += (d[i] == whole - 1) & (d[i + 1] == whole + 1)
             below, above = np.int32(np.ceil(0.6 * mean - 1.0)), np.int32(np.floor(1.5 * mean + 1.0))
             short, long = np.int64(0), np.int64(0)
             if least < below or most > above:

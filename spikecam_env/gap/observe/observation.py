@@ -50,6 +50,8 @@ class Observation:
     late: (F,) sum over the `timed` (F,) intervals that end in a frame of what they are longer than the pixel's mean
     [frames], of pixels without short or long ones; scatter: (F,) of the variances of those pixels' intervals.
     odd: (F,) short and long intervals that end in a frame.
+    flips: (P, 2) spikes a frame late with the next one back on time, and a frame early, of pixels whose mean interval
+    is within BESIDE_WHOLE of a whole number; 0 elsewhere.
     """
 
     shape: tuple[int, int]
@@ -69,6 +71,7 @@ class Observation:
     scatter: Array
     timed: NDArray[np.int32]
     odd: NDArray[np.int32]
+    flips: NDArray[np.int32]
 
     @property
     def frames(self) -> int:
@@ -107,9 +110,10 @@ def observe(
     lengths = np.zeros(LENGTHS + 1, np.int64)
     late, scatter = np.zeros((2, len(packed)))
     timed, odd = np.zeros((2, len(packed)), np.int32)
+    flips = np.zeros((pixels, 2), np.int32)
     words = as_words(packed)
     through_pixels(
-        words, np.array(DIFFERENCES), ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd
+        words, np.array(DIFFERENCES), ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd, flips
     )
     by_row = _rows_in_words(packed, shape)
     row = np.zeros((len(packed), shape[0]), np.int32)
@@ -134,6 +138,7 @@ def observe(
         scatter,
         timed,
         odd,
+        flips,
     )
 
 

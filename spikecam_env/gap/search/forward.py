@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.alarm import is_discrepant, with_held_out_motion
+from spikecam_env.gap.candidates.table import acting_through
 from spikecam_env.gap.compare.distance import is_significant, residual, robust_squares
 from spikecam_env.gap.compare.thresholds import TO_ADD, TO_JOIN
 from spikecam_env.gap.fit.candidate import Fit
@@ -24,6 +25,7 @@ from spikecam_env.gap.fit.confirm import TWINS_IN_THE_END, confirmed, with_dark_
 from spikecam_env.gap.fit.gauss_newton import PROBES
 from spikecam_env.gap.fit.joint import Errors, no_smaller, refined_together, simulated_for
 from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.screen.screen import screen
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
@@ -115,6 +117,9 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
     null, seen = here.null, here.seen
     left = [n for n in names if n not in {e.name for e in turn.model.effects}]
     screened = screen(templates, here.case.conditions, null, seen, left, line_of(here.case))
+    if through := acting_through(left, turn.model, here.case.conditions):
+        own = own_templates(here.case, here.model, null, through)
+        screened = sorted([*screened, *screen(own, here.case.conditions, null, seen, through)], key=lambda s: s.misfit)
     distance = np.nan_to_num((seen - null.mean) / null.noise)
     starts = starts_to_fit(screened, robust_squares(distance, null.weight), groups_that_stand_out(null, distance))
     confirm = partial(confirmed, here)

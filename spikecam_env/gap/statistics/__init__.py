@@ -57,6 +57,8 @@ FLOORS: dict[tuple[str, str], float] = {
     ("timing", ""): 0.01,
     ("clock", ""): 0.02,
     ("clock", "whole"): 1.0,
+    ("clock", "late"): 1.0,
+    ("clock", "early"): 1.0,
 }
 """Floors of the statistics' noise, whatever the number of spikes, by group and start of the name.
 

@@ -1,9 +1,11 @@
-"""Whether spikes of a scene follow the read-out's clock: pixels whose interval is nearly a whole number of frames.
+"""Whether spikes of a scene follow the array's clock, band by band of rows: pixels whose interval is nearly whole.
 
-In a camera whose pixels integrate freely, as many pixels lie near a whole interval as light puts there, and their noise
-is that of the others.  Reveals resets and comparators that are coupled to the read-out
-(synchronous_reset in small shares) and, by A_k at several k, noise that is not drawn anew for each spike.  Only scenes
-have every interval in them; flats have too few.
+In a camera whose pixels integrate freely, as many pixels lie near a whole interval as light puts there, their noise
+is that of the others, and a spike comes a frame late as often as early.  A threshold disturbed at one moment of the
+array's frame gathers pixels in every row; rows that are read at that moment show it as late and early spikes, the
+others only by what gathers (clock_feedthrough with readout_skew).  Rows pooled hide it.  A reset coupled to the
+read-out (synchronous_reset in small shares) looks the same in all rows.  A_k at several k, away from whole intervals:
+noise that is not drawn anew for each spike.  Only scenes have every interval in them; flats have too few.
 """
 
 from __future__ import annotations
@@ -12,41 +14,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import ideal_second_difference
-from spikecam_env.gap.observe.observation import DIFFERENCES
+from spikecam_env.gap.observe.bit_passes import BESIDE_WHOLE
+from spikecam_env.gap.observe.observation import DIFFERENCES, Observation
 from spikecam_env.gap.statistics.reading import Reading, root
 
 AT_WHOLE = 0.005
 """Distance of a mean interval from a whole number, up to which a pixel is counted [frames]."""
 
-BESIDE_WHOLE = 0.04
-"""Distance of a mean interval from a whole number, up to which a pixel is below or above it [frames]."""
+LEAST_DIFFERENCES = 5_000
+"""Second differences, at least, that a mean is taken of: its standard error is then some 2 % of the value."""
 
-LEAST_DIFFERENCES = 20_000
-"""Second differences, at least, that a mean is taken of."""
+BAND = 1.2e6
+"""Pixels times frames of a band of rows, at least: at an interval of 5 frames, 8 % of its 240 000 spikes are of pixels
+within BESIDE_WHOLE, 10 000 on either side of a whole interval."""
+
+MOST_BANDS = 10
+"""Bands at most: a disturbance that decays in a quarter of a frame is in two or three of ten."""
 
 
 def statistics(reading: Reading, i: int) -> dict[str, float]:
-    """whole: pixels within AT_WHOLE of a whole mean interval, counted.
+    """whole b: pixels of band b within AT_WHOLE of a whole mean interval, counted; band 0 is at the top.
 
-    A_k below / above / between: mean of A_k less that of an ideal pixel of the same interval, over 2 k [1e-3 frames^2],
-    of pixels within BESIDE_WHOLE of a whole interval on either side, and of all others.
+    late b, early b: of pixels within BESIDE_WHOLE, spikes a frame late (early) with the next one back on time, counted.
+    A_1 below b, A_1 above b: mean of A_1 less that of an ideal pixel of the same interval, over 2 [1e-3 frames^2], of
+    pixels within BESIDE_WHOLE of a whole interval on either side; A_k between: of all others, over 2 k.
     """
     if reading.conditions[i].kind != "unknown":
         return {}
     o = reading.observations[i]
     good = reading.base.live & (o.times.count > 8) & (o.times.rate < 0.8)
-    interval = 1.0 / o.times.rate[good]
-    off = interval - np.round(interval)
-    found = {"whole": root(float((np.abs(off) < AT_WHOLE).sum()))}
-    parts: dict[str, NDArray[np.bool_]] = {
-        "below": (off < 0) & (off > -BESIDE_WHOLE),
-        "above": (off >= 0) & (off < BESIDE_WHOLE),
-        "between": np.abs(off) >= BESIDE_WHOLE,
-    }
-    for j, k in enumerate(DIFFERENCES):
-        terms = o.times.terms[good, j]
-        excess = o.times.square[good, j] - terms * ideal_second_difference(np.array(k), interval)
+    interval = 1.0 / np.where(good, o.times.rate, 1.0)
+    off = np.where(good, interval - np.round(interval), np.inf)
+    ideal = ideal_second_difference(np.array(DIFFERENCES), interval[:, None])
+    excess = o.times.square - o.times.terms * ideal
+    found = {}
+    for b, band in enumerate(bands(o.shape, o.frames)):
+        found[f"whole {b}"] = root(float((band & (np.abs(off) < AT_WHOLE)).sum()))
+        late, early = o.flips[band & good].sum(axis=0)
+        found[f"late {b}"], found[f"early {b}"] = root(float(late)), root(float(early))
+        parts = {"below": (off < 0) & (off > -BESIDE_WHOLE), "above": (off >= 0) & (off < BESIDE_WHOLE)}
         for name, part in parts.items():
-            if terms[part].sum() > LEAST_DIFFERENCES:
-                found[f"A_{k} {name}"] = 1e3 * float(excess[part].sum() / terms[part].sum()) / (2 * k)
+            found |= _mean(o, excess, band & part, 0, f"A_{DIFFERENCES[0]} {name} {b}")
+    for j, k in enumerate(DIFFERENCES):
+        found |= _mean(o, excess, good & (np.abs(off) >= BESIDE_WHOLE), j, f"A_{k} between")
     return found
+
+
+def bands(shape: tuple[int, int], frames: int) -> list[NDArray[np.bool_]]:
+    """(P,) pixels of each band, by equal numbers of rows: as many as BAND allows, MOST_BANDS at most."""
+    rows, columns = shape
+    count = int(np.clip(rows * columns * frames // BAND, 1, min(MOST_BANDS, rows)))
+    band = np.repeat(np.arange(rows) * count // rows, columns)
+    return [band == b for b in range(count)]
+
+
+def _mean(o: Observation, excess: NDArray[np.float64], part: NDArray[np.bool_], j: int, name: str) -> dict[str, float]:
+    terms = o.times.terms[part, j].sum()
+    if terms < LEAST_DIFFERENCES:
+        return {}
+    return {name: 1e3 * float(excess[part, j].sum() / terms) / (2 * DIFFERENCES[j])}

@@ -53,6 +53,7 @@ class ClockFeedthrough(Effect):
         fitted=("amplitude_mV", "phase_frames", "tau_us"),
         shapes={"phase_frames": (0.1, 0.35, 0.6, 0.85), "tau_us": (2.0, 6.0, 18.0)},
         needs=Needs.STEADY,
+        shape_step=-0.15,
         experiment="flats whose intervals are whole numbers of frames, and a hundredth more and less",
     )
 

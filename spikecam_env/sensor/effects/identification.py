@@ -54,6 +54,7 @@ class Identification:
     shape_step: step of a shape's logarithm to take a derivative by: a time constant needs a long one, to show above
     what simulations scatter; a level of light from which something begins leads elsewhere by it.
     needs: recordings without which it cannot be seen.
+    acts_through: effects of a model through which it shows in recordings that could not show it by itself.
     experiment: what would distinguish it from others that do the same.
     """
 
@@ -63,6 +64,7 @@ class Identification:
     square: bool = False
     mixed: bool = False
     needs: Needs = Needs.NOTHING
+    acts_through: tuple[str, ...] = ()
     only_contrast: bool = False
     random_course: bool = False
     events: bool = False

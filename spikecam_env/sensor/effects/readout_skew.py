@@ -37,7 +37,9 @@ class ReadoutSkew(Effect):
     within = Within.INTEGRATED
     strength = "span"
     within_frame = True
-    identification = Identification(family="readout", needs=Needs.MOTION, only_contrast=True)
+    identification = Identification(
+        family="readout", needs=Needs.MOTION, acts_through=("clock_feedthrough", "supply_ripple"), only_contrast=True
+    )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import pytest
 
-from spikecam_env.gap.candidates.table import LACKING, Candidate, Candidates, candidate
-from spikecam_env.sensor import CATALOGUE, Effect, Stage
+from spikecam_env.gap.candidates.table import LACKING, Candidate, Candidates, acting_through, candidate
+from spikecam_env.gap.candidates.table import testable as split_testable
+from spikecam_env.gap.observe.conditions import Condition
+from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, Stage
 from spikecam_env.sensor.effects.base import parameter
 
 
@@ -52,3 +54,20 @@ class _Plain(Effect):
 def test_an_effect_that_declares_nothing_is_fitted_by_its_strength_and_needs_nothing():
     plain = Candidate.of(_Plain)
     assert (plain.fitted, plain.family, plain.power, LACKING[plain.needs](())) == (("level",), "other", 1.0, None)
+
+
+SCENE = Condition("wall", "unknown", 0.2, None, 500, "fit")
+
+
+def test_skew_is_tried_on_a_static_scene_where_the_clock_may_be_in_the_light_or_the_threshold():
+    names = ["clock_feedthrough", "readout_skew", "photodiode_lag"]
+    kept, lacking = split_testable(names, [SCENE])
+    assert kept == ["clock_feedthrough", "readout_skew"] and [n for n, _ in lacking] == ["photodiode_lag"]
+    assert split_testable(["dead_time", "readout_skew"], [SCENE])[0] == []
+
+
+def test_skew_acts_through_an_edge_of_the_clock_that_the_model_has():
+    plain = SensorModel.preset("scsim")
+    with_edge = plain.with_effect(CATALOGUE["clock_feedthrough"]())
+    assert acting_through(["readout_skew", "dead_time"], with_edge, [SCENE]) == ["readout_skew"]
+    assert acting_through(["readout_skew", "dead_time"], plain, [SCENE]) == []

@@ -120,6 +120,27 @@ def test_short_long_and_odd_intervals_are_counted_where_they_end(stream):
     assert np.allclose(o.scatter, scatter, atol=1e-9 * len(stream))
 
 
+def test_late_and_early_spikes_are_counted_near_whole_intervals(stream):
+    """By plain Python, in pixels of a mean interval within 0.04 frames of a whole number."""
+    o = seen(stream)
+    for p, t in enumerate(times_of_pixels(stream)):
+        d = np.diff(t) if t.size >= 4 else np.zeros(0)
+        whole = round(d.mean()) if d.size else 0
+        near = d.size > 0 and abs(d.mean() - whole) < 0.04
+        late = sum(a == whole + 1 and b == whole - 1 for a, b in pairwise(d)) if near else 0
+        early = sum(a == whole - 1 and b == whole + 1 for a, b in pairwise(d)) if near else 0
+        assert tuple(o.flips[p]) == (late, early)
+
+
+@pytest.mark.parametrize("flip, expected", [(1, (1, 0)), (-1, (0, 1))])
+def test_one_spike_a_frame_off_is_late_or_early(flip, expected):
+    spikes = np.zeros((100, 1, 1), np.uint8)
+    times = np.arange(3, 100, 5)
+    times[7] += flip
+    spikes[times] = 1
+    assert tuple(seen(spikes).flips[0]) == expected
+
+
 def test_intervals_are_counted_by_length_one_frame_first(stream):
     o = seen(stream)
     d = np.concatenate([np.diff(t) for t in times_of_pixels(stream)])
