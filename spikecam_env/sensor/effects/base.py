@@ -202,8 +202,8 @@ class Feedback(NamedTuple):
 
     At the moment of a spike each of its four neighbours gets `kick_at_once`, and fires where that is enough, but not
     twice at one moment: what would make it is lost.  At the end of the frame every pixel gets `kick` for each of its
-    four neighbours that fired, and one that fired gets left (1 - exp(-T/left_tau)), T the interval that has ended.  Thresholds of a row are times 1 + droop a, a the share
-    of it that fired in the frame before.
+    four neighbours that fired, and one that fired gets left (1 - exp(-T/left_tau)), T the interval that has ended.
+    Thresholds of a row are times 1 + droop a, a the share of it that fired in the frame before.
     """
 
     lost_per_root_rate: float = 0.0
