@@ -45,7 +45,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.errors import unknown_name
+from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.ranges import parameter as parameter
 from spikecam_env.sensor.unit import PixelArray, Unit
@@ -54,6 +54,9 @@ Array = NDArray[np.float64]
 Field = NDArray[np.float32]
 Spikes = NDArray[np.bool_]
 
+
+MOST_INTERVALS = 1024
+"""Parts of a frame at most: 32 periods of a sine."""
 
 A_CYCLE = 32
 """Parts of a period of a sine that are taken as linear: within (2 pi / 32)^2 / 8, half a per cent of its amplitude."""
@@ -172,8 +175,8 @@ class Feedback(NamedTuple):
         residual <- (residual - lost_per_root_rate sqrt(x) - lost_per_rate x) kept
 
     At the moment of a spike each of its four neighbours gets `kick_at_once`, and fires where that is enough, but not
-    twice at one moment: what would make it is lost.  At the end of the frame every pixel gets `kick` for each of its four
-    neighbours that fired, and one that fired gets
+    twice at one moment: what would make it is lost.  At the end of the frame every pixel gets `kick` for each of its
+    four neighbours that fired, and one that fired gets
     left (1 - exp(-T/left_tau)), T the interval that has ended.  Thresholds of a row are times 1 + droop a, a the share
     of it that fired in the frame before.
     """
@@ -256,8 +259,9 @@ class Effect:
         """How the comparators' reference moves in these frames, and the memory."""
         return Shift(), memory
 
-    def intervals(self, first: Exposure) -> int:
-        """Parts of a frame, in each of which the reference moves by `sway` as if linearly; 0: not within a frame."""
+    def intervals(self, frame_rate_hz: float) -> int:
+        """Parts of a frame in each of which the reference moves by `sway` as if linearly, at most MOST_INTERVALS; 0 where
+        it does not move within a frame."""
         return 0
 
     def kinks(self, first: Exposure) -> tuple[float, ...]:
@@ -316,6 +320,18 @@ def neighbour_sum(values: Array) -> Array:
     total[..., :, 1:] += values[..., :, :-1]
     total[..., :, :-1] += values[..., :, 1:]
     return total
+
+
+def check_intervals(effects: Sequence[Effect], frame_rate_hz: float) -> None:
+    """Raise InputError for a reference that moves too fast within a frame."""
+    for effect in effects:
+        parts = effect.intervals(frame_rate_hz)
+        if parts > MOST_INTERVALS:
+            raise InputError(
+                f"{effect.name} moves the reference too fast: a frame of {1e6 / frame_rate_hz:g} us would be cut into "
+                f"{parts} parts; at most {MOST_INTERVALS} are allowed (32 periods of a sine); lower its frequency, "
+                "lengthen its time constant, or raise frame_rate_hz"
+            )
 
 
 def build(catalogue: dict[str, type[Effect]], name: str, parameters: dict[str, Any]) -> Effect:

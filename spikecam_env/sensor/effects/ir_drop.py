@@ -7,8 +7,8 @@ Stage: threshold.  Seen in: dim pixels beside bright ones in the same row; on fl
 Pixels of a row that are exactly alike and free of noise fall into step (pulse-coupled oscillators).
 Twins: photo_response_nonlinearity (inseparable on flats), row_temporal_noise, blooming (neighbours, not rows).
 Source: resistance of the supply grid; first order in the current.  The load is that of the frame before, by
-assumption: a sample of one frame's spikes, one frame late.  In light that stays over T frames the mean rate is exact; where a row's
-activity changes by da from frame to frame the threshold is off by d da, 1 % where d = 0.2 and da = 0.05.
+assumption: a sample of one frame's spikes, one frame late.  In steady light the mean rate is that of the law; where a
+row's activity changes by da from one frame to the next the threshold is off by d da: 1 % at d = 0.2 and da = 0.05.
 """
 
 from __future__ import annotations
