@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Field, Spikes, having
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.sensor.model import generator
@@ -20,9 +19,6 @@ from spikecam_env.sensor.model import generator
 Memory = dict[str, Any]
 """What each effect remembers, by its name."""
 
-
-MOST_INTERVALS = 1024
-"""Parts of a frame at most: 32 periods of a sine."""
 
 _TOUCHES = 1e-9
 """A kink that near to the end of a part [frames] is there: rounding would leave it on either side."""
@@ -60,25 +56,12 @@ def begin(first: Exposure, effects: Sequence[Effect], seed: int, unit_seed: int 
     """What each effect remembers at the first frame.
 
     Each has generators of its own: adding or removing one leaves the draws of the others as they were.
-    Raises InputError for a reference that moves too fast within a frame.
     """
-    _check_intervals(first, effects)
     of_unit = seed if unit_seed is None else unit_seed
     return {
         e.name: e.begin(first, generator(of_unit, f"{e.name}: unit"), generator(seed, f"{e.name}: temporal"))
         for e in effects
     }
-
-
-def _check_intervals(first: Exposure, effects: Sequence[Effect]) -> None:
-    for effect in effects:
-        parts = effect.intervals(first)
-        if parts > MOST_INTERVALS:
-            raise InputError(
-                f"{effect.name} moves the reference too fast: a frame of {1e6 / first.frame_rate_hz:g} us would be cut "
-                f"into {parts} parts; {MOST_INTERVALS} are allowed (32 periods of a sine): lower its frequency, "
-                "lengthen its time constant, or raise frame_rate_hz"
-            )
 
 
 def expected_charge(
@@ -111,7 +94,7 @@ def wants_rise(effects: Sequence[Effect]) -> bool:
 def intervals(first: Exposure, effects: Sequence[Effect]) -> int:
     """Parts of a frame between the nodes of `Sway`; 0 where no reference moves and nobody is kicked within a frame."""
     kicked = any(effect.feedback(first).kick_at_once for effect in effects)
-    return max((effect.intervals(first) for effect in effects), default=0) or int(kicked)
+    return max((effect.intervals(first.frame_rate_hz) for effect in effects), default=0) or int(kicked)
 
 
 def lead(first: Exposure, effects: Sequence[Effect]) -> Array:
@@ -150,7 +133,7 @@ def _sway(now: Exposure, effects: Sequence[Effect], factor: Array, common: Array
     parts = intervals(now, effects)
     if parts == 0:
         return None
-    swaying = [effect for effect in effects if effect.intervals(now)]
+    swaying = [effect for effect in effects if effect.intervals(now.frame_rate_hz)]
     early = lead(now, effects)
     at = _nodes(parts, [kink for effect in swaying for kink in effect.kinks(now)], early)
     early = early if early.any() else np.zeros((1, 1))

@@ -16,7 +16,7 @@ from pydantic import ConfigDict, Field
 
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor.effects import CATALOGUE, Effect
-from spikecam_env.sensor.effects.base import build
+from spikecam_env.sensor.effects.base import build, check_intervals
 from spikecam_env.sensor.own_effects import files_of
 from spikecam_env.sensor.ranges import check_parameters, parameter
 from spikecam_env.sensor.unit import Circuit, PixelArray, Unit, firing_law
@@ -51,7 +51,8 @@ class SensorModel:
     """What kind of camera: circuit, frame rate and effects, in physical order whatever order they are given in.
 
     Raises InputError for a frame rate outside its range, an effect listed twice, and where what effects do together
-    leaves no sensor: spreads or noise as large as what they spread.
+    leaves no sensor: spreads or noise as large as what they spread.  So it does for a reference that moves too fast
+    within a frame.
 
     >>> SensorModel.preset("scsim").without("shot_noise").effects[0].name
     'conversion_gain_spread'
@@ -69,6 +70,7 @@ class SensorModel:
         if not isinstance(self.circuit, Circuit):
             raise InputError(f"circuit = {shown(self.circuit)}; it must be a Circuit")
         object.__setattr__(self, "effects", _in_physical_order(self.effects))
+        check_intervals(self.effects, self.frame_rate_hz)
         alike = np.random.default_rng(0)
         self._pixels((1, 1), lambda _: alike).check()
 

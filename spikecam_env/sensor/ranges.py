@@ -66,7 +66,7 @@ def range_text(field: dataclasses.Field[Any]) -> str:
 
 def _checked(value: Any, field: dataclasses.Field[Any], place: str) -> bool | int | float | str:
     if field.metadata["choices"]:
-        if value not in field.metadata["choices"]:
+        if not isinstance(value, str) or value not in field.metadata["choices"]:
             raise unknown_name(place, value, field.metadata["choices"])
         return str(value)
     if isinstance(field.default, bool):

@@ -15,13 +15,15 @@ import numpy as np
 import pytest
 from laws import with_effects
 
+from spikecam_env.cli.named import named
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Circuit, Effect, SensorModel, SpikeSensor
 
 DECLARED: dict[str, type[Any]] = {"circuit": Circuit, **CATALOGUE}
 EVERY_FIELD = [(name, f) for name, cls in DECLARED.items() for f in fields(cls)]
 FIELD_NAMES = [f"{name}.{f.name}" for name, f in EVERY_FIELD]
-SWITCHES = [(name, f) for name, f in EVERY_FIELD if f.metadata["bounds"] is None]
+CHOICES = [(name, f) for name, f in EVERY_FIELD if f.metadata["choices"]]
+SWITCHES = [(name, f) for name, f in EVERY_FIELD if f.metadata["bounds"] is None and not f.metadata["choices"]]
 NUMBERS = [(name, f) for name, f in EVERY_FIELD if f.metadata["bounds"] is not None]
 
 NO_NUMBERS = ["1", b"1", None, True, False, np.True_, [0.3], np.array(0.3), np.array([0.3]), 1j, Decimal(1), object()]
@@ -62,6 +64,21 @@ def test_a_switch_is_true_or_false(declared: tuple[str, Field[Any]]) -> None:
         with pytest.raises(InputError, match=rf"{name}\.{f.name} = .* must be true or false"):
             DECLARED[name](**{f.name: bad})
     assert getattr(DECLARED[name](**{f.name: np.False_}), f.name) is False
+
+
+@pytest.mark.parametrize("declared", CHOICES, ids=names)
+def test_a_choice_is_one_of_its_names_and_is_written_and_read(declared: tuple[str, Field[Any]], tmp_path) -> None:
+    name, f = declared
+    for bad in ("", "never", f.default.upper(), 0, 1.0, None, True, [f.default], np.array([f.default, f.default])):
+        with pytest.raises(
+            InputError, match=rf"unknown {name}\.{f.name} .*; choose one of {sorted(f.metadata['choices'])[0]}"
+        ):
+            DECLARED[name](**{f.name: bad})
+    for good in f.metadata["choices"]:
+        model = with_effects("ideal", CATALOGUE[name](**{f.name: good}))
+        model.to_toml(tmp_path / "model.toml")
+        assert SensorModel.from_toml(tmp_path / "model.toml") == model
+        assert named(f"{name}:{f.name}={good}", CATALOGUE, "effect") == model.effects[-1]
 
 
 def test_numbers_are_kept_plain_so_that_models_compare_and_write() -> None:
@@ -143,7 +160,9 @@ def check_engines_agree(model: SensorModel, seed: int = 0) -> None:
     assert abs(off.mean()) < 5.0 * error, f"rates differ by {off.mean():.2g} +- {error:.2g}: {model}"
 
 
-def ends(f: Field[Any]) -> list[float]:
+def ends(f: Field[Any]) -> list[Any]:
+    if f.metadata["choices"]:
+        return list(f.metadata["choices"])
     if f.metadata["bounds"] is None:
         return [False, True]
     return [*f.metadata["bounds"], *([] if f.metadata["largest"] is None else [f.metadata["largest"]])]
@@ -161,6 +180,9 @@ def drawn(rng: np.random.Generator, name: str) -> Effect:
     """An effect with every parameter at an end of its range or anywhere inside."""
     values: dict[str, Any] = {}
     for f in fields(CATALOGUE[name]):
+        if f.metadata["choices"]:
+            values[f.name] = str(rng.choice(f.metadata["choices"]))
+            continue
         low, *others = ends(f)
         high = min(others[-1], 1e15)
         inside = low + (high - low) * rng.random() ** 4

@@ -45,7 +45,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.errors import unknown_name
+from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.effects.identification import Identification
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.ranges import parameter as parameter
@@ -56,6 +56,9 @@ Array = NDArray[np.float64]
 Field = NDArray[np.float32]
 Spikes = NDArray[np.bool_]
 
+
+MOST_INTERVALS = 1024
+"""Parts of a frame at most: 32 periods of a sine."""
 
 A_CYCLE = 32
 """Parts of a period of a sine that are taken as linear: within (2 pi / 32)^2 / 8, half a per cent of its amplitude."""
@@ -291,8 +294,9 @@ class Effect:
         """How the comparators' reference moves in these frames, and the memory."""
         return Shift(), memory
 
-    def intervals(self, first: Exposure) -> int:
-        """Parts of a frame, in each of which the reference moves by `sway` as if linearly; 0: not within a frame."""
+    def intervals(self, frame_rate_hz: float) -> int:
+        """Parts of a frame in each of which the reference moves by `sway` as if linearly, at most MOST_INTERVALS; 0 where
+        it does not move within a frame."""
         return 0
 
     def kinks(self, first: Exposure) -> tuple[float, ...]:
@@ -356,6 +360,18 @@ def neighbour_sum(values: Array) -> Array:
     total[..., :, 1:] += values[..., :, :-1]
     total[..., :, :-1] += values[..., :, 1:]
     return total
+
+
+def check_intervals(effects: Sequence[Effect], frame_rate_hz: float) -> None:
+    """Raise InputError for a reference that moves too fast within a frame."""
+    for effect in effects:
+        parts = effect.intervals(frame_rate_hz)
+        if parts > MOST_INTERVALS:
+            raise InputError(
+                f"{effect.name} moves the reference too fast: a frame of {1e6 / frame_rate_hz:g} us would be cut into "
+                f"{parts} parts; at most {MOST_INTERVALS} are allowed (32 periods of a sine); lower its frequency, "
+                "lengthen its time constant, or raise frame_rate_hz"
+            )
 
 
 def build(catalogue: dict[str, type[Effect]], name: str, parameters: dict[str, Any]) -> Effect:

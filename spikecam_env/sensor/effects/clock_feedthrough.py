@@ -57,18 +57,18 @@ class ClockFeedthrough(Effect):
         experiment="flats whose intervals are whole numbers of frames, and a hundredth more and less",
     )
 
-    def intervals(self, first: Exposure) -> int:
-        return math.ceil(PARTS / self.tau(first)) if self.amplitude_mV else 0
+    def intervals(self, frame_rate_hz: float) -> int:
+        return math.ceil(PARTS / self.tau(frame_rate_hz)) if self.amplitude_mV else 0
 
     def kinks(self, first: Exposure) -> tuple[float, ...]:
         return (self.phase_frames % 1.0,)
 
     def sway(self, now: Exposure, phase: Array, piece: Array) -> Shift:
-        tau = self.tau(now)
+        tau = self.tau(now.frame_rate_hz)
         since = (phase - self.phase_frames) - np.floor(piece - self.phase_frames)
         mean = tau * (1.0 - math.exp(-1.0 / tau))
         return Shift(millivolts=(self.amplitude_mV * (np.exp(-since / tau) - mean))[None])
 
-    def tau(self, now: Exposure) -> float:
+    def tau(self, frame_rate_hz: float) -> float:
         """Time constant of the decay [frames]."""
-        return self.tau_us * 1e-6 * now.frame_rate_hz
+        return self.tau_us * 1e-6 * frame_rate_hz

@@ -35,8 +35,8 @@ class SupplyRipple(Effect):
         family="common", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=Needs.STEADY
     )
 
-    def intervals(self, first: Exposure) -> int:
-        return max(1, math.ceil(A_CYCLE * self.frequency_hz / first.frame_rate_hz)) if self.ripple else 0
+    def intervals(self, frame_rate_hz: float) -> int:
+        return max(1, math.ceil(A_CYCLE * self.frequency_hz / frame_rate_hz)) if self.ripple else 0
 
     def sway(self, now: Exposure, phase: Array, piece: Array) -> Shift:
         frame = (now.number + np.arange(now.frames, dtype=np.float64))[:, None, None]

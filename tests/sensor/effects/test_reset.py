@@ -159,9 +159,9 @@ def test_crosstalk_gathers_neighbours_in_a_frame_at_the_spike_and_in_the_next_at
 ) -> None:
     """Correlation of neighbours at lag 0 and 1, k = .02, x = .22: more, fewer; at the frame's end fewer, more.
 
-    Reset noise of 9 % makes the phases of a pair others within the recording; error: from rows.
+    Reset noise of 8 % makes the phases of a pair others within the recording; error: from rows.
     """
-    model = jittered(kappa=0.09).with_effect(CATALOGUE["crosstalk"](kick=0.02, when=when))
+    model = jittered(kappa=0.08).with_effect(CATALOGUE["crosstalk"](kick=0.02, when=when))
     s = SpikeSensor(model, (150, 200), 0).step(np.full((150, 200), 0.22), 260)[60:].astype(float)
     off = (s - s.mean(axis=0)) / s.std(axis=0)
     lag0 = (off[:, :, 1:] * off[:, :, :-1]).mean(axis=(0, 2))

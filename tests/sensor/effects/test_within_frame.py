@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -135,6 +135,5 @@ def test_ripple_of_no_frequency_is_a_constant_factor(engine: str, monkeypatch: p
 def test_what_is_too_fast_for_the_frame_is_refused_by_name(name: str, wrong: dict[str, float]) -> None:
     model = with_effects("ideal", CATALOGUE[name](**wrong))
     SpikeSensor(model, (2, 2))
-    slow = SensorModel(model.name, model.circuit, 1000.0, model.effects)
     with pytest.raises(InputError, match=f"{name} moves the reference too fast: a frame of 1000 us"):
-        SpikeSensor(slow, (2, 2))
+        replace(model, frame_rate_hz=1000.0)
