@@ -27,7 +27,7 @@ MOST_FACTOR = 1e3
 class Faster(Derived):
     """Scene: another one's light; frame t is its frame `factor` * t.
 
-    Keys lie at fractions of frames, which costs the sensor a pass a frame.
+    Keys lie at fractions of frames; a frame with keys inside it costs the sensor a pass.
     Errors: InputError for a factor that is not above 0 and at most MOST_FACTOR; a gaze is refused.
     """
 

@@ -119,7 +119,9 @@ One new file. `spikecam_env/sensor/effects/slow_shutter.py`:
 
     x <- x (1 - exp(-t/tau))
 
-Stage: optics.  Seen in: the first frames of a recording.  Twins: lamp_drift.  Source: a shutter's data sheet.
+Stage: optics.  Seen in: the first frames of a recording.  Twins: lamp_drift.
+Within a frame: integrated over the frame.
+Source: a shutter's data sheet.
 """
 
 from __future__ import annotations
@@ -127,9 +129,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.within_frame import mean_decay
 
 
 @dataclass(frozen=True)
@@ -137,16 +138,21 @@ class SlowShutter(Effect):
     tau_us: float = parameter(500.0, unit="us", bounds=(0.0, 1e6), doc="time to open")
 
     stage = Stage.OPTICS
+    within = Within.INTEGRATED
     strength = "tau_us"
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
-        open_by_now = -np.expm1(-1e6 * now.middle_s / self.tau_us) if self.tau_us else 1.0
-        return light.scaled(open_by_now), dark, memory
+        tau = 1e-6 * self.tau_us * now.frame_rate_hz
+        return light.scaled(1.0 - mean_decay(now.start, tau) if tau else 1.0), dark, memory
 ```
 
 That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))` and `[[effect]]`
 in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
-anew. The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
+anew. `within` says how it acts within a frame, and its docstring how far that is exact: charge is integrated over the
+frame, not sampled at its middle. `now.start` is when each frame begins, `spikecam_env/sensor/within_frame.py` has
+closed forms, and with `within_frame = True` a `Charge` says how light rises within the frame.
+
+The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
 changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
 cut, saved and restored; docs, bounds, twins that exist; and a test of your own, `test_slow_shutter_...`, of its law.
 

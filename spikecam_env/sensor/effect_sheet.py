@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects import CATALOGUE, Effect
 
-SECTIONS = ("Stage", "Seen in", "Twins", "Source")
+SECTIONS = ("Stage", "Seen in", "Twins", "Within a frame", "Source")
 
 
 @dataclass(frozen=True)

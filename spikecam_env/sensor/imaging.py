@@ -37,7 +37,8 @@ class Imaging:
             return segment
         start = self.image(segment.radiance0)
         held = segment.radiance1 is segment.radiance0
-        return replace(segment, radiance0=start, radiance1=start if held else self.image(segment.radiance1))
+        rise = None if segment.rise is None else self.image(segment.rise)
+        return replace(segment, radiance0=start, radiance1=start if held else self.image(segment.radiance1), rise=rise)
 
     def image(self, picture: Picture) -> Picture:
         """The image (H*W,) of a picture (H*W,); the same array while the picture is the same."""

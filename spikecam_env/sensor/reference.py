@@ -30,11 +30,13 @@ Array = NDArray[np.float64]
 class ReferenceState:
     """charge, threshold: (P,) float64 [grains]; rng: the pixels' own temporal noise; frame: number of the next.
 
-    memory: what each effect remembers, by its name.
+    missed: (P,) charge taken off at a reset for light that falls while the node is held, as far as as much has not yet
+    arrived since, which it does without noise.  memory: what each effect remembers, by its name.
     """
 
     charge: Array
     threshold: Array
+    missed: Array
     rng: np.random.Generator
     frame: int
     memory: drive.Memory
@@ -50,7 +52,7 @@ def start(
     rng = generator(seed, "temporal")
     threshold = draw_threshold(first.unit.kappa, rng)
     memory = drive.begin(first, effects, seed, unit_seed)
-    return ReferenceState(np.floor(phase * GRAINS), threshold, rng, first.number, memory)
+    return ReferenceState(np.floor(phase * GRAINS), threshold, np.zeros(phase.size), rng, first.number, memory)
 
 
 def run(first: Exposure, effects: Sequence[Effect], state: ReferenceState, segment: Segment) -> NDArray[np.uint8]:
@@ -75,7 +77,9 @@ def step(
     light, dark = drive.expected_charge(now, effects, state.memory, mean / GRAINS, rise / GRAINS)
     dark_grains = np.clip(dark.values[0].reshape(-1) * GRAINS, 0.0, MOST_GRAINS)
     mean = np.minimum(np.maximum(light.values[0], 0.0).reshape(-1) * GRAINS + dark_grains, MOST_GRAINS)
-    state.charge += collect(now.unit, mean, dark_grains, state.rng)
+    missed = np.minimum(state.missed, mean)
+    state.missed -= missed
+    state.charge += collect(now.unit, mean, dark_grains, missed, state.rng)
     fired = fire(now, effects, state, mean, references(now, effects, state)).reshape(now.shape)
     for effect in having("spiked", effects):
         charge, rate = thresholds(state.charge, now), thresholds(mean, now)
@@ -89,11 +93,11 @@ def thresholds(grains: Array, now: Exposure) -> Array:
     return (grains / GRAINS).reshape(now.shape)
 
 
-def collect(unit: Unit, mean: Array, dark: Array, rng: np.random.Generator) -> Array:
+def collect(unit: Unit, mean: Array, dark: Array, missed: Array, rng: np.random.Generator) -> Array:
     """Charge of a frame [grains] given its expectation: Poisson electrons, paper (3)-(4), or the mean itself."""
     if not unit.shot:
         return mean
-    certain = 0.0 if unit.dark_is_noisy else dark
+    certain = missed if unit.dark_is_noisy else np.minimum(missed + dark, mean)
     electrons = rng.poisson((mean - certain) * (unit.electrons / GRAINS))
     return electrons * (GRAINS / unit.electrons) + certain
 
@@ -133,6 +137,7 @@ def fire(
         residual = (state.charge[crossed] - limit[crossed]) / GRAINS
         for effect in acting:
             residual = effect.after_reset(residual, mean[crossed] / GRAINS, now)
+            state.missed[crossed] += effect.feedback(now).lost(mean[crossed] / GRAINS) * GRAINS
         state.charge[crossed] = residual * GRAINS
         state.threshold[crossed] = draw_threshold(now.unit.kappa[crossed], state.rng)
         limit = compared_with(state.threshold)

@@ -17,6 +17,7 @@ from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import BIN
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes
+from spikecam_env.sensor.between_keys import key_weights
 
 Pictures = NDArray[np.float32]
 
@@ -48,22 +49,12 @@ def films(conditions: Sequence[Condition], shape: tuple[int, int]) -> dict[str, 
 
 def light_film(light: Keyframes, frames: int) -> Pictures:
     """(F // BIN, P) light collected in each bin, linear between keys."""
-    pixels = light.radiance.shape[1] * light.radiance.shape[2]
-    keys = light.radiance.reshape(len(light.frame), pixels)
-    out = np.zeros((frames // BIN, pixels), np.float32)
-    middle = np.arange(frames // BIN * BIN) + 0.5
-    at = np.clip(np.searchsorted(light.frame, middle, side="right") - 1, 0, max(len(light.frame) - 2, 0))
-    if len(light.frame) == 1:
-        out[:] = keys[0] * BIN
-        return out
-    w = np.clip((middle - light.frame[at]) / (light.frame[at + 1] - light.frame[at]), 0.0, 1.0)
-    for b in range(len(out)):
-        weights: dict[int, float] = {}
-        for f in range(b * BIN, (b + 1) * BIN):
-            weights[int(at[f])] = weights.get(int(at[f]), 0.0) + 1.0 - w[f]
-            weights[int(at[f]) + 1] = weights.get(int(at[f]) + 1, 0.0) + w[f]
-        for k, weight in weights.items():
-            out[b] += np.float32(weight) * keys[k]
+    keys = light.radiance.reshape(len(light.frame), -1)
+    out = np.zeros((frames // BIN, keys.shape[1]), np.float32)
+    for b, collected in enumerate(out):
+        first, of_mean, _ = key_weights(light.frame, b * BIN, (b + 1) * BIN)
+        for key, weight in enumerate(of_mean, first):
+            collected += np.float32(BIN * weight) * keys[key]
     return out
 
 

@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.statistics.reading import Reading, slope
+from spikecam_env.sensor.between_keys import frame_means
 
 EDGES = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256)
 """Lags after an edge [frames], ends of the windows."""
 
 
 def uniform_light(condition) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
-    """(F,) radiance of every frame, by the light law: the value at its middle."""
+    """(F,) mean radiance of every frame."""
     light = condition.light
-    return np.interp(np.arange(condition.frames) + 0.5, light.frame, light.radiance[:, 0, 0])
+    return frame_means(light.frame, light.radiance[:, 0, 0].astype(np.float64), condition.frames)
 
 
 def edges_of(level: NDArray[np.float64]) -> list[tuple[int, float]]:

@@ -4,6 +4,7 @@
 
 Stage: read-out.  Seen in: static light: short intervals of one fixed length, and their complement.
 Twins: spurious_spikes (at any time), crosstalk (in the neighbours).
+Within a frame: at the end of the frame; it acts on the bit that is read.
 Source: a comparator that trips again on the ringing of a reset; fixed delay assumed, and the node keeps its charge.
 """
 
@@ -15,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
 
 
 class Pending(NamedTuple):
@@ -31,6 +32,7 @@ class Afterpulsing(Effect):
     delay_frames: int = parameter(2, unit="frames", bounds=(1, 1000), doc="time from a spike to its second report")
 
     stage = Stage.READOUT
+    within = Within.END
     strength = "probability"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Pending:

@@ -38,7 +38,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Sequence
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -48,6 +48,7 @@ from spikecam_env.errors import unknown_name
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.ranges import parameter as parameter
 from spikecam_env.sensor.unit import PixelArray, Unit
+from spikecam_env.sensor.within_frame import Moments
 
 Array = NDArray[np.float64]
 Field = NDArray[np.float32]
@@ -65,6 +66,16 @@ class Stage(IntEnum):
     READOUT = 6
 
 
+class Within(Enum):
+    """How an effect acts within a frame; its docstring says so in these words, and how far that is exact."""
+
+    CONSTANT = "constant in time"
+    INTEGRATED = "integrated over the frame"
+    CROSSING = "at the crossing"
+    END = "at the end of the frame"
+    DRAWN = "drawn once a frame"
+
+
 @dataclasses.dataclass(frozen=True)
 class Exposure:
     """A block of frames of one camera: what a hook may know.
@@ -78,6 +89,11 @@ class Exposure:
     shape: tuple[int, int]
     unit: Unit
     frames: int = 1
+
+    @property
+    def start(self) -> Array:
+        """When each frame begins (F, 1, 1) [frames]."""
+        return (self.number + np.arange(self.frames, dtype=np.float64))[:, None, None]
 
     @property
     def middle_s(self) -> Array:
@@ -103,18 +119,29 @@ class Charge:
     pixels: (F, H, W), or (1, H, W) where all frames are alike.  factor: (F, 1, 1), (F, H, 1) or a number.
     few: what some of the pixels get besides, before the factor.
     Three parts, so that what is common to all pixels, or is in few, costs a number a frame and not a picture.
-    rise: as pixels, or 0: by how much more of it comes at a frame's end than at its start, a frame.  An effect that
-    changes charge otherwise than by a factor may leave it out.
+    rise: as pixels, or 0: by how much more of it comes at a frame's end than at its start, a frame; of charge that is
+    not linear in the frame, of the line with its mean and first moment.  An effect that changes charge otherwise than
+    by a factor may leave it out.
+    tilt: (F, 1, 1) or 0: what rises besides, pixels * tilt.
     """
 
     pixels: Array
     factor: Array | float = 1.0
     rise: Array | float = 0.0
     few: Few | None = None
+    tilt: Array | float = 0.0
 
     def scaled(self, factor: Array | float) -> Charge:
         """This, times a number a frame or a row."""
-        return Charge(self.pixels, self.factor * factor, self.rise, self.few)
+        return Charge(self.pixels, self.factor * factor, self.rise, self.few, self.tilt * factor)
+
+    def modulated(self, by: Moments) -> Charge:
+        """This, times a number that changes within each frame, where charge is linear in the frame."""
+        rises = self.rises
+        if not rises.any():
+            return Charge(self.pixels, self.factor * by.mean, 0.0, self.few, self.factor * by.tilt)
+        x = self.values
+        return Charge(x * by.mean + rises * (by.tilt / 12.0), 1.0, x * by.tilt + rises * by.bend)
 
     def plus(self, few: Few) -> Charge:
         """This, and what a few pixels get besides."""
@@ -137,8 +164,9 @@ class Charge:
 
     @property
     def rises(self) -> Array:
-        """`rise`, multiplied out."""
-        return np.asarray(self.rise if self._whole else self.rise * self.factor)
+        """`rise` and `tilt`, multiplied out."""
+        rise = self.rise if self._whole else self.rise * self.factor
+        return np.asarray(rise if isinstance(self.tilt, float) else rise + self.pixels * self.tilt)
 
     @property
     def _whole(self) -> bool:
@@ -178,6 +206,10 @@ class Feedback(NamedTuple):
     left_tau: float = 1.0
     droop: float = 0.0
 
+    def lost(self, rate: Array) -> Array:
+        """Light (n,) that falls while a reset holds the node, of pixels with this charge a frame [thresholds]."""
+        return self.lost_per_root_rate * np.sqrt(rate) + self.lost_per_rate * rate
+
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
@@ -187,6 +219,7 @@ class Effect:
     """
 
     stage: ClassVar[Stage]
+    within: ClassVar[Within | None] = None
     within_frame: ClassVar[bool] = False
     """Whether `collect` asks for the rise of light within a frame."""
     name: ClassVar[str] = "effect"

@@ -3,6 +3,7 @@
     V_d(x, y) = V_d + V_S,  V_S ~ N(0, sigma^2)
 
 Stage: threshold.  Seen in: flats at two V_d settings (at one, it is part of the gain).
+Within a frame: constant in time.
 Source: paper (10)-(12); published 0.0497 V.
 """
 
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -21,6 +22,7 @@ class BiasVoltageSpread(Effect):
     sigma_V: float = parameter(0.0497, unit="V", bounds=(0.0, 0.5), doc="standard deviation over pixels")
 
     stage = Stage.THRESHOLD
+    within = Within.CONSTANT
     strength = "sigma_V"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

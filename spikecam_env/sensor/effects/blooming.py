@@ -4,6 +4,8 @@
 
 Stage: photodiode.  Seen in: pictures with lights brighter than one spike a frame: a halo in the pixels next to them.
 Twins: optical_blur (at all levels), crosstalk (at all rates).
+Within a frame: integrated over the frame, in light that is linear in it; what a pixel hands on rises as its own light
+does.
 Source: overflow model of CCD and CMOS texts (Janesick, Photon Transfer).  Light counts up to x = 2, the engines' cap.
 """
 
@@ -15,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -24,26 +26,33 @@ class Blooming(Effect):
     full: float = parameter(1.0, unit="thresholds a frame", bounds=(0.0, 2.0), doc="charge a frame that still stays")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "share"
+    within_frame = True
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+        half = np.abs(light.rises) / 2.0
         x = light.values
-        if not (x > self.full).any():
+        if not (x + half > self.full).any():
             return light, dark, memory
-        spread = np.empty(x.shape)
-        _spill_over(np.ascontiguousarray(x), self.share, self.full, spread)
-        return Charge(spread), dark, memory
+        shape = np.broadcast_shapes(x.shape, half.shape)
+        x, half = (np.ascontiguousarray(np.broadcast_to(a, shape)) for a in (x, half))
+        spread = np.empty(shape)
+        _spill_over(x, half, self.share, self.full, spread)
+        return Charge(spread, 1.0, light.rises), dark, memory
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _spill_over(x, share, full, out):  # type: ignore[no-untyped-def]
-    """out (F, H, W), overwritten: the charge x with what flows over."""
+def _spill_over(x, half, share, full, out):  # type: ignore[no-untyped-def]
+    """out (F, H, W), overwritten: the charge x, half more or less at a frame's ends, with what flows over."""
     frames, rows, columns = x.shape
     spill = np.zeros((rows + 2, columns + 2))  # beyond the edge there is nothing
     for f in range(frames):
         for r in range(rows):
             for c in range(columns):
-                spill[r + 1, c + 1] = max(x[f, r, c] - full, 0.0) * share
+                over, h = x[f, r, c] - full, half[f, r, c]
+                excess = max(over, 0.0) if abs(over) >= h else (over + h) ** 2 / (4.0 * h)
+                spill[r + 1, c + 1] = excess * share
         for r in range(rows):
             above, here, below = spill[r], spill[r + 1], spill[r + 2]
             for c in range(columns):

@@ -3,6 +3,7 @@
     C(x, y) = C + C_S,  C_S ~ N(0, sigma^2)
 
 Stage: integration.  Seen in: flats (with dark current, separates from conversion gain).
+Within a frame: constant in time.
 Source: paper (10); published 0.0128 fF.
 """
 
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -21,6 +22,7 @@ class CapacitorSpread(Effect):
     sigma_fF: float = parameter(0.0128, unit="fF", bounds=(0.0, 1.0), doc="standard deviation over pixels")
 
     stage = Stage.INTEGRATION
+    within = Within.CONSTANT
     strength = "sigma_fF"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

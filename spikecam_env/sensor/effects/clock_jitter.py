@@ -4,7 +4,8 @@
 
 Stage: read-out.  Seen in: spikes a frame over the whole array: variance 2 (x sigma)^2, lag-1 correlation -1/2.
 Twins: common_threshold_noise (does not grow with light), light_flicker (a line).
-Source: period jitter of a clock; nanoseconds in practice.  Light within a frame counts as steady.
+Within a frame: integrated over the frame between its edges, in light that is linear on both sides of each.
+Source: period jitter of a clock; nanoseconds in practice.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 
 
 class Edge(NamedTuple):
@@ -29,12 +30,20 @@ class ClockJitter(Effect):
     sigma_ns: float = parameter(20.0, unit="ns", bounds=(0.0, 5000.0), doc="standard deviation of an edge")
 
     stage = Stage.READOUT
+    within = Within.INTEGRATED
     strength = "sigma_ns"
+    within_frame = True
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:
         return Edge(rng.standard_normal(), rng)
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Edge) -> tuple[Charge, Charge, Edge]:
         edges = np.concatenate([[memory.at], memory.rng.standard_normal(now.frames)])
-        length = (1.0 + np.diff(edges) * (self.sigma_ns * 1e-9 * now.frame_rate_hz))[:, None, None]
-        return light.scaled(length), dark.scaled(length), Edge(edges[-1], memory.rng)
+        late = (edges * (self.sigma_ns * 1e-9 * now.frame_rate_hz))[:, None, None]
+        begin, end = late[:-1], late[1:]
+        length = 1.0 + (end - begin)
+        rises = light.rises
+        read = light.scaled(length)
+        if rises.any():
+            read = Charge(read.values + rises * ((end + begin) * length / 2.0), 1.0, rises)
+        return read, dark.scaled(length), Edge(edges[-1], memory.rng)

@@ -4,6 +4,7 @@
 
 Stage: threshold.  Seen in: flats and the dark alike: stripes along columns, constant in time.
 Twins: row_fixed_pattern (other direction).
+Within a frame: constant in time.
 Source: EMVA 1288 release 4 (column non-uniformity); 5 mV is about 0.5 % of the swing.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -22,6 +23,7 @@ class ColumnFixedPattern(Effect):
     sigma_mV: float = parameter(5.0, unit="mV", bounds=(0.0, 200.0), doc="standard deviation over columns")
 
     stage = Stage.THRESHOLD
+    within = Within.CONSTANT
     strength = "sigma_mV"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

@@ -5,6 +5,7 @@
 
 Stage: threshold.  Seen in: spikes a frame over the whole array: variance 2 sigma^2/V_d^2, lag-1 correlation -1/2.
 Twins: row_temporal_noise (rows), clock_jitter (in proportion to light), supply_ripple (a line).
+Within a frame: drawn once a frame; by assumption it holds for the frame.
 Source: a reference that all comparators share; white by assumption.  A real wall recording shows none.
 """
 
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class CommonThresholdNoise(Effect):
     sigma_mV: float = parameter(1.0, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of the common reference")
 
     stage = Stage.THRESHOLD
+    within = Within.DRAWN
     strength = "sigma_mV"
 
     def compare(self, now: Exposure, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:

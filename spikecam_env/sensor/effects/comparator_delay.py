@@ -4,6 +4,8 @@
 
 Stage: reset.  Seen in: flats at several levels (intervals longer by an amount that grows as 1/sqrt(x)).
 Twins: dead_time (the same at all levels), photo_response_nonlinearity.
+Within a frame: at the crossing; the light lost is that of its frame for as long as the node is held: below 1 % of a
+threshold off while d T'^2 < 0.02, d the change of x from one frame to the next and T' = c / sqrt(x).
 Source: delay of a comparator on a slow ramp, square root of the time to cross a window (regenerative comparator).
 """
 
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,7 @@ class ComparatorDelay(Effect):
     delay_us: float = parameter(0.1, unit="us", bounds=(0.0, 25.0), doc="delay c at one spike a frame (x = 1)")
 
     stage = Stage.RESET
+    within = Within.CROSSING
     strength = "delay_us"
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:

@@ -3,6 +3,7 @@
     alpha(x, y) = alpha (1 + sigma n),  n ~ N(0, 1) a pixel
 
 Stage: photodiode.  Seen in: flats, rate proportional to light, pixel by pixel.
+Within a frame: constant in time.
 Source: paper (8); published 0.0584 / 1.0128.
 """
 
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -21,6 +22,7 @@ class ConversionGainSpread(Effect):
     sigma: float = parameter(0.0584 / 1.0128, unit="relative", bounds=(0.0, 1.0), doc="standard deviation over mean")
 
     stage = Stage.PHOTODIODE
+    within = Within.CONSTANT
     strength = "sigma"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

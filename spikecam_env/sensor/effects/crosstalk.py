@@ -4,6 +4,7 @@
 
 Stage: reset.  Seen in: coincidences of neighbours' spikes at lag 0 and 1; spots of light (a halo).
 Twins: optical_blur (no coincidence), blooming (only beside saturated pixels).
+Within a frame: at the end of the frame.
 Source: capacitive coupling between nodes, k = C_coupling / C; the kick arrives at the end of the frame by assumption.
 """
 
@@ -21,6 +22,7 @@ from spikecam_env.sensor.effects.base import (
     Feedback,
     Spikes,
     Stage,
+    Within,
     neighbour_sum,
     parameter,
 )
@@ -31,6 +33,7 @@ class Crosstalk(Effect):
     kick: float = parameter(0.002, unit="thresholds", bounds=(-0.2, 0.2), doc="charge k to each neighbour a spike")
 
     stage = Stage.RESET
+    within = Within.END
     strength = "kick"
 
     def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:

@@ -3,6 +3,7 @@
     charge of a frame += I_dark / frame rate
 
 Stage: photodiode.  Seen in: dark recordings; flats at low level.  Source: paper (9); published mean 0.4442 pA.
+Within a frame: constant in time.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -20,6 +21,7 @@ class DarkCurrent(Effect):
     mean_pA: float = parameter(0.4442, unit="pA", bounds=(0.0, 1e3), doc="mean dark current of a pixel")
 
     stage = Stage.PHOTODIODE
+    within = Within.CONSTANT
     strength = "mean_pA"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

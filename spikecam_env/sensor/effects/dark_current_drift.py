@@ -4,6 +4,7 @@
 
 Stage: photodiode.  Seen in: dark recordings: the rate climbs; lit ones hardly.
 Twins: lamp_drift (in the light), random_telegraph_noise (pixel by pixel).
+Within a frame: integrated over the frame.
 Source: dark current doubles every 6 to 8 K (Janesick, Photon Transfer); the exponential is first-order warming.
 """
 
@@ -12,9 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.within_frame import mean_decay
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,9 @@ class DarkCurrentDrift(Effect):
     tau_ms: float = parameter(50.0, unit="ms", bounds=(1e-3, 1e8), doc="time constant of the warming")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "rise"
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
-        return light, dark.scaled(1.0 - self.rise * np.expm1(-1e3 * now.middle_s / self.tau_ms)), memory
+        left = mean_decay(now.start, 1e-3 * self.tau_ms * now.frame_rate_hz)
+        return light, dark.scaled(1.0 + self.rise * (1.0 - left)), memory

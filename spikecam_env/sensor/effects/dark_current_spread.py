@@ -3,6 +3,7 @@
     I_dark(x, y) += sigma n,  n ~ N(0, 1) a pixel; a current below zero counts as zero
 
 Stage: photodiode.  Seen in: dark recordings, pixel by pixel.  Twins: dark_current_tail.
+Within a frame: constant in time.
 Source: paper (9); published 0.1731 pA.
 """
 
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -21,6 +22,7 @@ class DarkCurrentSpread(Effect):
     sigma_pA: float = parameter(0.1731, unit="pA", bounds=(0.0, 1e3), doc="standard deviation over pixels")
 
     stage = Stage.PHOTODIODE
+    within = Within.CONSTANT
     strength = "sigma_pA"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

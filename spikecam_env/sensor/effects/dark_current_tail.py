@@ -4,6 +4,7 @@
 
 Stage: photodiode.  Seen in: dark recordings: log-normal quantiles, up to the last per mille.
 Twins: dark_current_spread (symmetric), hot_pixels (a separate population).
+Within a frame: constant in time.
 Source: flat-field maps of a real camera: log-normal, sigma 0.45.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -22,6 +23,7 @@ class DarkCurrentTail(Effect):
     sigma: float = parameter(0.45, unit="log", bounds=(0.0, 3.0), doc="standard deviation of the logarithm")
 
     stage = Stage.PHOTODIODE
+    within = Within.CONSTANT
     strength = "sigma"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

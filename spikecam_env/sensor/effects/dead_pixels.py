@@ -4,6 +4,7 @@
 
 Stage: read-out.  Seen in: any recording of some length: pixels without a spike.
 Twins: missed_spikes (all pixels, now and then).
+Within a frame: constant in time.
 Source: EMVA 1288 (defect pixels); some 1e-4 in a tested device.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -22,6 +23,7 @@ class DeadPixels(Effect):
     fraction: float = parameter(1e-4, unit="relative", bounds=(0.0, 1.0), doc="share of pixels that are dead")
 
     stage = Stage.READOUT
+    within = Within.CONSTANT
     strength = "fraction"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

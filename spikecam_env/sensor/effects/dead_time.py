@@ -4,6 +4,8 @@
 
 Stage: reset.  Seen in: flats at x > 0.3 (every interval longer by tau, whatever the level).
 Twins: comparator_delay (grows as 1/sqrt(x)), photo_response_nonlinearity.
+Within a frame: at the crossing; the light lost is that of its frame for as long as the node is held: below 1 % of a
+threshold off while d tau^2 < 0.02, d the change of x from one frame to the next.
 Source: SCSim's script (0.2 % of a 50 us frame).
 """
 
@@ -11,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,7 @@ class DeadTime(Effect):
     tau_us: float = parameter(0.1, unit="us", bounds=(0.0, 25.0), doc="time without integration after a spike")
 
     stage = Stage.RESET
+    within = Within.CROSSING
     strength = "tau_us"
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:

@@ -4,6 +4,7 @@
 
 Stage: threshold.  Seen in: the k-slope of A_k, T^2 kappa^2, above what kT/C and shot noise give.
 Twins: reset_noise (same law, its strength known from C), shot_noise (separated by a second V_d).
+Within a frame: at the crossing; drawn anew at the reset.
 Source: comparator input noise, white and sampled once a spike; about 1 mV rms in CMOS comparators.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -22,6 +23,7 @@ class ExcessThresholdNoise(Effect):
     sigma_mV: float = parameter(2.0, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a spike's threshold")
 
     stage = Stage.THRESHOLD
+    within = Within.CROSSING
     strength = "sigma_mV"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

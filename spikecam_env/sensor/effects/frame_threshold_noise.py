@@ -4,6 +4,7 @@
     mean interval T (1 - (sigma/V_d)^2 T) while sigma T << V_d
 
 Stage: threshold.  Seen in: dim flats: many draws before a crossing make the lowest win, so intervals shorten with T.
+Within a frame: drawn once a frame; by assumption it holds for the frame.
 Source: SCSim's public script (6.36 mV), kept for comparison with it.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
 from spikecam_env.sensor.random_fields import Words, white_field, words
 
 
@@ -22,6 +23,7 @@ class FrameThresholdNoise(Effect):
     sigma_mV: float = parameter(6.36, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a frame's reference")
 
     stage = Stage.THRESHOLD
+    within = Within.DRAWN
     strength = "sigma_mV"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Words:

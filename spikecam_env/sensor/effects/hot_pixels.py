@@ -4,6 +4,7 @@
 
 Stage: photodiode.  Seen in: dark recordings: quantiles beyond those of the crowd.
 Twins: dark_current_tail (one population with a long tail).
+Within a frame: constant in time.
 Source: flat-field maps of a real camera: 78 of 100 000 pixels above five times the median; exponential tail assumed.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -23,6 +24,7 @@ class HotPixels(Effect):
     mean_pA: float = parameter(3.0, unit="pA", bounds=(0.0, 1e4), doc="mean extra current of a hot pixel")
 
     stage = Stage.PHOTODIODE
+    within = Within.CONSTANT
     strength = "fraction"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

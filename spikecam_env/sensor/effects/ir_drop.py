@@ -6,6 +6,7 @@
 Stage: threshold.  Seen in: dim pixels beside bright ones in the same row; on flats, as a non-linearity.
 Pixels of a row that are exactly alike and free of noise fall into step (pulse-coupled oscillators).
 Twins: photo_response_nonlinearity (inseparable on flats), row_temporal_noise, blooming (neighbours, not rows).
+Within a frame: at the end of the frame; by assumption the activity of one frame acts in the next.
 Source: resistance of the supply grid; first order in the current, one frame late by assumption.
 """
 
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class IrDrop(Effect):
     )
 
     stage = Stage.THRESHOLD
+    within = Within.END
     strength = "droop"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Array:

@@ -4,6 +4,7 @@
 
 Stage: optics.  Seen in: lit recordings: the population's rate wanders, variance growing with time, dark does not.
 Twins: light_flicker (a line), dark_current_drift (in the dark).
+Within a frame: integrated over the frame, but where the walk would make light negative in a part of it.
 Source: form assumed; a random walk is the usual model of a free-running source (power as 1/f^2).
 """
 
@@ -15,14 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 
 
 class Walk(NamedTuple):
-    """at: the walk's value.  rng: what drives it."""
+    """at: the walk's value.  rng: what drives it from frame to frame.  within: what drives it within frames."""
 
     at: float
     rng: np.random.Generator
+    within: np.random.Generator
 
 
 @dataclass(frozen=True)
@@ -32,12 +34,15 @@ class LampDrift(Effect):
     )
 
     stage = Stage.OPTICS
+    within = Within.INTEGRATED
     strength = "sigma_per_root_s"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:
-        return Walk(0.0, rng)
+        return Walk(0.0, rng, rng.spawn(1)[0])
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Walk) -> tuple[Charge, Charge, Walk]:
-        steps = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz) * memory.rng.standard_normal(now.frames)
+        sigma = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz)
+        steps, bridge = (sigma * rng.standard_normal(now.frames) for rng in (memory.rng, memory.within))
         path = np.cumsum(np.concatenate([[memory.at], steps]))
-        return light.scaled(np.maximum(1.0 + path[1:, None, None], 0.0)), dark, Walk(path[-1], memory.rng)
+        mean = (path[1:] + path[:-1]) / 2.0 + bridge / math.sqrt(12.0)
+        return light.scaled(np.maximum(1.0 + mean[:, None, None], 0.0)), dark, memory._replace(at=path[-1])

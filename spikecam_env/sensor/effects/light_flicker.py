@@ -1,9 +1,10 @@
 """Light flicker: the lamp's brightness swings with the mains or its driver.
 
-    L(t) <- L(t) (1 + m sin(2 pi (f t + p)))        at the middle of the frame
+    L(t) <- L(t) (1 + m sin(2 pi (f t + p)))        integrated over each frame, in light that is linear in it
 
 Stage: optics.  Seen in: any lit recording: a line at f in the population's rate, absent in the dark.
 Twins: supply_ripple (also in the dark, and of opposite sign), lamp_drift (no line).
+Within a frame: integrated over the frame, in light that is linear in it.
 Source: lamps on 50 Hz mains swing at 100 Hz, by per cents (LED) to tens of them (IEEE 1789); here its first harmonic.
 """
 
@@ -12,9 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.within_frame import wave_moments
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,11 @@ class LightFlicker(Effect):
     phase_cycles: float = parameter(0.0, unit="cycles", bounds=(0.0, 1.0), doc="phase p at frame 0")
 
     stage = Stage.OPTICS
+    within = Within.INTEGRATED
     strength = "modulation"
+    within_frame = True
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
-        wave = np.sin(2.0 * np.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))
-        return light.scaled(1.0 + self.modulation * wave), dark, memory
+        cycles = self.frequency_hz * now.middle_s + self.phase_cycles
+        wave = wave_moments(self.modulation, self.frequency_hz / now.frame_rate_hz, cycles)
+        return light.modulated(wave), dark, memory

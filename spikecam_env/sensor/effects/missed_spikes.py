@@ -4,6 +4,7 @@
 
 Stage: read-out.  Seen in: static light: intervals of twice the length.
 Twins: dead_pixels (for ever), dead_time (all intervals longer, none doubled).
+Within a frame: at the end of the frame; it acts on the bit that is read.
 Source: a flag latched too late or overwritten; independent by assumption.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,7 @@ class MissedSpikes(Effect):
     probability: float = parameter(1e-3, unit="relative", bounds=(0.0, 1.0), doc="chance p to lose a spike")
 
     stage = Stage.READOUT
+    within = Within.END
     strength = "probability"
 
     def read_out(

@@ -7,6 +7,7 @@ below 0.3, where an edge in motion, averaged over each pixel, still loses s^2 / 
 
 Stage: optics.  Seen in: textured or moving light: edges are erf(x / (sqrt(2) s)); flats are unchanged.
 Twins: crosstalk (electrical: also a coincidence of spikes), photodiode_lag (blurs motion, not static texture).
+Within a frame: constant in time.
 Source: Gaussian approximation of a lens' point spread; diffraction alone gives s = 0.42 lambda F (Airy's core).
 """
 
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 from scipy.optimize import brentq
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 
 _NO_BLUR = 1e-9
 """[pixels] Below, the neighbours' weight is under 1e-18, and no float32 moves by it."""
@@ -31,6 +32,7 @@ class OpticalBlur(Effect):
     sigma_pixels: float = parameter(0.5, unit="pixels", bounds=(0.0, 20.0), doc="standard deviation of the spread")
 
     stage = Stage.OPTICS
+    within = Within.CONSTANT
     strength = "sigma_pixels"
 
     def image(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:

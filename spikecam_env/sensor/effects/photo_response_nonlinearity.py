@@ -4,6 +4,7 @@
 
 Stage: photodiode.  Seen in: flats over a wide range of levels, up to x = 0.6.
 Twins: ir_drop (inseparable on flats), dead_time (T = 1/x + tau), comparator_delay.
+Within a frame: integrated over the frame, in light that is linear in it.
 Source: second-order term of the response, EMVA 1288 (linearity error); typical 1 % at full scale.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -20,8 +21,13 @@ class PhotoResponseNonlinearity(Effect):
     beta: float = parameter(0.01, unit="per threshold a frame", bounds=(-0.25, 0.25), doc="loss at one spike a frame")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "beta"
+    within_frame = True
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
-        x = light.values
-        return Charge(x * (1.0 - self.beta * x)), dark, memory
+        x, d = light.values, light.rises
+        collected = x * (1.0 - self.beta * x)
+        if not d.any():
+            return Charge(collected), dark, memory
+        return Charge(collected - self.beta / 12.0 * d**2, 1.0, d * (1.0 - 2.0 * self.beta * x)), dark, memory

@@ -5,6 +5,8 @@
 
 Stage: photodiode.  Seen in: steps and moving light (tails of length tau); static light is unchanged.
 Twins: incomplete_reset (depends on the last interval, not on the last light), optical_blur.
+Within a frame: integrated over the frame, in light that is linear in it; of a jump inside a frame, the late charge of
+that frame is off by 0.06 f of the jump at most, 0.03 f at tau = 1.5 frames.
 Source: first-order image lag (Janesick, Photon Transfer); light before frame 0 is taken as steady.
 """
 
@@ -16,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.within_frame import decay_moment
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,9 @@ class PhotodiodeLag(Effect):
     tau_us: float = parameter(1000.0, unit="us", bounds=(0.1, 1e7), doc="time constant of the late charge")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "fraction"
+    within_frame = True
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None
@@ -33,24 +38,42 @@ class PhotodiodeLag(Effect):
     def collect(
         self, light: Charge, dark: Charge, now: Exposure, memory: Array | None
     ) -> tuple[Charge, Charge, Array | None]:
-        x = light.values
-        slow = x[0] if memory is None else memory
-        if len(x) == 1 and np.array_equal(slow, x[0]):
+        x, d = light.values, light.rises
+        moves = bool(d.any())
+        slow = (x[0] - 0.5 * d[0] if moves else x[0]) if memory is None else memory
+        if len(x) == 1 and not moves and np.array_equal(slow, x[0]):
             return light, dark, slow
+        shape = (now.frames, *now.shape)
+        x, d = (_flat(a if np.ndim(a) else np.zeros((1, 1, 1)), shape) for a in (x, d))
+        late, rises, slow = np.empty((now.frames, x.shape[1])), np.empty((now.frames, x.shape[1])), slow.flatten()
+        _follow(x, d, self.fraction, self._law(now), slow, late, rises)
+        return Charge(late.reshape(shape), 1.0, rises.reshape(shape)), dark, slow.reshape(now.shape)
+
+    def _law(self, now: Exposure) -> tuple[float, ...]:
+        """What a frame makes of light x + d (t - 1/2) and of s, what lags at its start: see `_follow`."""
         tau = self.tau_us * 1e-6 * now.frame_rate_hz
         kept = math.exp(-1.0 / tau)
-        late, slow = np.empty((now.frames, now.shape[0] * now.shape[1])), slow.flatten()
-        _follow(np.ascontiguousarray(x).reshape(len(x), -1), self.fraction * tau * (1.0 - kept), kept, slow, late)
-        return Charge(late.reshape(-1, *now.shape)), dark, slow.reshape(now.shape)
+        mean = -tau * math.expm1(-1.0 / tau)
+        return kept, 0.5 - tau + (0.5 + tau) * kept, mean, mean / 2.0 + tau * (mean - 1.0), tau + 0.5, decay_moment(tau)
+
+
+def _flat(values: Array, shape: tuple[int, int, int]) -> Array:
+    """(F, H, W), or (1, H, W) where all frames are alike, as (F or 1, P)."""
+    return np.ascontiguousarray(np.broadcast_to(values, (len(values), *shape[1:]))).reshape(len(values), -1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _follow(x, late, kept, slow, out):  # type: ignore[no-untyped-def]
-    """out (F, P), overwritten: charge of which a part is late.  x: (F or 1, P).  slow: (P,) what lags, updated."""
-    moves = x.shape[0] > 1
-    for f in range(out.shape[0]):
-        now, row = x[f * moves], out[f]
+def _follow(x, d, fraction, law, slow, mean, rise):  # type: ignore[no-untyped-def]
+    """mean, rise (F, P), overwritten: charge of which a part is late.  x, d: (F or 1, P).  slow (P,): what lags.
+
+    What lags is s(t) = L(t) - d tau + (s - x + d/2 + d tau) exp(-t/tau).
+    """
+    kept, kept_rise, late, late_rise, reach, moment = law
+    x_moves, d_moves = x.shape[0] > 1, d.shape[0] > 1
+    for f in range(mean.shape[0]):
+        xs, ds, means, rises = x[f * x_moves], d[f * d_moves], mean[f], rise[f]
         for p in range(slow.size):
-            behind = slow[p] - now[p]
-            row[p] = now[p] + behind * late
-            slow[p] = now[p] + behind * kept
+            behind, slope = slow[p] - xs[p], ds[p]
+            means[p] = xs[p] + fraction * (behind * late + slope * late_rise)
+            rises[p] = slope + fraction * 12.0 * (behind + slope * reach) * moment
+            slow[p] = xs[p] + behind * kept + slope * kept_rise

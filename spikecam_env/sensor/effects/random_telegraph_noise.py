@@ -5,31 +5,36 @@
 
 Stage: photodiode.  Seen in: dark recordings: counts of these pixels have two levels, windows shorter than the dwell.
 Twins: spurious_spikes (no levels), threshold_flicker_noise (all pixels, also in the light).
+Within a frame: integrated over the frame; a switch is timed to 2^-16 of a frame.
 Source: dark-current RTN in irradiated CCD pixels (Hopkins and Hopkinson 1993); one trap a pixel,
 even dwell times assumed.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Few, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Few, Stage, Within, parameter
 
 AHEAD = 4096
 """Switches that are drawn at once."""
+
+TICKS = 1 << 16
+"""To a frame: in whole ones, when a switch comes does not depend on where a recording is cut."""
+
+_LONGEST = 1 << 50
+"""Ticks of a gap at most, so that AHEAD of them add up in 64 bits."""
 
 
 class Traps(NamedTuple):
     """pixels: flat indices (n,) of those with a trap.  upper: (n,) which are in the upper state.
 
-    charge: (n,) thresholds a frame in that state.  switches: (k,) those to come, ascending, as places in the frames'
-    states (F, n), flat, from the next frame on; at least one.  rng: what draws more.
+    charge: (n,) thresholds a frame in that state.  switches: (k,) those to come, ascending, at least one [ticks]: the
+    n traps' first frames one after the other, then their second frames, from the next frame on.  rng: what draws more.
     """
 
     pixels: NDArray[np.intp]
@@ -46,28 +51,44 @@ class RandomTelegraphNoise(Effect):
     dwell_ms: float = parameter(10.0, unit="ms", bounds=(1e-3, 1e7), doc="mean time in a state")
 
     stage = Stage.PHOTODIODE
+    within = Within.INTEGRATED
     strength = "amplitude_pA"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Traps:
         pixels = np.flatnonzero(pattern.random(first.shape) < self.fraction)
         charge = first.charge_of(self.amplitude_pA).reshape(-1)[pixels]
         upper = rng.random(pixels.size) < 0.5
-        return Traps(pixels, upper, charge, self._after(-1, first.frame_rate_hz, rng), rng)
+        return Traps(pixels, upper, charge, self._after(0, first.frame_rate_hz, rng), rng)
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Traps) -> tuple[Charge, Charge, Traps]:
-        upper = np.zeros((now.frames, memory.pixels.size), np.bool_)
-        to_come = [memory.switches]
-        while to_come[-1][-1] < upper.size:
+        traps = memory.pixels.size
+        end, to_come = now.frames * traps * TICKS, [memory.switches]
+        while to_come[-1][-1] < end:
             to_come.append(self._after(to_come[-1][-1], now.frame_rate_hz, memory.rng))
         switches = np.concatenate(to_come)
-        here = np.searchsorted(switches, upper.size)
-        upper.reshape(-1)[switches[:here]] = True
-        for before, after in pairwise([memory.upper, *upper]):
-            np.logical_xor(before, after, out=after)
-        raised = dark.plus(Few(memory.pixels, memory.charge * upper))
-        return light, raised, memory._replace(upper=upper[-1].copy(), switches=switches[here:] - upper.size)
+        here = np.searchsorted(switches, end)
+        share, upper = share_in_upper(memory.upper, switches[:here], now.frames)
+        raised = dark.plus(Few(memory.pixels, memory.charge * share))
+        return light, raised, memory._replace(upper=upper, switches=switches[here:] - end)
 
     def _after(self, last: int, frame_rate_hz: float, rng: np.random.Generator) -> NDArray[np.int64]:
-        """(AHEAD,) places of the switches that follow one: each frame every trap switches with the same probability."""
-        leaves = -math.expm1(-2e3 / (self.dwell_ms * frame_rate_hz)) / 2.0
-        return np.asarray(last + np.cumsum(rng.geometric(leaves, AHEAD)))
+        """(AHEAD,) switches that follow one: in all frames of all traps, laid end to end, a Poisson stream."""
+        gaps = rng.exponential(1e-3 * self.dwell_ms * frame_rate_hz * TICKS, AHEAD)
+        return np.asarray(last + np.cumsum(np.minimum(gaps, _LONGEST).astype(np.int64)))
+
+
+def share_in_upper(
+    upper: NDArray[np.bool_], switches: NDArray[np.int64], frames: int
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Share (F, n) of each frame that each trap spends in the upper state, and the state after them.
+
+    upper: (n,) before them.  switches: as of `Traps`, those of these frames.
+    """
+    place, tick = np.divmod(switches, TICKS)
+    odd = np.bincount(place, minlength=frames * upper.size).reshape(frames, upper.size) % 2 == 1
+    states = np.logical_xor.accumulate(np.concatenate([upper[None], odd]), axis=0)
+    share = states[:-1].astype(np.float64)
+    nth = np.arange(place.size) - np.searchsorted(place, place)
+    raises = np.where(states[:-1].reshape(-1)[place] ^ (nth % 2 == 1), -1.0, 1.0)
+    np.add.at(share.reshape(-1), place, raises * (1.0 - tick / TICKS))
+    return share, states[-1].copy()

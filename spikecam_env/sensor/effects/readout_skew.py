@@ -5,6 +5,7 @@
 
 Stage: read-out.  Seen in: steps of light (a row's response comes up to s frames later), moving edges (a slant);
 nothing in static light.
+Within a frame: integrated over the frame, in light that is linear in it.
 Source: sequential read-out of rows, as in a rolling shutter.  The light x_t of a frame rises by d_t from its start to
 its end: exact where it is linear in a frame.  Before frame 0 it is taken as steady; where another effect has changed it
 otherwise than by a factor, within a frame as well.
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class ReadoutSkew(Effect):
     span: float = parameter(0.9, unit="frames", bounds=(0.0, 1.0), doc="time s that reading all rows takes")
 
     stage = Stage.READOUT
+    within = Within.INTEGRATED
     strength = "span"
     within_frame = True
 

@@ -5,6 +5,7 @@
 
 Stage: threshold.  Seen in: the k-slope of A_k, T^2 kappa^2.
 Twins: excess_threshold_noise, shot_noise (separated by a second V_d).
+Within a frame: at the crossing; drawn anew at the reset.
 Source: paper (7), (12).
 """
 
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -23,6 +24,7 @@ class ResetNoise(Effect):
     sigma_mV: float = parameter(0.976, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a reset's voltage")
 
     stage = Stage.THRESHOLD
+    within = Within.CROSSING
     strength = "sigma_mV"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

@@ -4,6 +4,7 @@
 
 Stage: threshold.  Seen in: spikes a frame of a row: pixels of one row move together, rows do not.
 Twins: common_threshold_noise (all rows together), row_fixed_pattern (constant in time), ir_drop (follows activity).
+Within a frame: drawn once a frame; by assumption it holds for the frame.
 Source: shared reference lines of CMOS imagers; white by assumption.  A real wall recording shows none.
 """
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,7 @@ class RowTemporalNoise(Effect):
     sigma_mV: float = parameter(1.0, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a row's reference")
 
     stage = Stage.THRESHOLD
+    within = Within.DRAWN
     strength = "sigma_mV"
 
     def compare(self, now: Exposure, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:

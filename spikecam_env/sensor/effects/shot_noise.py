@@ -4,6 +4,7 @@
 
 Stage: integration.  Seen in: the k-slope of A_k, T^2/N.  Source: paper (3)-(4), where the photon count is
 drawn; here it is the collected electrons, dark ones included.  SCSim's script counts 5e4 quanta a frame at full scale.
+Within a frame: integrated over the frame; electrons are a Poisson stream in it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -33,6 +34,7 @@ class ShotNoise(Effect):
     )
 
     stage = Stage.INTEGRATION
+    within = Within.INTEGRATED
     strength = "quanta"
     neutral = math.inf
 

@@ -4,6 +4,7 @@
 
 Stage: read-out.  Seen in: the dark (a rate that is Poisson, unlike the pixel's); static light: intervals cut in two.
 Twins: random_telegraph_noise (two levels), afterpulsing (a fixed time after a spike), dark_current (regular).
+Within a frame: at the end of the frame; it acts on the bit that is read.
 Source: bit errors of the link or a metastable latch; independent by assumption.
 """
 
@@ -15,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
 
 _AT_ONCE = 256
 """Gaps drawn at a time."""
@@ -36,6 +37,7 @@ class SpuriousSpikes(Effect):
     probability: float = parameter(1e-5, unit="per frame", bounds=(0.0, 1.0), doc="chance p of a false spike")
 
     stage = Stage.READOUT
+    within = Within.END
     strength = "probability"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Strikes:

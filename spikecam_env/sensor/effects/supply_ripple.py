@@ -4,6 +4,7 @@
 
 Stage: threshold.  Seen in: light and dark: a line at f in the population's rate, amplitude rho at all levels.
 Twins: light_flicker (dark separates them), common_threshold_noise (no line).
+Within a frame: at the crossing.
 Source: rectified mains ripples at 100 or 120 Hz, converters from 100 kHz; 0.1 % of the supply is typical.
 """
 
@@ -14,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class SupplyRipple(Effect):
     phase_cycles: float = parameter(0.0, unit="cycles", bounds=(0.0, 1.0), doc="phase p at frame 0")
 
     stage = Stage.THRESHOLD
+    within = Within.CROSSING
     strength = "ripple"
 
     def compare(self, now: Exposure, memory: Any) -> tuple[Shift, Any]:

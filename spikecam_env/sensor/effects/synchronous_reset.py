@@ -3,6 +3,7 @@
     T = ceil(1/x) for steady light x;  averaged over x: mean interval + 1/2, successive intervals uncorrelated
 
 Stage: reset.  Seen in: flats (intervals locked to whole frames).
+Within a frame: at the crossing, exactly.
 Source: what simulators do that set the accumulator to zero.
 """
 
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, parameter
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class SynchronousReset(Effect):
     )
 
     stage = Stage.RESET
+    within = Within.CROSSING
     strength = "fraction"
 
     def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:

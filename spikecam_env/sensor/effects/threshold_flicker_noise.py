@@ -5,6 +5,7 @@
 
 Stage: threshold.  Seen in: A_k, which grows as k^2 where white noise grows as k.
 Twins: random_telegraph_noise (some pixels, dark), lamp_drift (all pixels together), reset_noise (white).
+Within a frame: drawn once a frame; an octave holds for an eighth of its correlation time, and no less than a frame.
 Source: 1/f noise of MOS transistors as a sum of Lorentzians (McWhorter 1957); octaves as in Voss and McCartney.
 """
 
@@ -16,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
 from spikecam_env.sensor.random_fields import Words, octave_field, words
 
 
@@ -35,6 +36,7 @@ class ThresholdFlickerNoise(Effect):
     )
 
     stage = Stage.THRESHOLD
+    within = Within.DRAWN
     strength = "sigma_mV"
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Octaves:

@@ -4,6 +4,7 @@
 
 Stage: optics.  Seen in: flats: a radial bowl, in proportion to light; absent in the dark.
 Twins: conversion_gain_spread (rough, not radial).
+Within a frame: constant in time.
 Source: first order of the cos^4 law, v = 2 tan^2(field angle); measured flat maps show 4 to 5 % of smooth
 shading about a centre above the middle, of which 1 % is left beside this law.
 """
@@ -14,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -25,6 +26,7 @@ class Vignetting(Effect):
     centre_y: float = parameter(0.5, unit="relative", bounds=(0.0, 1.0), doc="first row 0, last row 1")
 
     stage = Stage.OPTICS
+    within = Within.CONSTANT
     strength = "falloff"
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:

@@ -86,7 +86,7 @@ def look_ahead(state: AheadState, segment: Segment, threads: int | None) -> None
     elif segment.first > 0:
         state.reach = 0
     state.sample = sample
-    rest = MAX_SEGMENT if _is_steady(segment) else segment.length - segment.first
+    rest = segment.length - (0 if _is_steady(segment) else segment.first)
     count = min(state.reach, rest)
     if count <= segment.count:
         return

@@ -4,9 +4,9 @@ The effects' hooks say once a block what arrives and how the references move (`d
 then goes from frame to frame and does what depends on the spikes, from the numbers of `Feedback`.
 
 Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's
-draw mixed in.  N counts what the reset loses and where the reference stands at the reset.  What moves the reference, or
-the charge (`kick`), by delta from there to the next spike is taken without the shot noise of delta: of a spike's
-variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
+draw mixed in.  N counts where the reference stands at the reset, and not the light that falls while the node is held.
+What moves the reference, or the charge (`kick`), by delta from there to the next spike is taken without the shot noise
+of delta: of a spike's variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, Few, having
 from spikecam_env.sensor.kernels import block_loop, fast, loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
-from spikecam_env.sensor.light import GRAINS, Ramp, Segment
+from spikecam_env.sensor.light import GRAINS, Ramp, Segment, rise_of
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
 
@@ -168,6 +168,7 @@ def _parts(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[_Part]:
         if last is None or light is None or s.length != last.length or not _same_light(s, last):
             ends = fast.compilable(s.radiance0), fast.compilable(s.radiance1)
             light = Ramp(*loop.ramp(*ends, law.gain, law.dark, s.length))
+            light = replace(light, own_rise=rise_of(s, law.gain))
         last = s
         most = _most(light)
         for done in range(0, s.count, most):

@@ -535,12 +535,12 @@ def drawn(first, second, number, polynomial):  # type: ignore[no-untyped-def]
 def after_reset(over, rate, limit, per_root_rate, per_rate, kept):  # type: ignore[no-untyped-def]
     """Charge after a reset [grains], and how many electrons the next spike still needs [thresholds].
 
-    Those up to the limit and those lost; of charge thrown away in part, the rest is known less well than it was.
+    Those up to the limit: light that falls while the node is held never reaches it, nor does its noise; of charge
+    thrown away in part, the rest is known less well than it was.
     """
     root, over = math.sqrt(rate), over / _G
     left = ((over - root * per_root_rate) - rate * per_rate) * kept
-    lost = kept * (root * per_root_rate + rate * per_rate)
-    return on_grid(left * _G), limit * (1.0 / _G) + lost - kept * (1.0 - kept) * over
+    return on_grid(left * _G), limit * (1.0 / _G) - kept * (1.0 - kept) * over
 
 
 @njit(inline="always")

@@ -39,6 +39,30 @@ def test_comparator_delay_lengthens_intervals_by_the_root_of_their_length(interv
     check("mean interval", measured, interval + 0.1 * np.sqrt(interval), 1 / 399)
 
 
+def intervals_read(times: np.ndarray) -> np.ndarray:
+    """Intervals (P, n - 1) of spikes at these times (P, n) as the read-out sees them, in whole frames."""
+    return np.diff(np.floor(times), axis=1)
+
+
+@pytest.mark.parametrize("engine", ["reference", "fast"])
+@pytest.mark.parametrize(
+    "name, parameter, power", [("dead_time", "tau_us", 0.0), ("comparator_delay", "delay_us", 0.5)]
+)
+def test_light_on_a_held_node_brings_no_noise(name: str, parameter: str, power: float, engine: str) -> None:
+    """Intervals are the time that N electrons take, Gamma(N) / (N x), and 0.9 frames (times x^-1/2) on top: against
+    those times, drawn literally and read in whole frames.  With the noise of the light lost, N would be N (1 + 0.9 x).
+    """
+    x, electrons, pixels, count = 0.3, 100.0, 4000, 40
+    rng = np.random.default_rng(1)
+    steps = rng.gamma(electrons, 1 / (electrons * x), (pixels, count)) + 0.9 * x**-power
+    literal = intervals_read(np.cumsum(steps, axis=1) + rng.uniform(0, 10, (pixels, 1)))
+    model = jittered(quanta=electrons).with_effect(CATALOGUE[name](**{parameter: 0.9 * 25.0}))
+    seen = np.diff(spike_frames(model, np.full(pixels, 1 / x), count, engine, slack=2.4), axis=1)
+    check_mean("interval", seen - literal, 0.0)
+    check_mean("variance", (seen - seen.mean()) ** 2 - (literal - literal.mean()) ** 2, 0.0)
+    check_mean("lag 1", seen[:, 1:] * seen[:, :-1] - literal[:, 1:] * literal[:, :-1], 0.0)
+
+
 def steady_interval(x: float, fraction: float, tau: float) -> float:
     return brentq(lambda t: x * t - 1 + fraction * (1 - np.exp(-t / tau)), 0, 2 / x)
 
