@@ -30,10 +30,12 @@ DENSE = 64
 
 @dataclass
 class Camera:
-    """One camera before it is exposed; (H, W) float64, millivolts and picoamperes as their names say.
+    """One camera before it is exposed.
 
-    late: how much earlier than the frame's end each row is read (H,) [frames].  jitter: (F + 1,) by how much each
-    read-out is late.  offset_mV: (F * k, H or 1, W or 1).  reports: what happens to the bits, in order.
+    keys, levels: (K,) light over time [frames, thresholds a frame].  picture: (H, W) light of each pixel over that.
+    early: (H,) how long before the frame's end each row is read; jitter: (F + 1,) by how much each read-out is late
+    [frames].  offset_mV: (F * k, H or 1, W or 1) what is added to the thresholds.  reports: what happens to the bits,
+    in order.  law: the values of `Law` that are not 0.
     """
 
     model: SensorModel
@@ -44,7 +46,9 @@ class Camera:
     picture: Array
     rng: np.random.Generator
     law: dict[str, float] = field(default_factory=dict)
+    trap_pA: float = 0.0
     noise_V: float = 0.0
+    edge_V: float = 0.0
     kick: float = 0.0
     late_kick: bool = False
     share: float = 0.0
@@ -83,12 +87,10 @@ class Camera:
     def exposed(self) -> Bits:
         """Spikes (F, H, W) uint8."""
         electrons = self.law.get("electrons", 1000.0)
-        law = Law(**{"electrons": electrons, **self.law})
+        per_pA = electrons / (self.model.circuit.capacitance_fF * self.nominal_V * self.frames_per_s * 1e-3)
+        law = Law(**{**self.law, "trap": self.trap_pA * per_pA, "edge": electrons * self.edge_V / self.nominal_V})
         area = self.capacitance_fF * self.swing_V / (self.model.circuit.capacitance_fF * self.nominal_V)
-        pA_per_threshold = self.model.circuit.capacitance_fF * self.nominal_V * self.frames_per_s * 1e-3
-        dark = electrons * self.dark_pA / pA_per_threshold
-        if "trap_pA" in self.law:
-            raise KeyError("a trap is set in electrons")
+        dark = self.dark_pA * per_pA
         pixels = Pixels(self.gain, dark, electrons * area, self.noise_V / self.swing_V, self.trapped)
         spikes = np.zeros((self.frames, *self.shape), np.uint8)
         film = Film(self.keys, self.levels, _most(self.keys, self.levels, self.frames))
@@ -233,11 +235,9 @@ def photodiode_lag(effect: Any, camera: Camera) -> None:
 @law
 def random_telegraph_noise(effect: Any, camera: Camera) -> None:
     """A trap in a fraction of the pixels adds a current in one of its two states, which last exponential times."""
-    per_pA = camera.law["electrons"] / (
-        camera.model.circuit.capacitance_fF * camera.nominal_V * camera.frames_per_s * 1e-3
-    )
     camera.trapped = camera.rng.random(camera.shape) < effect.fraction
-    camera.law |= {"trap": effect.amplitude_pA * per_pA, "dwell": effect.dwell_ms * 1e-3 * camera.frames_per_s}
+    camera.trap_pA = effect.amplitude_pA
+    camera.law["dwell"] = effect.dwell_ms * 1e-3 * camera.frames_per_s
 
 
 # --- integration
@@ -334,6 +334,13 @@ def supply_ripple(effect: Any, camera: Camera) -> None:
 
 
 @law
+def clock_feedthrough(effect: Any, camera: Camera) -> None:
+    """phi + a (exp(-w/tau) - mean), w the time since the last edge of the array's clock, which all rows share."""
+    camera.edge_V = 1e-3 * effect.amplitude_mV
+    camera.law |= {"edge_phase": effect.phase_frames, "edge_tau": effect.tau_us * 1e-6 * camera.frames_per_s}
+
+
+@law
 def ir_drop(effect: Any, camera: Camera) -> None:
     """phi (1 + d a), a the share of the row that fired in the frame before."""
     camera.law["droop"] = effect.droop
@@ -377,9 +384,11 @@ def crosstalk(effect: Any, camera: Camera) -> None:
 
 @law
 def readout_skew(effect: Any, camera: Camera) -> None:
-    """Row r is read s (1 - r / (H - 1)) frames before the end of the frame."""
+    """Rows are read one after the other within |s| frames, the first first, or for s < 0 the last; the one that is read
+    last is read at the end of the frame."""
     rows = camera.shape[0]
-    camera.early = effect.span * (1.0 - np.arange(rows) / max(rows - 1, 1))
+    order = np.arange(rows) / max(rows - 1, 1)
+    camera.early = effect.span * (1.0 - order) if effect.span > 0.0 else -effect.span * order
 
 
 @law

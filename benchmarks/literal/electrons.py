@@ -30,7 +30,7 @@ class Law(NamedTuple):
     dead: the reset switch holds the node so long.  delay: of the comparator at one threshold a frame.
     left_*: share of a threshold left after a long interval, time constant.  synchronous: share lost until the read-out.
     droop: rise of a row's threshold when all of it fired in the frame before.  edge_*: of the array's clock, once a
-    frame: relative fall of the threshold, moment in the frame, time constant of its recovery.
+    frame: height that it adds to the threshold [electrons], moment in the frame, time constant of its decay.
     """
 
     electrons: float = 1000.0
@@ -120,50 +120,40 @@ def warming(t, law):
 
 
 @njit(cache=True, error_model="numpy")
-def reference(t, law):
-    """phi(t) over its mean: (1 + rho sin 2 pi (f t + p)) (1 - a exp(-w/tau)), w: since the clock's last edge."""
-    value = 1.0
+def reference(t, mean, law):
+    """phi(t) = mean (1 + rho sin 2 pi (f t + p)) + c(t)."""
+    phi = mean
     if law.ripple > 0.0:
-        value += law.ripple * np.sin(_TAU * (law.ripple_frequency * t + law.ripple_phase))
+        phi *= 1.0 + law.ripple * np.sin(_TAU * (law.ripple_frequency * t + law.ripple_phase))
     if law.edge != 0.0:
-        value *= 1.0 + clock_edge(t, law)
-    return value
+        phi += clock_edge(t, law)
+    return phi
 
 
 @njit(cache=True, error_model="numpy")
 def clock_edge(t, law):
-    """-a exp(-w/tau), summed over all edges that have been, one a frame; w = (t - v0) mod 1."""
+    """c(t) = a (exp(-w/tau) - its mean over a frame), w = (t - v0) mod 1: since the last edge of the array's clock."""
     since = (t - law.edge_phase) % 1.0
-    return -law.edge * np.exp(-since / law.edge_tau) / (1.0 - np.exp(-1.0 / law.edge_tau))
+    return law.edge * (np.exp(-since / law.edge_tau) - law.edge_tau * (1.0 - np.exp(-1.0 / law.edge_tau)))
 
 
 @njit(cache=True, error_model="numpy")
-def lowest_reference(law):
-    """A bound: phi(t) over its mean is never below."""
-    return (1.0 - law.ripple) * (1.0 - abs(law.edge) / (1.0 - np.exp(-1.0 / law.edge_tau)))
-
-
-@njit(cache=True, error_model="numpy")
-def meeting(charge, scale, offset, start, end, law):
-    """First moment in [start, end) at which scale * reference(t) + offset <= charge; `end` where there is none.
+def meeting(charge, mean, offset, start, end, law):
+    """First moment in [start, end) at which phi(t) + offset <= charge; `end` where there is none.
 
     Looked for in steps of 1/64 frame or of 1/32 period, whichever is less, then halved to 1e-9 frames.
     """
-    if scale * lowest_reference(law) + offset > charge:
+    if mean * (1.0 - law.ripple) - abs(law.edge) + offset > charge:
         return end
     step = min(1.0 / 64.0, 1.0 / (32.0 * max(law.ripple_frequency, 1e-9)))
     before, t = start, start
-    while True:
-        if scale * reference(t, law) + offset <= charge:
-            break
+    while reference(t, mean, law) + offset > charge:
         if t >= end:
             return end
         before, t = t, min(t + step, end)
-    if t >= end and scale * reference(end, law) + offset > charge:
-        return end
     while t - before > 1e-9:
         middle = 0.5 * (before + t)
-        if scale * reference(middle, law) + offset <= charge:
+        if reference(middle, mean, law) + offset <= charge:
             t = middle
         else:
             before = middle
@@ -206,7 +196,11 @@ def report(t, n, r, c, edges, spikes):
 
 @njit(cache=True, error_model="numpy")
 def live(n, r, c, start, end, scale, offset, law, pixels, film, nodes, edges, rng, spikes):
-    """One pixel from `start` to `end`, in its frame n, in which phi(t) = limit * scale * reference(t) + offset."""
+    """One pixel from `start` to `end`, in its frame n, with thresholds times `scale` plus `offset`.
+
+    Where the threshold comes down to the charge, the reset clears the node, and nothing is left.  What is drawn anew for
+    a frame comes down at its start by convention: what is above it then is kept, as the effects that do so state.
+    """
     moving = law.ripple > 0.0 or law.edge != 0.0
     gain, own, read = law.electrons * pixels.gain[r, c], pixels.threshold[r, c], edges[n + 1, r]
     brightest = gain * film.most[n] * (1.0 + law.flicker)
@@ -226,7 +220,8 @@ def live(n, r, c, start, end, scale, offset, law, pixels, film, nodes, edges, rn
                 met = meeting(nodes.charge[r, c], limit, offset, max(t, min(nodes.held[r, c], stop)), stop, law)
                 if met >= stop:
                     break
-                phi = limit * reference(met, law) + offset
+                drawn_anew = met == edges[n, r]
+                phi = reference(met, limit, law) + offset if drawn_anew else nodes.charge[r, c]
                 now = photocurrent(gain * radiance(met, law, film), own, law) + pixels.dark[r, c] * warming(met, law)
                 trips = reset(met, r, c, phi, (now + raised) / own, read, law, pixels, nodes, rng)
                 report(trips, n, r, c, edges, spikes)
@@ -256,11 +251,11 @@ def live(n, r, c, start, end, scale, offset, law, pixels, film, nodes, edges, rn
         if law.synchronous > 0.0 and t < nodes.swept[r, c] and rng.random() < law.synchronous:
             continue
         nodes.charge[r, c] += 1.0
-        phi = nodes.limit[r, c] * scale * reference(t, law) + offset
+        phi = reference(t, nodes.limit[r, c] * scale, law) + offset
         while nodes.charge[r, c] >= phi:
             now = photocurrent(gain * radiance(t, law, film), own, law) + pixels.dark[r, c] * warming(t, law) + raised
             report(reset(t, r, c, phi, now / own, read, law, pixels, nodes, rng), n, r, c, edges, spikes)
-            phi = nodes.limit[r, c] * scale * reference(t, law) + offset
+            phi = reference(t, nodes.limit[r, c] * scale, law) + offset
 
 
 @njit(cache=True, error_model="numpy")

@@ -269,6 +269,15 @@ def latency(edge: int, period: int) -> tuple[Statistic, ...]:
     )
 
 
+def bands(n: int) -> tuple[Statistic, ...]:
+    """Interval variance in each of n bands of rows."""
+
+    def in_band(k: int) -> Callable[[Bits], float]:
+        return lambda bits: _interval_variance(np.array_split(bits, n, axis=1)[k])
+
+    return tuple(Statistic(f"interval variance, band {k + 1} of {n}", in_band(k)) for k in range(n))
+
+
 def windows(*frames: int) -> tuple[Statistic, ...]:
     return tuple(Statistic(f"variance in {n} frames", _window_variance(n)) for n in frames)
 
