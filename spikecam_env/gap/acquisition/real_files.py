@@ -210,8 +210,12 @@ def _light(source: _Source, label: Label, part: _Part, unit: float) -> Keyframes
 
 
 def _later(light: Keyframes | None, frames: int) -> Keyframes | None:
-    """The light of a recording that begins so many frames later."""
-    return None if light is None else Keyframes(light.frame - frames, light.radiance)
+    """The light of a recording that begins so many frames later, from the last key before it on: earlier ones may be so
+    near each other (`Keyframes.steps`) that far below zero they would be one."""
+    if light is None:
+        return None
+    first = max(int(np.searchsorted(light.frame, frames, side="right")) - 1, 0)
+    return Keyframes(light.frame[first:] - frames, light.radiance[first:])
 
 
 def _write(folder: Path, piece: _Piece) -> dict[str, Any]:

@@ -10,6 +10,8 @@ import pytest
 from spikecam_env.calibration import calibrate
 from spikecam_env.errors import InputError
 from spikecam_env.gap import Dark, Flat, Label, Step, import_campaign, labels_from_table, write_campaign
+from spikecam_env.gap.acquisition import real_files
+from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
 
 REAL = Path(__file__).parents[3].parent / "shared" / "data" / "real"
@@ -190,3 +192,11 @@ def test_the_wall_and_the_flat_maps_become_campaigns(tmp_path: Path) -> None:
     assert np.median(dim.rate() - dark.rate()) == pytest.approx(dim.static_radiance()[0, 0], rel=1e-6)
     assert np.median(lit.rate() - dark.rate()) == pytest.approx(lit.static_radiance()[0, 0], rel=1e-6)
     assert dark.static_radiance().max() == 0.0
+
+
+def test_light_that_jumps_is_the_same_for_a_part_that_begins_later():
+    jumps = np.array([0.0, 1.5, 900.25, 1200.75])
+    light = Keyframes.steps(jumps, np.array([0.1, 0.4, 0.2, 0.3], np.float32).reshape(-1, 1, 1))
+    later = real_files._later(light, 1000)
+    for t in (0.0, 200.7, 200.75, 900.0):
+        assert later.at(t) == light.at(t + 1000)
