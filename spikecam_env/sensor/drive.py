@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Field, Spikes, having
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.sensor.model import generator
@@ -20,30 +21,64 @@ Memory = dict[str, Any]
 """What each effect remembers, by its name."""
 
 
+MOST_INTERVALS = 1024
+"""Parts of a frame at most: 32 periods of a sine."""
+
+_TOUCHES = 1e-9
+"""A kink that near to the end of a part [frames] is there: rounding would leave it on either side."""
+
+
+@dataclass(frozen=True)
+class Sway:
+    """How the references move within F frames of H rows: linear between n nodes.
+
+    at: (H or 1, n) moments of the row's own frame, 0 .. 1, ascending; where a reference jumps, twice the same.
+    factor, common [mV]: (F or 1, H or 1, n), with what holds for the frame.
+    """
+
+    at: Array
+    factor: Array
+    common: Array
+
+
 @dataclass(frozen=True)
 class Comparators:
     """A pixel fires at threshold * factor + grains_per_mV * (common + field), in F frames of H rows and P pixels.
 
     factor: (F, H).  common: (F, H) [mV].  field: (F, P), or (1, P) where all frames are alike, float32 [mV].
-    grains_per_mV: (P,).
+    grains_per_mV: (P,).  sway: where factor and common move within the frames; these are then the least of each frame.
     """
 
     factor: Array
     common: Array
     field: Field
     grains_per_mV: Array
+    sway: Sway | None
 
 
 def begin(first: Exposure, effects: Sequence[Effect], seed: int, unit_seed: int | None = None) -> Memory:
     """What each effect remembers at the first frame.
 
     Each has generators of its own: adding or removing one leaves the draws of the others as they were.
+    Raises InputError for a reference that moves too fast within a frame.
     """
+    _check_intervals(first, effects)
     of_unit = seed if unit_seed is None else unit_seed
     return {
         e.name: e.begin(first, generator(of_unit, f"{e.name}: unit"), generator(seed, f"{e.name}: temporal"))
         for e in effects
     }
+
+
+def _check_intervals(first: Exposure, effects: Sequence[Effect]) -> None:
+    for effect in effects:
+        parts = effect.intervals(first)
+        if parts > MOST_INTERVALS:
+            raise InputError(
+                f"{effect.name} moves the reference too fast: a frame of {1e6 / first.frame_rate_hz:g} us would be cut "
+                f"into {parts} parts; {MOST_INTERVALS} are allowed (32 periods of a sine): lower its frequency, "
+                "lengthen its time constant, or raise frame_rate_hz"
+            )
 
 
 def expected_charge(
@@ -73,10 +108,23 @@ def wants_rise(effects: Sequence[Effect]) -> bool:
     return any(effect.within_frame for effect in effects)
 
 
+def intervals(first: Exposure, effects: Sequence[Effect]) -> int:
+    """Parts of a frame between the nodes of `Sway`; 0 where no reference moves within a frame."""
+    return max((effect.intervals(first) for effect in effects), default=0)
+
+
+def lead(first: Exposure, effects: Sequence[Effect]) -> Array:
+    """How long before the end of the array's frame each row is read (H, 1) [frames].
+
+    At u of its own frame, 0 .. 1, the array's clock stands at u - lead.
+    """
+    return np.zeros((first.shape[0], 1)) + sum(effect.lead(first) for effect in effects)
+
+
 def comparators(now: Exposure, effects: Sequence[Effect], memory: Memory) -> Comparators:
     """How the references move in the frames; updates `memory`."""
-    factor = np.ones((now.frames, now.shape[0], 1))
-    common = np.zeros((now.frames, now.shape[0], 1))
+    whole = (now.frames, now.shape[0])
+    factor, common = np.ones((1, 1, 1)), np.zeros((1, 1, 1))
     fields: list[Field] = []
     for effect in having("compare", effects):
         shift, memory[effect.name] = effect.compare(now, memory[effect.name])
@@ -86,10 +134,52 @@ def comparators(now: Exposure, effects: Sequence[Effect], memory: Memory) -> Com
             common = common + millivolts
         else:
             fields.append(millivolts.astype(np.float32, copy=False))
+    sway = _sway(now, effects, factor, common)
+    if sway is not None:
+        factor, common = sway.factor.min(axis=2, keepdims=True), sway.common.min(axis=2, keepdims=True)
     pixels = now.shape[0] * now.shape[1]
     field = reduce(np.add, fields) if fields else np.zeros((1, pixels), dtype=np.float32)
     grains_per_mV = GRAINS * (1e-3 / now.unit.swing_V)
-    return Comparators(factor[:, :, 0], common[:, :, 0], field.reshape(-1, pixels), grains_per_mV)
+    factor, common = (np.broadcast_to(rows, (*whole, 1))[:, :, 0] for rows in (factor, common))
+    return Comparators(factor, common, field.reshape(-1, pixels), grains_per_mV, sway)
+
+
+def _sway(now: Exposure, effects: Sequence[Effect], factor: Array, common: Array) -> Sway | None:
+    """How the references move within the frames besides factor and common (F or 1, H or 1, 1), which hold for each."""
+    parts = intervals(now, effects)
+    if parts == 0:
+        return None
+    swaying = [effect for effect in effects if effect.intervals(now)]
+    early = lead(now, effects)
+    at = _nodes(parts, [kink for effect in swaying for kink in effect.kinks(now)], early)
+    early = early if early.any() else np.zeros((1, 1))
+    phase, piece = at - early, _beside(at, 1.0 / parts) - early
+    for effect in swaying:
+        shift = effect.sway(now, phase, piece)
+        factor, common = factor * shift.factor, common + shift.millivolts
+    nodes = at.shape[1]
+    return Sway(at, *(np.broadcast_to(wave, (*wave.shape[:2], nodes)) for wave in (factor, common)))
+
+
+def _nodes(parts: int, kinks: Sequence[float], early: Array) -> Array:
+    """Ends of the parts of a frame, and twice each kink, (H or 1, n) ascending."""
+    ends = np.arange(parts + 1)[None] / parts
+    if not kinks:
+        return ends
+    early = early if early.any() else np.zeros((1, 1))
+    moments = (np.array(kinks)[None] + early) % 1.0
+    near = np.round(moments * parts) / parts
+    moments = np.where(np.abs(moments - near) < _TOUCHES, near % 1.0, moments)
+    return np.sort(np.concatenate([np.repeat(ends, len(moments), axis=0), moments, moments], axis=1), axis=1)
+
+
+def _beside(at: Array, part: float) -> Array:
+    """A moment beside each node, on the side on which it is of several nodes at the same moment."""
+    middles = 0.5 * (at[:, 1:] + at[:, :-1])
+    left = np.concatenate([at[:, :1] - 0.5 * part, middles], axis=1)
+    right = np.concatenate([middles, middles[:, -1:]], axis=1)
+    last = np.concatenate([at[:, 1:] > at[:, :-1], np.zeros((len(at), 1), dtype=np.bool_)], axis=1)
+    return np.where(last, right, left)
 
 
 def read_out(now: Exposure, effects: Sequence[Effect], memory: Memory, spikes: Spikes) -> Spikes:

@@ -4,6 +4,7 @@
     while charge >= threshold:  spike;  charge -= threshold;  threshold = 1 + kappa n      (drawn at each reset)
 
 Reset is asynchronous: charge after the crossing is kept.  A frame reports one bit; further crossings in it are lost.
+Where references move within the frame (`crossing`), a pixel fires when it is first at its own.
 However far noise and effects go, a frame brings MOST_GRAINS at most and a comparator trips at LEAST_LIMIT at least.
 Charge is in grains of the pixel's own threshold (`light`), so without noise all sums are exact integers.  Effects see
 it in thresholds, a power of two away, so that to go there and back changes no bit.
@@ -13,11 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
+from spikecam_env.sensor.crossing import first_crossing
 from spikecam_env.sensor.effects.base import Effect, Exposure, having
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Segment, ramp
 from spikecam_env.sensor.model import generator
@@ -79,8 +82,13 @@ def step(
     mean = np.minimum(np.maximum(light.values[0], 0.0).reshape(-1) * GRAINS + dark_grains, MOST_GRAINS)
     missed = np.minimum(state.missed, mean)
     state.missed -= missed
-    state.charge += collect(now.unit, mean, dark_grains, missed, state.rng)
-    fired = fire(now, effects, state, mean, references(now, effects, state)).reshape(now.shape)
+    gained = collect(now.unit, mean, dark_grains, missed, state.rng)
+    state.charge += gained
+    law = drive.comparators(now, effects, state.memory)
+    if law.sway is None:
+        fired = fire(now, effects, state, mean, references(now, effects, state, law)).reshape(now.shape)
+    else:
+        fired = fire_within(now, effects, state, mean, gained, law).reshape(now.shape)
     for effect in having("spiked", effects):
         charge, rate = thresholds(state.charge, now), thresholds(mean, now)
         charge, state.memory[effect.name] = effect.spiked(charge, fired, rate, now, state.memory[effect.name])
@@ -102,22 +110,30 @@ def collect(unit: Unit, mean: Array, dark: Array, missed: Array, rng: np.random.
     return electrons * (GRAINS / unit.electrons) + certain
 
 
-def references(now: Exposure, effects: Sequence[Effect], state: ReferenceState) -> Callable[[Array], Array]:
+def references(
+    now: Exposure, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
+) -> Callable[[Array], Array]:
     """What the comparators compare with in this frame, as a function of the thresholds (P,) [grains]."""
-    moving, reacting = having("compare", effects), having("react", effects)
-    if not moving and not reacting:
+    if not having("compare", effects) and not having("react", effects):
         return lambda threshold: np.maximum(threshold, LEAST_LIMIT)
-    law = drive.comparators(now, moving, state.memory)
-    factor, common = (np.broadcast_to(rows.T, now.shape).reshape(-1) for rows in (law.factor, law.common))
-    offset = law.grains_per_mV * (common + law.field[0])
+    return partial(compared_with, now, effects, state, law, law.factor.T, law.common.T)
 
-    def compared_with(threshold: Array) -> Array:
-        limit = thresholds(threshold * factor + offset, now)
-        for effect in reacting:
-            limit = effect.react(limit, now, state.memory[effect.name])
-        return np.maximum(limit.reshape(-1) * GRAINS, LEAST_LIMIT)
 
-    return compared_with
+def compared_with(
+    now: Exposure,
+    effects: Sequence[Effect],
+    state: ReferenceState,
+    law: drive.Comparators,
+    factor: Array,
+    common: Array,
+    threshold: Array,
+) -> Array:
+    """What pixels of these thresholds compare with (P,) [grains], where factor and common (H or 1, 1) [mV] stand so."""
+    factor, common = (np.broadcast_to(rows, now.shape).reshape(-1) for rows in (factor, common))
+    limit = thresholds(threshold * factor + law.grains_per_mV * (common + law.field[0]), now)
+    for effect in having("react", effects):
+        limit = effect.react(limit, now, state.memory[effect.name])
+    return np.maximum(limit.reshape(-1) * GRAINS, LEAST_LIMIT)
 
 
 def fire(
@@ -142,6 +158,35 @@ def fire(
         state.threshold[crossed] = draw_threshold(now.unit.kappa[crossed], state.rng)
         limit = compared_with(state.threshold)
         crossed = crossed[state.charge[crossed] >= limit[crossed]]
+    return fired
+
+
+def fire_within(
+    now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array, gained: Array, law: drive.Comparators
+) -> NDArray[np.bool_]:
+    """As `fire`, where references move within the frame, over which the charge gained (P,) comes evenly."""
+    sway = law.sway
+    assert sway is not None
+    pixels, columns = mean.size, now.shape[1]
+    at = np.broadcast_to(np.repeat(sway.at.T, columns if len(sway.at) > 1 else 1, axis=1), (sway.at.shape[1], pixels))
+    nodes = [(sway.factor[0, :, k, None], sway.common[0, :, k, None]) for k in range(len(at))]
+    fired, since = np.zeros(pixels, dtype=np.bool_), np.zeros(pixels)
+    acting = having("after_reset", effects)
+    left = np.arange(pixels)
+    while left.size:
+        limits = np.stack([compared_with(now, effects, state, law, *node, state.threshold)[left] for node in nodes])
+        begin = state.charge[left] - gained[left]
+        moment, taken = first_crossing(begin, gained[left], since[left], at[:, left], limits)
+        crosses = moment <= 1.0
+        crossed, since[left] = left[crosses], moment
+        fired[crossed] = True
+        residual = (state.charge[crossed] - taken[crosses]) / GRAINS
+        for effect in acting:
+            residual = effect.after_reset(residual, mean[crossed] / GRAINS, now)
+            state.missed[crossed] += effect.feedback(now).lost(mean[crossed] / GRAINS) * GRAINS
+        state.charge[crossed] = residual * GRAINS
+        state.threshold[crossed] = draw_threshold(now.unit.kappa[crossed], state.rng)
+        left = crossed
     return fired
 
 

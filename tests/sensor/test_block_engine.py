@@ -18,7 +18,7 @@ from benchmarks.agreement import compare, observe
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, decay, random_fields
 from spikecam_env.sensor.effects.base import Array, Charge, Exposure, Spikes, parameter
-from spikecam_env.sensor.kernels import block, block_loop, draws, loop
+from spikecam_env.sensor.kernels import block, block_loop, draws, loop, within
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.random_fields import octave_field, white_field, words
@@ -67,7 +67,16 @@ def started(model: SensorModel, engine: str, phase: Array) -> SpikeSensor:
 
 
 @pytest.mark.parametrize(
-    "name", ["dead_time", "crosstalk", "ir_drop", "row_temporal_noise", "random_telegraph_noise", "readout_skew"]
+    "name",
+    [
+        "dead_time",
+        "crosstalk",
+        "ir_drop",
+        "row_temporal_noise",
+        "random_telegraph_noise",
+        "readout_skew",
+        "clock_feedthrough",
+    ],
 )
 def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("spikecam_env.threads.PIXEL_STEPS_A_THREAD", 1)
@@ -92,7 +101,7 @@ def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.
 
 
 @pytest.mark.parametrize("shape", [(2, 2500), (3, 1021), (25, 100)])
-@pytest.mark.parametrize("name", ["crosstalk", "ir_drop", "incomplete_reset", "dead_time"])
+@pytest.mark.parametrize("name", ["crosstalk", "ir_drop", "incomplete_reset", "dead_time", "clock_feedthrough"])
 def test_rows_wider_than_a_band_and_bands_of_rows_have_the_bits_of_the_reference(
     name: str, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -268,6 +277,11 @@ def test_octave_field_keeps_unit_variance_and_its_correlation() -> None:
 def test_the_kernel_names_the_decay_that_it_is_compiled_with() -> None:
     now = zlib.crc32(inspect.getsource(decay).encode())
     assert now == block_loop.DECAY, f"the decay has changed: write DECAY = {now:#x} in {block_loop.__file__}"
+
+
+def test_the_kernel_names_the_crossings_that_it_is_compiled_with() -> None:
+    now = zlib.crc32(inspect.getsource(within).encode())
+    assert now == block_loop.WITHIN, f"crossings have changed: write WITHIN = {now:#x} in {block_loop.__file__}"
 
 
 def test_kernels_name_the_draws_that_they_are_compiled_with() -> None:

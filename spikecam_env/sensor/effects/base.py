@@ -13,7 +13,8 @@ once a recording:
 for a block of frames, whatever fires in it; arrays have a leading axis of time:
 
     collect      charge expected, from light and in the dark, before shot noise
-    compare      how the comparators' reference moves
+    compare      how the comparators' reference moves from frame to frame
+    sway         how it moves within them; `intervals` and `kinks` say how finely
     read_out     bits reported
 
 and frame by frame, for what depends on the spikes:
@@ -53,6 +54,10 @@ from spikecam_env.sensor.within_frame import Moments
 Array = NDArray[np.float64]
 Field = NDArray[np.float32]
 Spikes = NDArray[np.bool_]
+
+
+A_CYCLE = 32
+"""Parts of a period of a sine that are taken as linear: within (2 pi / 32)^2 / 8, half a per cent of its amplitude."""
 
 
 class Stage(IntEnum):
@@ -177,9 +182,10 @@ class Charge:
 class Shift:
     """How the comparators' reference moves: a pixel fires at its threshold * factor + millivolts over its swing.
 
-    factor: (F, H, 1), with 1 for F or H where all are alike.  millivolts: (F, H, W), with 1 for F, H or W; a field
-    that differs from pixel to pixel is taken in single precision.  Either may be a number.  Of several effects the
-    factors multiply and the millivolts add.
+    From frame to frame (`compare`): factor: (F, H, 1), with 1 for F or H where all are alike.  millivolts: (F, H, W),
+    with 1 for F, H or W; a field that differs from pixel to pixel is taken in single precision.
+    Within frames (`sway`): either (F, H, n), with 1 for F or H, at the n moments asked for.
+    Either may be a number.  Of several effects the factors multiply and the millivolts add.
     """
 
     factor: Array | float = 1.0
@@ -280,6 +286,27 @@ class Effect:
         """How the comparators' reference moves in these frames, and the memory."""
         return Shift(), memory
 
+    def intervals(self, first: Exposure) -> int:
+        """Parts of a frame, in each of which the reference moves by `sway` as if linearly; 0: not within a frame."""
+        return 0
+
+    def kinks(self, first: Exposure) -> tuple[float, ...]:
+        """Phases of the array's clock [frames], in [0, 1), at which `sway` jumps."""
+        return ()
+
+    def sway(self, now: Exposure, phase: Array, piece: Array) -> Shift:
+        """How the reference moves within these frames, at moments (H or 1, n) of each.
+
+        phase: of the array's clock at those moments [frames]: 0 at the start of the frame, below 0 in the rows that
+        are read before its end.  piece: a phase beside it between the same two kinks: where the reference jumps there
+        are two moments, before and after, of the same phase and of different pieces.
+        """
+        return Shift()
+
+    def lead(self, first: Exposure) -> Array | float:
+        """How long before the end of the array's frame each row is read (H, 1) [frames]."""
+        return 0.0
+
     def read_out(self, spikes: Spikes, now: Exposure, memory: Any) -> tuple[Spikes, Any]:
         """The bits reported (F, H, W), and the memory."""
         return spikes, memory
@@ -301,7 +328,7 @@ class Effect:
         return Feedback()
 
 
-BLOCK_HOOKS = ("collect", "compare", "read_out")
+BLOCK_HOOKS = ("collect", "compare", "sway", "read_out")
 SPIKE_HOOKS = ("react", "after_reset", "spiked")
 FRAME_HOOKS = ("begin", *BLOCK_HOOKS, *SPIKE_HOOKS)
 

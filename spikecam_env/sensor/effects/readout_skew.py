@@ -1,14 +1,17 @@
-"""Read-out skew: rows are read one after the other, the first earlier than the last.
+"""Read-out skew: rows are read one after the other, by the array's clock, the first or the last row first.
 
-    row r is read e = s (1 - r/(H - 1)) frames before the end of the frame that its bit is counted in
-    light of its frame: x_t <- x_t + e (x_(t-1) - x_t) + e (1 - e) / 2 (d_(t-1) - d_t)
+    s > 0, first row first: row r is read e = s (1 - r/(H - 1)) frames before the end of the frame its bit is counted in
+    s < 0, last row first:                e = -s r/(H - 1)
+    light of its frame: x_t <- x_t + e (x_(t-1) - x_t) + e (1 - e) / 2 (d_(t-1) - d_t);  e > 1: t - 1 for t, e - 1 for e
+    the array's clock at u of a row's own frame (u: 0 .. 1): v = u - e
 
-Stage: read-out.  Seen in: steps of light (a row's response comes up to s frames later), moving edges (a slant);
-nothing in static light.
+Stage: read-out.  Seen in: steps of light (a row's response comes up to |s| frames later), moving edges (a slant).
+In static light it acts through what follows the array's clock alone: the phase of supply_ripple and clock_feedthrough
+then differs from row to row.
 Within a frame: integrated over the frame, in light that is linear in it.
-Source: sequential read-out of rows, as in a rolling shutter.  The light x_t of a frame rises by d_t from its start to
-its end: exact where it is linear in a frame.  Before frame 0 it is taken as steady; where another effect has changed it
-otherwise than by a factor, within a frame as well.
+Source: sequential read-out of rows, as in a rolling shutter; a wall recording by a public camera has s near -1.1.  The
+light x_t of a frame rises by d_t from its start to its end: exact where it is linear in a frame.  Before frame 0 it is
+taken as steady; where another effect has changed it otherwise than by a factor, within a frame as well.
 """
 
 from __future__ import annotations
@@ -17,12 +20,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Spikes, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
 class ReadoutSkew(Effect):
-    span: float = parameter(0.9, unit="frames", bounds=(0.0, 1.0), doc="time s that reading all rows takes")
+    span: float = parameter(
+        0.9,
+        unit="frames",
+        bounds=(-1.25, 1.25),
+        doc="time s that reading all rows takes; below 0: the last row is read first",
+    )
 
     stage = Stage.READOUT
     within = Within.INTEGRATED
@@ -32,27 +40,34 @@ class ReadoutSkew(Effect):
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None
 
+    def lead(self, first: Exposure) -> Array:
+        rows = first.shape[0]
+        in_order = np.arange(rows)[:, None] / max(rows - 1, 1)
+        return self.span * (1.0 - in_order) if self.span > 0.0 else -self.span * in_order
+
     def collect(
         self, light: Charge, dark: Charge, now: Exposure, memory: tuple[Array, Array] | None
     ) -> tuple[Charge, Charge, tuple[Array, Array]]:
         x, d = light.values, light.rises
-        last, last_d = memory or (x[0], np.zeros(now.shape))
-        if len(x) == 1 and not d.any() and not last_d.any() and np.array_equal(last, x[0]):
+        last, last_d = memory or (np.repeat(x[:1], 2, axis=0), np.zeros((2, *now.shape)))
+        if len(x) == 1 and not d.any() and not last_d.any() and np.all(last == x[0]):
             return light, dark, (last, last_d)
-        x, d = np.broadcast_to(x, (now.frames, *now.shape)), np.broadcast_to(d, (now.frames, *now.shape))
-        rows = now.shape[0]
-        early = self.span * (1.0 - np.arange(rows)[:, None] / max(rows - 1, 1))
-        read, slant = _earlier(x, last), _earlier(d, last_d)
+        x, d = (
+            np.concatenate([before, np.broadcast_to(new, (now.frames, *now.shape))])
+            for before, new in ((last, x), (last_d, d))
+        )
+        early = self.lead(now)
+        over = early > 1.0
+        early = early - over
+        read, slant = _earlier(x, over), _earlier(d, over)
         read *= early
-        read += x
+        read += np.where(over, x[1:-1], x[2:]) if over.any() else x[2:]
         slant *= 0.5 * early * (1.0 - early)
         read += slant
-        return Charge(read), dark, (x[-1].copy(), d[-1].copy())
+        return Charge(read), dark, (x[-2:].copy(), d[-2:].copy())
 
 
-def _earlier(now: Array, last: Array) -> Array:
-    """(F, H, W) by how much more there was in the frame before; last: in that before the first."""
-    more = np.empty(now.shape)
-    np.subtract(last, now[0], out=more[0])
-    np.subtract(now[:-1], now[1:], out=more[1:])
-    return more
+def _earlier(values: Array, over: Spikes) -> Array:
+    """(F, H, W) by how much more there was in the frame before, of F + 2; of rows `over` (H, 1): one before that."""
+    last = values[1:-1] - values[2:]
+    return np.where(over, values[:-2] - values[1:-1], last) if over.any() else last

@@ -2,6 +2,9 @@
 
     phi(t) <- phi (1 + rho sin(2 pi (f t + p)));   slow ripple: rate = x / (1 + rho sin)
 
+A pixel fires at the moment within the frame at which its charge reaches the swinging threshold; the sine is taken as
+linear in 32 parts of a period, within half a per cent of rho.  Up to 32 periods a frame.  t is the time of the array's
+clock: with readout_skew rows see the ripple shifted.
 Stage: threshold.  Seen in: light and dark: a line at f in the population's rate, amplitude rho at all levels.
 Twins: light_flicker (dark separates them), common_threshold_noise (no line).
 Within a frame: at the crossing.
@@ -10,12 +13,12 @@ Source: rectified mains ripples at 100 or 120 Hz, converters from 100 kHz; 0.1 %
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import A_CYCLE, Array, Effect, Exposure, Shift, Stage, Within, parameter
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,10 @@ class SupplyRipple(Effect):
     within = Within.CROSSING
     strength = "ripple"
 
-    def compare(self, now: Exposure, memory: Any) -> tuple[Shift, Any]:
-        wave = np.sin(2.0 * np.pi * (self.frequency_hz * now.middle_s + self.phase_cycles))
-        return Shift(factor=1.0 + self.ripple * wave), memory
+    def intervals(self, first: Exposure) -> int:
+        return max(1, math.ceil(A_CYCLE * self.frequency_hz / first.frame_rate_hz)) if self.ripple else 0
+
+    def sway(self, now: Exposure, phase: Array, piece: Array) -> Shift:
+        frame = (now.number + np.arange(now.frames, dtype=np.float64))[:, None, None]
+        cycles = self.frequency_hz * ((frame + phase) / now.frame_rate_hz) + self.phase_cycles
+        return Shift(factor=1.0 + self.ripple * np.sin(2.0 * np.pi * cycles))

@@ -35,6 +35,11 @@ _MOVING = 1 << 16
 """Where light moves, since a dozen such arrays are then made of it: half a megabyte each, which a cache holds and the
 allocator keeps; fresh pages cost up to four times the arithmetic."""
 
+_NODES = 1 << 20
+"""Nodes of a block at which references that move within the frame stand, at most: eight megabytes."""
+
+_STILL = drive.Sway(np.empty((1, 0)), np.empty((1, 1, 0)), np.empty((1, 1, 0)))
+
 _NOBODY = Few(np.empty(0, np.intp), np.empty((1, 0)))
 
 _FEWEST, _LONGEST = 8, 256
@@ -123,7 +128,8 @@ def run(
     first, effects: as given to `start`.  threads: default NUMBA_NUM_THREADS.
     """
     done = 0
-    for parts in _blocks(state.law, segments):
+    longest = _longest(first, effects)
+    for parts in _blocks(state.law, segments, longest):
         mean = _mean(parts)
         rise = _rise(parts) if drive.wants_rise(effects) else 0.0
         count = sum(part.count for part in parts)
@@ -143,12 +149,17 @@ class _Part:
     count: int
 
 
-def _blocks(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[list[_Part]]:
+def _longest(first: Exposure, effects: Sequence[Effect]) -> int:
+    """Frames of a block at most, whatever the light."""
+    return max(min(_LONGEST, _NODES // (first.shape[0] * (drive.intervals(first, effects) + 1))), 1)
+
+
+def _blocks(law: BlockLaw, segments: Iterable[Segment], longest: int) -> Iterator[list[_Part]]:
     """Parts that make a block: light that moves, or the same light that stays."""
     block: list[_Part] = []
     frames = 0
-    for part in _parts(law, segments):
-        if block and (frames + part.count > _most(part.light) or not _alike(block[-1].light, part.light)):
+    for part in _parts(law, segments, longest):
+        if block and (frames + part.count > _most(part.light, longest) or not _alike(block[-1].light, part.light)):
             yield block
             block, frames = [], 0
         block.append(part)
@@ -157,12 +168,12 @@ def _blocks(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[list[_Part]]
         yield block
 
 
-def _most(light: Ramp) -> int:
+def _most(light: Ramp, longest: int) -> int:
     """Frames of a block in such light, at most."""
-    return min(max(_FEWEST, (_BLOCK if light.steady else _MOVING) // light.level.size), _LONGEST)
+    return min(max(_FEWEST, (_BLOCK if light.steady else _MOVING) // light.level.size), longest)
 
 
-def _parts(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[_Part]:
+def _parts(law: BlockLaw, segments: Iterable[Segment], longest: int) -> Iterator[_Part]:
     last, light = None, None
     for s in segments:
         if last is None or light is None or s.length != last.length or not _same_light(s, last):
@@ -170,7 +181,7 @@ def _parts(law: BlockLaw, segments: Iterable[Segment]) -> Iterator[_Part]:
             light = Ramp(*loop.ramp(*ends, law.gain, law.dark, s.length))
             light = replace(light, own_rise=rise_of(s, law.gain))
         last = s
-        most = _most(light)
+        most = _most(light, longest)
         for done in range(0, s.count, most):
             yield _Part(light, s.first + done, min(most, s.count - done))
 
@@ -196,6 +207,7 @@ def _block(
 ) -> None:
     light, dark = drive.expected_charge(now, effects, state.memory, mean, rise)
     law = drive.comparators(now, effects, state.memory)
+    sway = law.sway or _STILL
     feedback = _sum([e.feedback(now) for e in effects])
     light = light if light.few is None else Charge(light.values)
     few = dark.few or _NOBODY
@@ -212,6 +224,7 @@ def _block(
         np.ascontiguousarray(law.common),
         law.field,
         law.grains_per_mV,
+        *(np.ascontiguousarray(nodes) for nodes in (sway.at, sway.factor, sway.common)),
         tuple(float(number) for number in feedback),
         state.law.per_electron,
         state.law.kappa_squared,

@@ -7,6 +7,7 @@
 The same operations in the same order, in float64, so that without noise the bits are the reference's.  With noise the
 electrons still to come are drawn once a spike, as in the jump kernel (`fast`).  No fastmath.
 
+Where references move within the frame, limits are their least, and who reaches that is looked at again (`within`).
 Where nothing moves from frame to frame, or only what single pixels get, a pixel goes from spike to spike instead
 (`jump`).  Charge is held on a grid (`on_grid`) on which sums are exact: so many frames at once are so many one by one.
 
@@ -24,6 +25,7 @@ import numpy as np
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
+from spikecam_env.sensor.kernels.within import between, first_crossing, stands
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
 
 BAND = 1024
@@ -36,9 +38,9 @@ WORTH, SPARSE = 4, 0.5
 """Frames of a block from which on, and spikes a pixel and frame up to which, going from spike to spike is faster than
 going from frame to frame."""
 
-DRAWS, DECAY = 0x3BD9BCE3, 0xFDEE1FA
-"""Checksums of the draws and of the decay compiled in: numba's cache sees a change of this file, not of those it
-imports from."""
+DRAWS, DECAY, WITHIN = 0x3BD9BCE3, 0xFDEE1FA, 0xAABA32C
+"""Checksums of the draws, the decay and the crossings within a frame compiled in: numba's cache sees a change of this
+file, not of those it imports from."""
 
 decay = njit(inline="always")(decayed)
 
@@ -95,6 +97,9 @@ def advance(  # type: ignore[no-untyped-def]
     common,
     field,
     grains_per_mV,
+    at,
+    swayed_factor,
+    swayed_common,
     feedback,
     per_electron,
     kappa_squared,
@@ -112,6 +117,8 @@ def advance(  # type: ignore[no-untyped-def]
 
     light, dark: (F or 1, P) [thresholds]; extra: (F, n), what the pixels few (n,), ascending, get in the dark besides.
     light_factor, dark_factor, factor, common [mV]: (F, H).  field: (F or 1, P) float32 [mV].  grains_per_mV: (P,).
+    at, swayed_factor, swayed_common: nodes of `drive.Sway`, none where no reference moves within a frame; where one
+    does, factor and common are the least of each frame.
     feedback: the numbers of `Feedback`, in its order.  per_electron (1/N), kappa_squared: (P,).  polynomial: 8 float32.
     seed_low, seed_high: uint32.
     charge, threshold: (P,) [grains], fired: (P,) uint32, activity: (H,), crossing: (P,) [frames]; updated.
@@ -123,7 +130,10 @@ def advance(  # type: ignore[no-untyped-def]
     light_moves, dark_moves, field_moves = light.shape[0] > 1, dark.shape[0] > 1, field.shape[0] > 1
     moves = light_moves or dark_moves or field_moves or droop != 0.0
     moves = moves or differ(light_factor) or differ(dark_factor) or differ(factor) or differ(common)
-    alone = not moves and kick == 0.0 and frames >= WORTH
+    sways = at.shape[1] > 0
+    at_moves, f_moves, f_rolls = at.shape[0] > 1, swayed_factor.shape[0] > 1, swayed_factor.shape[1] > 1
+    c_moves, c_rolls = swayed_common.shape[0] > 1, swayed_common.shape[1] > 1
+    alone = not moves and not sways and kick == 0.0 and frames >= WORTH
     jumps = False
     pieces = (columns + BAND - 1) // BAND
     pitch = (min(columns, BAND) + 7) // 8 * 8
@@ -221,7 +231,24 @@ def advance(  # type: ignore[no-untyped-def]
                 collect(x[_HELD:], x[_ARRIVES:], x[_LIMIT:], used, hit)
                 groups = find_live(hit.view(np.uint64), (used + GROUP - 1) // GROUP, live)
                 wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_high)
-                if groups and fire(x, words, hit, live, groups, reset, polynomial):
+                if sways and groups:
+                    for line in range(begin, end):
+                        r, p0, n, h0 = row_of[line], pixel_of[line], width_of[line], slot_of[line]
+                        fire_within(
+                            x,
+                            words,
+                            hit,
+                            h0,
+                            n,
+                            at[r * at_moves],
+                            (swayed_factor[t * f_moves, r * f_rolls], swayed_common[t * c_moves, r * c_rolls]),
+                            fields[p0 : p0 + n],
+                            grains_per_mV[p0 : p0 + n],
+                            1.0 + droop * activity[r],
+                            reset,
+                            polynomial,
+                        )
+                elif groups and fire(x, words, hit, live, groups, reset, polynomial):
                     while groups:
                         groups = fire_again(x, words, live, groups, reset, polynomial)
                 for line in range(begin, end):
@@ -402,6 +429,42 @@ def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-un
         live[still] = q
         still += again != 0
     return still
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def fire_within(x, words, hit, h0, n, at, waves, field, grains_per_mV, load, reset, polynomial):  # type: ignore[no-untyped-def]
+    """As `fire` and `fire_again`, of a line whose references move within the frame; hit: of those that came near, those
+    that fired."""
+    per_root_rate, per_rate, kept = reset
+    whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
+    floats = words.view(np.float32)
+    for i in range(n):
+        j = h0 + i
+        if hit[j] == 0:
+            continue
+        held, gained, phi, since = x[_HELD + j], x[_ARRIVES + j], x[_PHI + j], 0.0
+        hit[j] = 0
+        while True:
+            since, taken, k = first_crossing(
+                held - gained, gained, since, phi, at, waves, field[i], grains_per_mV[i], load
+            )
+            if since > 1.0:
+                break
+            hit[j] = 1
+            low = stands(k - 1, _G, waves, field[i], grains_per_mV[i], load)
+            high = stands(k, _G, waves, field[i], grains_per_mV[i], load)
+            stood = between(k, since, at, low, high) if at[k] > at[k - 1] else high
+            held, electrons = on_grid(held - taken), stood * (1.0 / _G)
+            if not whole:
+                held, electrons = after_reset(held, gained / _G, stood, per_root_rate, per_rate, kept)
+            draw = drawn(words[_FIRST + j], words[_SECOND + j], words[_FIRED + j], polynomial)
+            words[_FIRED + j] = _U(words[_FIRED + j] + _U(1))
+            phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], draw)
+            floats[_DRAW + j] = draw
+            x[_ELECTRONS + j] = electrons
+        if hit[j] != 0:
+            x[_HELD + j], x[_PHI + j] = held, phi
+            x[_LIMIT + j] = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)

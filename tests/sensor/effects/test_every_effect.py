@@ -63,7 +63,7 @@ def strong(name: str):
     if math.isinf(effect.neutral):
         return effect(**{effect.strength: 50.0})
     default = getattr(effect(), effect.strength)
-    return effect(**{effect.strength: min(400 * default, bounds[1] / 2)})
+    return effect(**{effect.strength: min(400 * abs(default), bounds[1] / 2)})
 
 
 @pytest.mark.parametrize("engine", ["reference", "fast"])
@@ -117,9 +117,11 @@ def test_hooks_change_nothing_in_place_and_keep_shapes(name: str) -> None:
         spikes = frozen(rng.random(whole) < 0.3)
         *charges, memory = effect.collect(light, dark, now, frozen(memory))
         shift, memory = effect.compare(now, frozen(memory))
+        sway = effect.sway(now, *(frozen(rng.random((SHAPE[0], 5))) for _ in range(2)))
         read, memory = effect.read_out(spikes, now, frozen(memory))
         assert all(c.values.shape == whole and c.values.dtype == np.float64 for c in charges)
         assert fits(shift.factor, (frames, SHAPE[0], 1)) and fits(shift.millivolts, whole)
+        assert all(fits(wave, (frames, SHAPE[0], 5)) for wave in (sway.factor, sway.millivolts))
         assert read.shape == whole and read.dtype == np.bool_
         for i in range(frames):
             one, fired = replace(now, number=number + i, frames=1), spikes[i]

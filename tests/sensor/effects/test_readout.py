@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from laws import camera, check, check_mean, population
 
 from spikecam_env.sensor import Keyframes, SpikeSensor
@@ -43,23 +44,30 @@ def test_readout_skew_shows_a_step_of_light_later_in_the_rows_read_first() -> No
     assert np.abs(share[1:] - x).max() < error
 
 
-def test_readout_skew_of_light_that_changes_within_a_frame_is_its_integral_over_the_frame_that_is_read() -> None:
-    """A rise within frame 100, and a slow fall: a row read e early has the light from n - e to n + 1 - e."""
-    rows, columns, span = 11, 6000, 0.8
+@pytest.mark.parametrize("span", [0.8, 1.25, -0.8, -1.25])
+def test_readout_skew_of_light_that_changes_within_a_frame_is_its_integral_over_the_frame_that_is_read(
+    span: float,
+) -> None:
+    """A rise within frame 100, and a slow fall: a row read e early has the light from n - e to n + 1 - e.
+
+    e falls from |span| in the row read first, the first of all where span > 0, to 0 in the last."""
+    rows, columns = 11, 6000
+    early = abs(span) * np.linspace(1.0, 0.0, rows)[:: 1 if span > 0 else -1]
     edges, levels = np.array([0.0, 100.0, 101.0, 110.0, 114.0]), np.array([0.2, 0.2, 0.6, 0.6, 0.3])
     light = Keyframes(edges, np.broadcast_to(levels[:, None, None].astype(np.float32), (5, rows, columns)))
     share = camera("readout_skew", (rows, columns), span=span).step(light, 120)[98:116].mean(axis=2)
     time = np.linspace(0.0, 120.0, 120 * 1000 + 1)
     total = np.concatenate([[0.0], np.cumsum(np.interp(0.5 * (time[1:] + time[:-1]), edges, levels)) / 1000])
     collected = lambda t: np.interp(t, time, total)  # noqa: E731
-    begin = np.arange(98, 116)[:, None] - span * (1 - np.arange(rows) / (rows - 1))
+    begin = np.arange(98, 116)[:, None] - early
     expected = collected(begin + 1) - collected(begin)
     print("frame of the edge, by row:", np.round(share[2] - expected[2], 3))
     assert np.abs(share - expected).max() < 4.5 * 0.5 / np.sqrt(columns)
 
 
-def test_readout_skew_does_nothing_in_steady_light() -> None:
-    assert np.array_equal(camera("readout_skew", SHAPE).step(lit(0.37), 200), ideal_bits(0.37, 200))
+@pytest.mark.parametrize("span", [0.9, 1.25, -1.1])
+def test_readout_skew_alone_does_nothing_in_steady_light(span: float) -> None:
+    assert np.array_equal(camera("readout_skew", SHAPE, span=span).step(lit(0.37), 200), ideal_bits(0.37, 200))
 
 
 def test_dead_pixels_never_fire_and_the_others_fire_as_before() -> None:

@@ -1,0 +1,64 @@
+"""Clock feed-through: once a frame, an edge of the array's clock couples into the comparators' reference and decays.
+
+    reference += c(v) [mV],  c(v) = a (exp(-((v - v0) mod 1) / tau) - tau (1 - exp(-1/tau)))       tau in frames, mean 0
+    v: phase of the array's clock;  at u of a row's own frame (0 .. 1): v = u - e, e as in readout_skew, else 0
+    a < 0: the threshold falls at v0 by -a (1 - exp(-1/tau)), and recovers
+
+Charge that lies within the fall fires at v0, whatever it is exactly: the reset clears it, and pixels whose interval is
+nearly whole gather there.  A row that is read at that moment shows it as spikes that flip between two frames; the
+others show it as gathered intervals alone.  The same for all pixels, fixed in volts, also in the dark.
+The decay is taken as linear in parts of tau / 5, within half a per cent of a.
+
+Stage: threshold.  Seen in: static light: more pixels at whole intervals than chance has, early and late spikes in pairs
+in a band of rows.  Twins: supply_ripple (its phase moves on from frame to frame, unless it has the frame rate),
+row_temporal_noise (drawn anew in each frame).
+Within a frame: at the crossing.
+Source: coupling of a clock line into the reference through a capacitance, settling as RC.  Measured on a wall recorded
+by a public camera: a fall of some 9 mV, tau 0.2 to 0.3 frames, rows read one after another from the last to the first.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Shift, Stage, Within, parameter
+
+PARTS = 5
+"""Parts of tau in which the decay is taken as linear: within (1/5)^2 / 8 of the amplitude."""
+
+
+@dataclass(frozen=True)
+class ClockFeedthrough(Effect):
+    amplitude_mV: float = parameter(
+        -9.0, unit="mV", bounds=(-200.0, 200.0), doc="height a of the edge; below 0 the threshold falls"
+    )
+    phase_frames: float = parameter(0.1, unit="frames", bounds=(0.0, 1.0), doc="moment v0 of the array's frame")
+    tau_us: float = parameter(
+        6.0,
+        unit="us",
+        bounds=(0.2, 250.0),
+        doc="time constant of the decay; far beyond a frame what is left is a saw-tooth of height a / tau",
+    )
+
+    stage = Stage.THRESHOLD
+    within = Within.CROSSING
+    strength = "amplitude_mV"
+
+    def intervals(self, first: Exposure) -> int:
+        return math.ceil(PARTS / self.tau(first)) if self.amplitude_mV else 0
+
+    def kinks(self, first: Exposure) -> tuple[float, ...]:
+        return (self.phase_frames % 1.0,)
+
+    def sway(self, now: Exposure, phase: Array, piece: Array) -> Shift:
+        tau = self.tau(now)
+        since = (phase - self.phase_frames) - np.floor(piece - self.phase_frames)
+        mean = tau * (1.0 - math.exp(-1.0 / tau))
+        return Shift(millivolts=(self.amplitude_mV * (np.exp(-since / tau) - mean))[None])
+
+    def tau(self, now: Exposure) -> float:
+        """Time constant of the decay [frames]."""
+        return self.tau_us * 1e-6 * now.frame_rate_hz
