@@ -126,8 +126,9 @@ def largest_errors(rows: list[Row]) -> str:
     lines = [
         f"{len(rows)} comparisons, {sum(not row.comparison.agrees for row in rows)} beyond abs(z) = {LIMIT:g}.",
         "",
-        "| effect | within a frame | comparisons | largest abs(z): setting, statistic | literal | engine | z | error | command |",
-        "|---|---|---|---|---|---|---|---|---|",
+        _head(
+            "effect", "within a frame", "comparisons", "largest abs(z)", "literal", "engine", "z", "error", "command"
+        ),
     ]
     for name in dict.fromkeys(row.effect for row in rows):
         own = [row for row in rows if row.effect == name]
@@ -138,6 +139,10 @@ def largest_errors(rows: list[Row]) -> str:
             f"{c.literal:.5f} | {c.engine:.5f} | {c.z:+.1f} | {c.error:+.2%} | `{COMMAND} --only {name}` |"
         )
     return "\n".join(lines)
+
+
+def _head(*names: str) -> str:
+    return "\n".join(["".join(f"| {name} " for name in names) + "|", "|---" * len(names) + "|"])
 
 
 def _within(name: str) -> str:
@@ -157,7 +162,7 @@ def _line(row: Row) -> str:
 def _written(rows: list[Row], suffix: str) -> str:
     if suffix != ".md":
         return json.dumps([{**asdict(row), "verdict": row.verdict} for row in rows], indent=1) + "\n"
-    head = "| effect | setting | statistic | engine | literal | engine's | z | error | verdict |\n|---|---|---|---|---|---|---|---|---|\n"
+    head = _head("effect", "setting", "statistic", "engine", "literal", "engine's", "z", "error", "verdict") + "\n"
     return head + "".join(
         f"| {r.effect} | {r.setting} | {r.statistic} | {r.engine_name} | {r.comparison.literal:.5f} | "
         f"{r.comparison.engine:.5f} | {r.comparison.z:+.2f} | {r.comparison.error:+.3%} | {r.verdict} |\n"

@@ -168,6 +168,9 @@ def spot(rows: int, columns: int, low: float, high: float) -> Array:
 
 # --- settings
 
+PATTERN = (RATE, SPREAD, *QUANTILES)
+"""What shows a fixed pattern."""
+
 
 def _light() -> list[Case]:
     none: dict[str, dict[str, Any]] = {}
@@ -194,8 +197,14 @@ def _optics() -> list[Case]:
 
     drift = {"lamp_drift": {"sigma_per_root_s": 10.0}}
     beside = (*places((4, 4), (4, 5), (3, 4), (3, 5), (4, 6), (0, 0)), RATE)
-    spotted = {"picture": spot(8, 8, 0.2, 1.0), "electrons": 500.0, "shape": (8, 8), "groups": 40, "frames": 150}
-    blurred = {**spotted, "separate": True}
+    spotted: dict[str, Any] = {
+        "picture": spot(8, 8, 0.2, 1.0),
+        "electrons": 500.0,
+        "shape": (8, 8),
+        "groups": 40,
+        "frames": 150,
+    }
+    blurred: dict[str, Any] = {**spotted, "separate": True}
     return [
         Case("100 Hz, m .3", steady(0.3), flicker(0.3, 100.0), (*STEADY, *line(0.0025)), frames=800, groups=32),
         Case("40 kHz, m .5, phase 0", steady(0.3), flicker(0.5, 40e3), STEADY, quick=True),
@@ -267,14 +276,26 @@ def _photodiode() -> list[Case]:
         Case("a spot, strobe", strobe(1.0, 0.6, 0.2), bloom, beside, picture=spot(8, 8, 0.3, 1.2), **blooms),
         Case("a spot, slow swing", SWING, bloom, beside, picture=spot(8, 8, 0.3, 2.4), **blooms),
         Case("38 pA", dark, in_the_dark, STEADY),
-        Case("38 +- 8 pA", dark, {"dark_current_spread": {"sigma_pA": 8.0}} | in_the_dark, (RATE, SPREAD, *QUANTILES), **patterns),
-        Case("38 pA, log .45", dark, {"dark_current_tail": {"sigma": 0.45}} | in_the_dark, (RATE, SPREAD, *QUANTILES), **patterns),
-        Case("5 % hot, 40 pA", dark, {"hot_pixels": {"fraction": 0.05, "mean_pA": 40.0}} | in_the_dark, (RATE, SPREAD, *QUANTILES), **patterns),
-        Case("gain 5 %", steady(0.3), {"conversion_gain_spread": {"sigma": 0.05}}, (RATE, SPREAD, *QUANTILES), **patterns),
-        Case("capacitance .3 fF", steady(0.3), {"capacitor_spread": {"sigma_fF": 0.3}}, (RATE, SPREAD, *QUANTILES), **patterns),
-        Case("bias 50 mV", steady(0.3), {"bias_voltage_spread": {"sigma_V": 0.05}}, (RATE, SPREAD, *QUANTILES), **patterns),
-        Case("bias 50 mV, in the dark", dark, {"bias_voltage_spread": {"sigma_V": 0.05}} | in_the_dark, (RATE, SPREAD, *QUANTILES), **patterns),
-    ]  # fmt: skip
+        Case("38 +- 8 pA", dark, {"dark_current_spread": {"sigma_pA": 8.0}} | in_the_dark, PATTERN, **patterns),
+        Case("38 pA, log .45", dark, {"dark_current_tail": {"sigma": 0.45}} | in_the_dark, PATTERN, **patterns),
+        Case(
+            "5 % hot, 40 pA",
+            dark,
+            {"hot_pixels": {"fraction": 0.05, "mean_pA": 40.0}} | in_the_dark,
+            PATTERN,
+            **patterns,
+        ),
+        Case("gain 5 %", steady(0.3), {"conversion_gain_spread": {"sigma": 0.05}}, PATTERN, **patterns),
+        Case("capacitance .3 fF", steady(0.3), {"capacitor_spread": {"sigma_fF": 0.3}}, PATTERN, **patterns),
+        Case("bias 50 mV", steady(0.3), {"bias_voltage_spread": {"sigma_V": 0.05}}, PATTERN, **patterns),
+        Case(
+            "bias 50 mV, in the dark",
+            dark,
+            {"bias_voltage_spread": {"sigma_V": 0.05}} | in_the_dark,
+            PATTERN,
+            **patterns,
+        ),
+    ]
 
 
 def _threshold() -> list[Case]:
@@ -305,17 +326,31 @@ def _threshold() -> list[Case]:
         Case("20 % at 1 kHz", steady(0.3), ripple(0.2, 1e3), (*STEADY, *line(0.025)), electrons=500.0, groups=32),
         Case("2 % at 17 kHz, cosine light", COSINE, ripple(0.02, 17e3), (*STEADY, *line(0.425)), **fine),
         Case("2 % at 17 kHz, strobe", strobe(0.3, 0.2), ripple(0.02, 17e3), (*STEADY, *line(0.425)), **fine),
-        Case("5 % at 40 kHz, light 1.3", steady(1.3), ripple(0.05, 40e3), (RATE, HISTOGRAM), electrons=100.0, frames=100),
+        Case(
+            "5 % at 40 kHz, light 1.3", steady(1.3), ripple(0.05, 40e3), (RATE, HISTOGRAM), electrons=100.0, frames=100
+        ),
         Case("-20 mV, tau .25", steady(0.333), edge(-20.0, 0.25), (*STEADY, ROWS), **banded),
-        Case("-20 mV, tau .25, skew -1.1", steady(0.35), edge(-20.0, 0.25) | skew, (*STEADY, ROWS, *bands(4)), **banded),
+        Case(
+            "-20 mV, tau .25, skew -1.1", steady(0.35), edge(-20.0, 0.25) | skew, (*STEADY, ROWS, *bands(4)), **banded
+        ),
         Case("-50 mV, tau .25, skew -1.1", steady(0.5), edge(-50.0, 0.25) | skew, (*STEADY, ROWS, *bands(4)), **banded),
         Case("50 mV, tau .1, skew -1.1", steady(0.35), edge(50.0, 0.1) | skew, (*STEADY, ROWS, *bands(4)), **banded),
         Case("-50 mV, cosine light", COSINE, edge(-50.0, 0.25), (*STEADY, ROWS), **banded),
         Case("50 mV, N 500", steady(0.3), mV("reset_noise", 50.0), STEADY, electrons=500.0, groups=32),
         Case("50 mV, N 500", steady(0.3), mV("excess_threshold_noise", 50.0), STEADY, electrons=500.0, groups=32),
         Case("20 mV", steady(0.3), mV("common_threshold_noise", 20.0), (*STEADY, *POPULATION), **common),
-        Case("20 mV", steady(0.3), mV("row_temporal_noise", 20.0), (*STEADY, *POPULATION), **{**common, "shape": (1, 64)}),
-        Case("6.36 mV, light .05", steady(0.05), mV("frame_threshold_noise", 6.36), STEADY, electrons=1000.0, frames=400, groups=32),
+        Case(
+            "20 mV", steady(0.3), mV("row_temporal_noise", 20.0), (*STEADY, *POPULATION), **{**common, "shape": (1, 64)}
+        ),
+        Case(
+            "6.36 mV, light .05",
+            steady(0.05),
+            mV("frame_threshold_noise", 6.36),
+            STEADY,
+            electrons=1000.0,
+            frames=400,
+            groups=32,
+        ),
         Case("60 mV, light .1", steady(0.1), mV("frame_threshold_noise", 60.0), STEADY, electrons=500.0, groups=32),
         Case("60 mV, light .9", steady(0.9), mV("frame_threshold_noise", 60.0), STEADY, groups=32),
         Case("4 octaves of 20 mV", steady(0.2), flicker, STEADY, electrons=500.0, groups=32, shape=(4, 8)),
@@ -323,7 +358,7 @@ def _threshold() -> list[Case]:
         Case("d -.1, light .8", steady(0.8), {"ir_drop": {"droop": -0.1}}, (*STEADY, *POPULATION), **common),
         Case("20 mV", steady(0.3), mV("row_fixed_pattern", 20.0), (RATE, ROWS), **rows),
         Case("20 mV", steady(0.3), mV("column_fixed_pattern", 20.0), (RATE, COLUMNS), **{**rows, "shape": (8, 16)}),
-    ]  # fmt: skip
+    ]
 
 
 def _reset() -> list[Case]:
@@ -352,14 +387,16 @@ def _reset() -> list[Case]:
         Case("tau .9, edges at n + .6", edges, dead(0.9), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("c .1, light .3", steady(0.3), delay(0.1), STEADY),
         Case("c .5, light .3", steady(0.3), delay(0.5), STEADY),
-        Case("c .9, light .1", steady(0.1), delay(0.9), STEADY),
+        Case("c .9, light .1, N 10", steady(0.1), delay(0.9), STEADY, electrons=10.0, frames=600),
         Case("c .3, edges at n + .6", edges, delay(0.3), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("f .02, tau 10", steady(0.3), left(0.02, 10.0), STEADY),
         Case("f .4, tau 1", steady(0.3), left(0.4, 1.0), STEADY),
         Case("f .4, tau 3, light .9", steady(0.9), left(0.4, 3.0), STEADY),
         Case("f .4, tau 5, edges at n + .6", edges, left(0.4, 5.0), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("all, light .3", steady(0.3), {"synchronous_reset": {"fraction": 1.0}}, STEADY),
-        Case("half, light .7", steady(0.7), {"synchronous_reset": {"fraction": 0.5}}, STEADY),
+        Case(
+            "half, N 1000", steady(0.7), {"synchronous_reset": {"fraction": 0.5}}, STEADY, electrons=1000.0, groups=16
+        ),
         Case("all, strobe", strobe(0.4, 0.2, 0.3), {"synchronous_reset": {"fraction": 1.0}}, STEADY),
         Case("k .02, light .22", steady(0.22), kick(0.02), coupled, **beside, quick=True),
         Case("k -.02, light .22", steady(0.22), kick(-0.02), coupled, **beside),
@@ -393,9 +430,30 @@ def _readout() -> list[Case]:
         Case("span .9, edges at n + .6", edges, skew(0.9), (RATE, *after(5, 20), *latency(5, 20)), **rows, quick=True),
         Case("span 1, cosine light", COSINE, skew(1.0), (*STEADY, ROWS), **{**rows, "frames": 250}),
         Case("span 1, strobe", strobe(0.3, 0.2, 0.3), skew(1.0), (*STEADY, ROWS), **{**rows, "frames": 250}),
-        Case("span 1, flicker 17 kHz", steady(0.3), skew(1.0) | {"light_flicker": {"modulation": 0.5, "frequency_hz": 17e3}}, (*STEADY, *line(0.425)), **{**rows, "frames": 250}),
-        Case("span 1, ripple 2 % at 17 kHz", steady(0.3), skew(1.0) | {"supply_ripple": {"ripple": 0.02, "frequency_hz": 17e3}}, (*STEADY, *line(0.425)), electrons=1000.0, shape=(16, 2), groups=32, frames=250),
-        Case("span .9, lag, edges at n + .6", edges, skew(0.9) | {"photodiode_lag": {"fraction": 0.5, "tau_us": 37.5}}, (RATE, *after(5, 20), *latency(5, 20)), **rows),
+        Case(
+            "span 1, flicker 17 kHz",
+            steady(0.3),
+            skew(1.0) | {"light_flicker": {"modulation": 0.5, "frequency_hz": 17e3}},
+            (*STEADY, *line(0.425)),
+            **{**rows, "frames": 250},
+        ),
+        Case(
+            "span 1, ripple 2 % at 17 kHz",
+            steady(0.3),
+            skew(1.0) | {"supply_ripple": {"ripple": 0.02, "frequency_hz": 17e3}},
+            (*STEADY, *line(0.425)),
+            electrons=1000.0,
+            shape=(16, 2),
+            groups=32,
+            frames=250,
+        ),
+        Case(
+            "span .9, lag, edges at n + .6",
+            edges,
+            skew(0.9) | {"photodiode_lag": {"fraction": 0.5, "tau_us": 37.5}},
+            (RATE, *after(5, 20), *latency(5, 20)),
+            **rows,
+        ),
         Case("span -1.1, edges at n + .6", edges, skew(-1.1), (RATE, *after(5, 20), *latency(5, 20)), **rows),
         Case("1.25 us", steady(0.3), jitter(1250.0), (*STEADY, *POPULATION), **common),
         Case("5 us, light .8", steady(0.8), jitter(5000.0), (*STEADY, *POPULATION), **{**common, "frames": 100}),
@@ -406,8 +464,16 @@ def _readout() -> list[Case]:
         Case("5 %", steady(0.3), {"dead_pixels": {"fraction": 0.05}}, (RATE, SPREAD), separate=True, frames=100),
         Case("p .05", steady(0.3), {"missed_spikes": {"probability": 0.05}}, STEADY),
         Case("p .01", steady(0.2), {"spurious_spikes": {"probability": 0.01}}, STEADY),
-        Case("skew, ripple, flicker, lag, dead", SWING, together, (RATE, VARIANCE, SERIAL, A1, *line(0.425), *line(0.575)), electrons=500.0, shape=(16, 2), groups=32),
-    ]  # fmt: skip
+        Case(
+            "skew, ripple, flicker, lag, dead",
+            SWING,
+            together,
+            (RATE, VARIANCE, SERIAL, A1, *line(0.425), *line(0.575)),
+            electrons=500.0,
+            shape=(16, 2),
+            groups=32,
+        ),
+    ]
 
 
 def cases() -> list[Case]:

@@ -198,8 +198,8 @@ def report(t, n, r, c, edges, spikes):
 def live(n, r, c, start, end, scale, offset, law, pixels, film, nodes, edges, rng, spikes):
     """One pixel from `start` to `end`, in its frame n, with thresholds times `scale` plus `offset`.
 
-    Where the threshold comes down to the charge, the reset clears the node, and nothing is left.  What is drawn anew for
-    a frame comes down at its start by convention: what is above it then is kept, as the effects that do so state.
+    Where the threshold comes down to the charge, the reset clears the node, and nothing is left.  A threshold that is
+    drawn anew for a frame comes down at its start by convention, and what is above it then is kept.
     """
     moving = law.ripple > 0.0 or law.edge != 0.0
     gain, own, read = law.electrons * pixels.gain[r, c], pixels.threshold[r, c], edges[n + 1, r]
