@@ -387,7 +387,7 @@ def _reset() -> list[Case]:
         Case("tau .9, edges at n + .6", edges, dead(0.9), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("c .1, light .3", steady(0.3), delay(0.1), STEADY),
         Case("c .5, light .3", steady(0.3), delay(0.5), STEADY),
-        Case("c .9, light .1, N 10", steady(0.1), delay(0.9), STEADY, electrons=10.0, frames=600),
+        Case("c .9, light .1, N 25", steady(0.1), delay(0.9), STEADY, electrons=25.0, frames=600),
         Case("c .3, edges at n + .6", edges, delay(0.3), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("f .02, tau 10", steady(0.3), left(0.02, 10.0), STEADY),
         Case("f .4, tau 1", steady(0.3), left(0.4, 1.0), STEADY),
