@@ -375,8 +375,9 @@ def synchronous_reset(effect: Any, camera: Camera) -> None:
 
 @law
 def crosstalk(effect: Any, camera: Camera) -> None:
-    """A reset kicks the four neighbours, at once."""
+    """A reset kicks the four neighbours, at once, or by an option when its frame ends."""
     camera.kick = effect.kick
+    camera.late_kick = getattr(effect, "when", "at_spike") == "frame_end"
 
 
 # --- read-out

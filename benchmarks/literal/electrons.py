@@ -354,15 +354,16 @@ def expose_coupled(law, pixels, film, kick, late_kick, share, full, rng, spikes)
 
 @njit(cache=True, error_model="numpy")
 def _fire(n, r, c, kick, late_kick, nodes, pixels, due, crossed, down, right, spikes, rng):
-    """Reset (r, c) if it is at its threshold, and all whom that brings to theirs."""
+    """Reset (r, c) if an electron took it to its threshold, and all whom that kicks over theirs, which keep nothing."""
     rows, columns = nodes.charge.shape
-    crossed[0, 0], crossed[0, 1], waiting = r, c, 1
+    crossed[0, 0], crossed[0, 1], waiting, kicked = r, c, 1, False
     while waiting:
         waiting -= 1
         r, c = crossed[waiting, 0], crossed[waiting, 1]
         if nodes.charge[r, c] < nodes.limit[r, c]:
             continue
-        nodes.charge[r, c] -= nodes.limit[r, c]
+        nodes.charge[r, c] = 0.0 if kicked else nodes.charge[r, c] - nodes.limit[r, c]
+        kicked = True
         nodes.limit[r, c] = pixels.threshold[r, c]
         if pixels.kappa[r, c] > 0.0:
             nodes.limit[r, c] *= 1.0 + pixels.kappa[r, c] * rng.standard_normal()
