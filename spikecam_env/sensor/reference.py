@@ -151,6 +151,7 @@ def fire(
     while crossed.size:
         fired[crossed] = True
         reset(now, effects, state, mean, limit[crossed], crossed)
+        state.threshold[crossed] = draw_threshold(now.unit.kappa[crossed], state.rng)
         limit = compared_with(state.threshold)
         crossed = crossed[state.charge[crossed] >= limit[crossed]]
     return fired
@@ -162,13 +163,15 @@ def fire_in_turn(
     """As `fire`, in the order of the moments at which pixels are at their references, which may move within the frame.
 
     The charge gained (P,) comes evenly over the frame.  Each spike kicks its neighbours at its moment (`Feedback`).
-    Charge is put on a grid on which sums are the same in any order.
+    Charge is put on a grid on which sums are the same in any order.  The thresholds after a first reset are drawn for
+    all pixels at once, since what one is compared with takes as long to work out as what all are.
     """
     state.charge, gained = on_grid(state.charge), on_grid(gained)
     state.charge += gained
     kick = on_grid(sum(effect.feedback(now).kick_at_once for effect in effects) * GRAINS)
     at, limits_of = nodes(now, effects, state, law)
-    limits = limits_of(state.threshold)
+    limits, following = limits_of(state.threshold), draw_threshold(now.unit.kappa, state.rng)
+    limits_that_follow = limits_of(following)
     moment, taken = np.full((2, mean.size), NEVER)
     last, fired = np.full(mean.size, -1.0), np.zeros(mean.size, dtype=np.bool_)
     turns: list[tuple[float, int]] = []
@@ -188,11 +191,13 @@ def fire_in_turn(
         u, pixel = heappop(turns)
         if u != moment[pixel]:
             continue
-        fired[pixel], last[pixel], before = True, u, state.threshold[pixel]
+        if fired[pixel] and now.unit.kappa[pixel]:
+            following[pixel] = draw_threshold(now.unit.kappa[[pixel]], state.rng)[0]
+            limits_that_follow[:, pixel] = limits_of(following)[:, pixel]
+        fired[pixel], last[pixel] = True, u
         reset(now, effects, state, mean, taken[pixel], np.array([pixel]))
         state.charge[pixel] = on_grid(state.charge[pixel])
-        if state.threshold[pixel] != before:
-            limits[:, pixel] = limits_of(state.threshold)[:, pixel]
+        state.threshold[pixel], limits[:, pixel] = following[pixel], limits_that_follow[:, pixel]
         look(pixel, u)
         for other in neighbours(pixel, now.shape) if kick else ():
             state.charge[other] += kick
@@ -231,13 +236,12 @@ def reset(
     taken: Array | float,
     pixels: NDArray[np.intp],
 ) -> None:
-    """Take that charge [grains] from pixels that fire, and draw their next thresholds; a held node misses light."""
+    """Take that charge [grains] from pixels that fire; a held node misses light."""
     residual = (state.charge[pixels] - taken) / GRAINS
     for effect in having("after_reset", effects):
         residual = effect.after_reset(residual, mean[pixels] / GRAINS, now)
         state.missed[pixels] += effect.feedback(now).lost(mean[pixels] / GRAINS) * GRAINS
     state.charge[pixels] = residual * GRAINS
-    state.threshold[pixels] = draw_threshold(now.unit.kappa[pixels], state.rng)
 
 
 def draw_threshold(kappa: Array, rng: np.random.Generator) -> Array:
