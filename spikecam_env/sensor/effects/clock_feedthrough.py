@@ -51,7 +51,7 @@ class ClockFeedthrough(Effect):
     identification = Identification(
         family="clock",
         fitted=("amplitude_mV", "phase_frames", "tau_us"),
-        shapes={"phase_frames": (0.1, 0.35, 0.6, 0.85), "tau_us": (2.0, 6.0, 18.0)},
+        shapes={"phase_frames": (0.1, 0.35, 0.6, 0.85), "tau_us": (6.0,)},
         needs=Needs.STEADY,
         shape_step=-0.15,
         experiment="flats whose intervals are whole numbers of frames, and a hundredth more and less",
