@@ -5,8 +5,8 @@ then goes from frame to frame and does what depends on the spikes, from the numb
 
 Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's
 draw mixed in.  N counts where the reference stands at the reset, and not the light that falls while the node is held.
-What moves the reference, or the charge (`kick`), by delta from there to the next spike is taken without the shot noise
-of delta: of a spike's variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
+What moves the reference, or the charge at the frame's end (`kick`), by delta from there to the next spike is taken
+without the shot noise of delta: of a spike's variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
 """
 
 from __future__ import annotations

@@ -504,14 +504,27 @@ def fire_in_turn(  # type: ignore[no-untyped-def]
             q = p + down * columns + right
             o, j = place_of(row + down, column + right, pieces, lines)
             of_pixel = pixel_law(q, columns, at, waves, field, grains_per_mV, loads)
-            x[o + _HELD + j] += kick
+            held, phi, limit = x[o + _HELD + j], x[o + _PHI + j], x[o + _LIMIT + j]
+            kicked(x, o, j, kick)
             moment, taken = next_crossing(x, o, j, u, of_pixel, limits)
             if moment == u and last[q] == u:
-                x[o + _HELD + j] -= kick
+                x[o + _HELD + j], x[o + _PHI + j], x[o + _LIMIT + j] = held, phi, limit
                 continue
             moments[q], takes[q] = moment, taken
             if moment != NEVER:
                 heappush(turns, (moment, q))
+
+
+@njit(inline="always")
+def kicked(x, o, j, kick):  # type: ignore[no-untyped-def]
+    """Give a pixel charge [grains] that brings no shot noise: of its threshold's noise as much goes as its electrons had,
+    which are so many fewer now."""
+    noise, jitter = x[o + _NOISE + j], x[o + _JITTER + j]
+    x[o + _HELD + j] += kick
+    if noise > 0.0:
+        left = math.sqrt(max(1.0 - kick / _G * noise / (noise + jitter), 0.0))
+        x[o + _PHI + j] = _G + (x[o + _PHI + j] - _G) * left
+        x[o + _LIMIT + j] = max((x[o + _PHI + j] * x[o + _FACTOR + j] + x[o + _MOVED + j]) * x[o + _LOAD + j], _TRIPS)
 
 
 @njit(inline="always")
