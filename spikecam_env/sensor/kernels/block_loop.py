@@ -37,6 +37,10 @@ BAND = 1024
 GROUP = 16
 """Pixels that are worked out together where one of them fires (LLVM would make no vector instructions of fewer)."""
 
+AT_ONCE = 4
+"""Nodes of a moving reference that are worked out together: a charge comes near its limit in two or three parts of a
+frame."""
+
 WORTH, SPARSE = 4, 0.5
 """Frames of a block from which on, and spikes a pixel and frame up to which, going from spike to spike is faster than
 going from frame to frame."""
@@ -517,8 +521,7 @@ def fire_in_turn(  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def kicked(x, o, j, kick):  # type: ignore[no-untyped-def]
-    """Give a pixel charge [grains] that brings no shot noise: of its threshold's noise as much goes as its electrons had,
-    which are so many fewer now."""
+    """Give a pixel charge [grains] that brings no shot noise: its threshold loses that of as many electrons."""
     noise, jitter = x[o + _NOISE + j], x[o + _JITTER + j]
     x[o + _HELD + j] += kick
     if noise > 0.0:
@@ -545,14 +548,26 @@ def pixel_law(p, columns, at, waves, field, grains_per_mV, loads):  # type: igno
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def next_crossing(x, o, j, since, of_pixel, limits):  # type: ignore[no-untyped-def]
-    """`crossing.first_crossing` of place j of the scratch that begins at o; limits: (n,), overwritten."""
+    """`crossing.first_crossing` of place j of the scratch that begins at o; limits: (n,), overwritten.
+
+    Nodes are looked at from where the charge comes up to the least limit of the frame, a few at a time.
+    """
     held, gained, phi = x[o + _HELD + j], x[o + _ARRIVES + j], x[o + _PHI + j]
     if held < x[o + _LIMIT + j]:
         return NEVER, 0.0
     at, (factor, common), field, grains_per_mV, load = of_pixel
-    for k in range(at.size):
-        limits[k] = max((phi * factor[k] + grains_per_mV * (common[k] + field)) * load, _TRIPS)
-    return crossing(held - gained, gained, since, at, limits)
+    begin, least, start = held - gained, x[o + _LIMIT + j], 0
+    while start + 2 < at.size and begin + gained * at[start + 1] < least:
+        start += 1
+    while True:
+        stop = min(start + AT_ONCE, at.size)
+        for k in range(start, stop):
+            limits[k] = max((phi * factor[k] + grains_per_mV * (common[k] + field)) * load, _TRIPS)
+        of_these = at[start:stop], limits[start:stop]
+        moment, taken = crossing(begin, gained, max(since, at[start]), of_these[0], of_these[1])
+        if moment != NEVER or stop == at.size:
+            return moment, taken
+        start = stop - 1
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
