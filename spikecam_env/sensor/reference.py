@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from heapq import heappop, heappush
 
 import numpy as np
@@ -113,21 +112,19 @@ def references(
     """What the comparators compare with in this frame, as a function of the thresholds (P,) [grains]."""
     if not having("compare", effects) and not having("react", effects):
         return lambda threshold: np.maximum(threshold, LEAST_LIMIT)
-    return partial(compared_with, now, effects, state, law, law.factor.T, law.common.T)
+    factor, offset = moved_by(now, law, law.factor.T, law.common.T)
+    return lambda threshold: loaded(now, effects, state, threshold * factor + offset)
 
 
-def compared_with(
-    now: Exposure,
-    effects: Sequence[Effect],
-    state: ReferenceState,
-    law: drive.Comparators,
-    factor: Array,
-    common: Array,
-    threshold: Array,
-) -> Array:
-    """What pixels of these thresholds compare with (P,) [grains], where factor and common (H or 1, 1) [mV] stand so."""
+def moved_by(now: Exposure, law: drive.Comparators, factor: Array, common: Array) -> tuple[Array, Array]:
+    """What multiplies thresholds and what is added [grains], (P,), where factor and common (H or 1, 1) [mV] stand so."""
     factor, common = (np.broadcast_to(rows, now.shape).reshape(-1) for rows in (factor, common))
-    limit = thresholds(threshold * factor + law.grains_per_mV * (common + law.field[0]), now)
+    return factor, law.grains_per_mV * (common + law.field[0])
+
+
+def loaded(now: Exposure, effects: Sequence[Effect], state: ReferenceState, limit: Array) -> Array:
+    """Limits (P,) [grains] as the spikes before this frame leave them."""
+    limit = thresholds(limit, now)
     for effect in having("react", effects):
         limit = effect.react(limit, now, state.memory[effect.name])
     return np.maximum(limit.reshape(-1) * GRAINS, LEAST_LIMIT)
@@ -163,8 +160,9 @@ def fire_in_turn(
     state.charge, gained = on_grid(state.charge), on_grid(gained)
     state.charge += gained
     kick = on_grid(sum(effect.feedback(now).kick_at_once for effect in effects) * GRAINS)
-    at, limits_of = nodes(now, effects, state, law)
-    limits = limits_of(state.threshold)
+    at, factor, offset = nodes(now, law)
+    limits = np.stack([loaded(now, effects, state, limit) for limit in state.threshold * factor + offset])
+    reacting = having("react", effects)
     moment, taken = np.full((2, mean.size), NEVER)
     last, fired = np.full(mean.size, -1.0), np.zeros(mean.size, dtype=np.bool_)
     turns: list[tuple[float, int]] = []
@@ -188,7 +186,10 @@ def fire_in_turn(
         reset(now, effects, state, mean, taken[pixel], np.array([pixel]))
         state.charge[pixel] = on_grid(state.charge[pixel])
         if state.threshold[pixel] != before:
-            limits[:, pixel] = limits_of(state.threshold)[:, pixel]
+            limit = state.threshold[pixel] * factor[:, pixel] + offset[:, pixel]
+            if reacting:
+                limit = np.array([loaded(now, effects, state, np.full(mean.size, one))[pixel] for one in limit])
+            limits[:, pixel] = np.maximum(limit, LEAST_LIMIT)
         look(pixel, u)
         for other in neighbours(pixel, now.shape) if kick else ():
             state.charge[other] += kick
@@ -200,16 +201,15 @@ def fire_in_turn(
     return fired
 
 
-def nodes(
-    now: Exposure, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
-) -> tuple[list[list[float]], Callable[[Array], Array]]:
-    """Moments of each row at which the references are known, n each, and what thresholds (P,) [grains] are compared
-    with at each (n, P)."""
+def nodes(now: Exposure, law: drive.Comparators) -> tuple[list[list[float]], Array, Array]:
+    """Moments of each row at which the references are known, n each; what multiplies thresholds there, and what is
+    added [grains], (n, P)."""
     sway = law.sway
     assert sway is not None
-    moves = [(sway.factor[0, :, k, None], sway.common[0, :, k, None]) for k in range(sway.at.shape[1])]
-    at = np.broadcast_to(sway.at, (now.shape[0], sway.at.shape[1])).tolist()
-    return at, lambda threshold: np.stack([compared_with(now, effects, state, law, *m, threshold) for m in moves])
+    count = sway.at.shape[1]
+    stand = [moved_by(now, law, sway.factor[0, :, k, None], sway.common[0, :, k, None]) for k in range(count)]
+    factor, offset = (np.stack(part) for part in zip(*stand, strict=True))
+    return np.broadcast_to(sway.at, (now.shape[0], count)).tolist(), factor, offset
 
 
 def neighbours(pixel: int, shape: tuple[int, int]) -> list[int]:

@@ -260,8 +260,8 @@ class Effect:
         return Shift(), memory
 
     def intervals(self, frame_rate_hz: float) -> int:
-        """Parts of a frame in each of which the reference moves by `sway` as if linearly, at most MOST_INTERVALS; 0 where
-        it does not move within a frame."""
+        """Parts of a frame in each of which the reference moves by `sway` as if linearly, at most MOST_INTERVALS; 0
+        where it does not move within a frame."""
         return 0
 
     def kinks(self, first: Exposure) -> tuple[float, ...]:
