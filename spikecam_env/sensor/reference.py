@@ -117,7 +117,7 @@ def references(
 
 
 def moved_by(now: Exposure, law: drive.Comparators, factor: Array, common: Array) -> tuple[Array, Array]:
-    """What multiplies thresholds and what is added [grains], (P,), where factor and common (H or 1, 1) [mV] stand so."""
+    """What multiplies thresholds, and what is added [grains], (P,), at such factor and common (H or 1, 1) [mV]."""
     factor, common = (np.broadcast_to(rows, now.shape).reshape(-1) for rows in (factor, common))
     return factor, law.grains_per_mV * (common + law.field[0])
 
