@@ -47,7 +47,7 @@ def some_pixels(camera: Camera, fraction: float, rng: Rng) -> NDArray[np.int64]:
 def _lamp_drift(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
     """Known at whole frames, straight between them."""
     walk = np.cumsum(rng.standard_normal(frames + 1)) * p["sigma_per_root_s"] * np.sqrt(FRAME_S)
-    ph.light_waves += (Polygon(np.arange(frames + 1), np.maximum(1.0 + walk, 0.0)),)
+    ph.light_waves += (Polygon(np.arange(frames + 1.0), np.maximum(1.0 + walk, 0.0)),)
 
 
 def _light_flicker(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:

@@ -359,7 +359,7 @@ class Recording:
         ph = self.physics
         keys, light = ph.key_frame, ph.key_light
         if light.shape[1] == 1 or len(keys) == 1:
-            still = 1.0 if len(keys) > 1 else light[0].astype(np.float64)
+            still = np.ones(1) if len(keys) > 1 else light[0].astype(np.float64)
             return still * self._by_row(total) + self._by_row(leak)
         while self.key + 1 < len(keys) and keys[self.key + 1] <= n + window.start.min():
             self.key += 1

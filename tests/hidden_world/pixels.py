@@ -10,7 +10,7 @@ Near its threshold only: a pixel leaps over all cuts that no noise of seven devi
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -124,7 +124,11 @@ NORMAL = _normal_table()
 """Half quantiles of a normal law: the sum of four, picked at random, has variance one and is normal to 1e-3."""
 
 
-@njit(cache=True, _nrt=False)
+PLAIN: dict[str, Any] = {"_nrt": False}
+"""Compiled without numba's counting of references: nothing here allocates, and the counting costs more than the pixel."""
+
+
+@njit(cache=True, **PLAIN)
 def _bits(random):
     random[0] += np.uint64(0x9E3779B97F4A7C15)
     z = random[0]
@@ -133,19 +137,19 @@ def _bits(random):
     return z ^ (z >> np.uint64(31))
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def _gauss(random):
     z, low = _bits(random), np.uint64(1023)
     a, b = NORMAL[(z >> np.uint64(54)) & low], NORMAL[(z >> np.uint64(44)) & low]
     return a + b + NORMAL[(z >> np.uint64(34)) & low] + NORMAL[(z >> np.uint64(24)) & low]
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def _uniform(random):
     return (np.float64(_bits(random) >> np.uint64(11)) + 0.5) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def _collected(mean, quiet, random):
     """Charge that arrives as electrons, given its mean."""
     if quiet == 0.0 or mean <= 0.0:
@@ -160,7 +164,7 @@ def _collected(mean, quiet, random):
     return count * quiet
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def steady(pixels, x, random, spikes):
     """All frames of every pixel, one after the other, x (P,) its charge a frame; leaps while far from the threshold."""
     frames, charge, owed, quiet = spikes.shape[0], pixels.charge, pixels.owed, pixels.quiet
@@ -189,7 +193,7 @@ def steady(pixels, x, random, spikes):
         charge[p], pixels.threshold[p] = q, bar
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def coast(pixels, ramp_tau, margin, light, dark, near):
     """Advance pixels that cannot fire in this frame; `near` lists the others, their number is returned."""
     count, left = 0, np.exp(-1.0 / ramp_tau)
@@ -207,7 +211,7 @@ def coast(pixels, ramp_tau, margin, light, dark, near):
     return count
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def slow_noise(near, n, slow, slow_at, kept, sd, random, total):
     """Add the slow noise of the pixels `near` in frame n; it moves on over all frames since the last look."""
     for i in range(near.size):
@@ -220,7 +224,7 @@ def slow_noise(near, n, slow, slow_at, kept, sd, random, total):
             total[i] += sd[j] * slow[p, j]
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def give(to, what, factor, rows, columns, wraps):
     """Add factor * what to the pixel so many rows and columns away; beyond the edge on the other side, or nowhere."""
     height, width = what.shape
@@ -235,7 +239,7 @@ def give(to, what, factor, rows, columns, wraps):
                 to[i, j] += factor * what[r, c]
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def window_light(keys, light, start, length, columns, first, mean, tilt):
     """Mean, and half the change over the mean, of light between keys in each row's window [start, start + length).
 
@@ -273,7 +277,7 @@ def window_light(keys, light, start, length, columns, first, mean, tilt):
             tilt[p] = min(max(0.5 * (there - here) / mean[p], -1.0), 1.0) if mean[p] > 0.0 else 0.0
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def _between(keys, t, first):
     """The key before a time and how far from it to the next, 0 .. 1."""
     k, last = first, keys.size - 1
@@ -284,7 +288,7 @@ def _between(keys, t, first):
     return k, (t - keys[k]) / (keys[k + 1] - keys[k])
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def lagged(x, tilt, late, share, tau, window, rows_of, total):
     """Add to `total` the charge of a late part, share h_tau * x, of this frame; late (P,) is its rate, moved on.
 
@@ -301,7 +305,7 @@ def lagged(x, tilt, late, share, tau, window, rows_of, total):
             late[p] = rate + (late[p] - rate) * kept
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def cross_plainly(near, come, pixels, random, bits):
     """A frame of the pixels `near` within which nothing moves, and a reset only takes the threshold away."""
     light, dark, stretch, shift = come.light, come.dark, come.stretch, come.shift
@@ -320,7 +324,7 @@ def cross_plainly(near, come, pixels, random, bits):
         charge[p] = q
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def cross(near, n, come, window, pixels, laws, work, columns, random, bits):
     """Frame n of the pixels `near`, each by itself."""
     for i in range(near.size):
@@ -337,7 +341,7 @@ def cross(near, n, come, window, pixels, laws, work, columns, random, bits):
         _close(i, p, pixels, work)
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def cross_together(near, n, come, window, pixels, laws, work, to_rows, to_columns, wraps, columns, random, bits):
     """Frame n of the pixels `near` in the order of time: each crossing kicks others at once."""
     height, waiting = pixels.charge.size // columns, 0
@@ -387,7 +391,7 @@ def cross_together(near, n, come, window, pixels, laws, work, to_rows, to_column
         _close(i, near[i], pixels, work)
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def _rise(queue, seat, moment, k):
     """Restore the heap `queue` of pixels by `moment`, that of seat k having become earlier."""
     i = queue[k]
@@ -398,7 +402,7 @@ def _rise(queue, seat, moment, k):
     queue[k], seat[i] = i, k
 
 
-@njit(cache=True, _nrt=False)
+@njit(cache=True, **PLAIN)
 def _sink(queue, seat, moment, k, size):
     """Restore the heap `queue` of pixels by `moment`, that of seat k having become later."""
     if size == 0:
@@ -416,7 +420,7 @@ def _sink(queue, seat, moment, k, size):
     queue[k], seat[i] = i, k
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _kicked(i, at, kick, work):
     """Give a pixel charge at a moment of its window; whether its next event moves.  A held node takes none."""
     if at < work.open[i]:
@@ -431,7 +435,7 @@ def _kicked(i, at, kick, work):
     return work.entered[i]
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _open(i, p, pixels, window, work, columns, random):
     """Begin a window."""
     work.row[i] = p // columns if window.u.shape[0] > 1 else 0
@@ -441,14 +445,14 @@ def _open(i, p, pixels, window, work, columns, random):
     pixels.owed[p] = 0.0
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _close(i, p, pixels, work):
     """End a window."""
     pixels.charge[p] = work.charge[i]
     pixels.blind[p] = max(work.open[i] - 1.0, 0.0)
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _bar(i, p, side, come, window, pixels, work):
     """The threshold at one end of the pixel's piece."""
     r, s = work.row[i], work.piece[i]
@@ -456,7 +460,7 @@ def _bar(i, p, side, come, window, pixels, work):
     return level + pixels.per_mv[p] * window.millivolt[r, s, side]
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _mean(i, p, come, window, work):
     """Mean charge that comes in the pixel's piece."""
     r, s = work.row[i], work.piece[i]
@@ -465,7 +469,7 @@ def _mean(i, p, come, window, work):
     return max(come.light[p] * light + come.dark[p] * (b - a), 0.0)
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _next(i, p, come, window, pixels, laws, work, random, bits):
     """The moment of the pixel's next crossing, or the end of a piece near its threshold; (NEVER, False) at the end."""
     pieces = window.light.shape[1]
@@ -483,7 +487,7 @@ def _next(i, p, come, window, pixels, laws, work, random, bits):
     return _meets(i, p, come, window, pixels, work)
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _leap(i, p, come, window, pixels, laws, work, random):
     """Pass pieces in which the pixel cannot cross, with one draw of their noise."""
     total = come.light[p] + come.dark[p]
@@ -499,14 +503,14 @@ def _leap(i, p, come, window, pixels, laws, work, random):
     work.charge[i] += _collected(mean, pixels.quiet[p], random)
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _decay_ramp(i, p, window, pixels, laws, work):
     if laws.ramp_loss > 0.0:
         r, s = work.row[i], work.piece[i]
         pixels.ramp[p] *= np.exp(-(window.u[r, s + 1] - window.u[r, s]) / laws.ramp_tau)
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _enter_piece(i, p, come, window, pixels, laws, work, random):
     """Draw what comes between the piece's beginning, or the moment that the node is let go, and its end."""
     r, s = work.row[i], work.piece[i]
@@ -519,14 +523,14 @@ def _enter_piece(i, p, come, window, pixels, laws, work, random):
     work.rest[i] = _collected(mean, pixels.quiet[p], random)
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _leave_piece(i, work):
     work.charge[i] += work.rest[i]
     work.rest[i], work.entered[i] = 0.0, False
     work.piece[i] += 1
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _meets(i, p, come, window, pixels, work):
     """When charge meets the threshold in the pixel's piece, and whether it does (else the piece's end)."""
     r, s = work.row[i], work.piece[i]
@@ -543,7 +547,7 @@ def _meets(i, p, come, window, pixels, work):
     return begin + (end - begin) * now / (now - then), True
 
 
-@njit(inline="always", _nrt=False)
+@njit(inline="always", **PLAIN)
 def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
     """A spike at the moment `at`: the cycle begins anew, with what comes after the node is let go."""
     begin, end = work.begin[i], work.end[i]
