@@ -125,7 +125,7 @@ NORMAL = _normal_table()
 
 
 PLAIN: dict[str, Any] = {"_nrt": False}
-"""Compiled without numba's counting of references: nothing here allocates, and the counting costs more than the pixel."""
+"""Compiled without the counting of references: nothing here allocates, and counting costs more than the pixel."""
 
 
 @njit(cache=True, **PLAIN)
