@@ -30,7 +30,7 @@ def test_every_candidate_has_templates_weak_ones_first_and_severe_ones_stronger(
     weak = {e.shape: e.parameters[CATALOGUE[e.name].strength] for e in templates.weakest}
     for e in templates.entries:
         strength = e.parameters[CATALOGUE[e.name].strength]
-        assert e.times == 1 or weak[e.shape] < strength <= 1.01 * e.times * weak[e.shape], e.name
+        assert e.times == 1 or abs(weak[e.shape]) < abs(strength) <= 1.01 * e.times * abs(weak[e.shape]), e.name
         assert 0 < e.white <= 1 and e.shift.shape == templates.noise.shape and np.isfinite(e.shift).all()
 
 
