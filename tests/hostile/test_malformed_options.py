@@ -152,7 +152,6 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--seed": SEEDS,
             "--jobs": WORKERS,
             "--effort": ("nan", "-1", "0", "-inf"),
-            "--static-only": ("perhaps",),
             "--candidates": ("", "lag"),
             "--exclude": ("", "lag"),
             "--effect-file": EFFECT_FILES,
