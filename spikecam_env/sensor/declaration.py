@@ -49,7 +49,7 @@ def _check_parameter(effect: type[Effect], field: Field[Any]) -> None:
         raise _wrong(effect, f"{field.name} has no unit and bounds; declare it by parameter(...)")
     if field.default is MISSING:
         raise _wrong(effect, f"{field.name} has no default; a parameter's default is one that shows")
-    if field.metadata["bounds"] is None and not isinstance(field.default, bool):
+    if not (field.metadata["bounds"] or field.metadata["choices"] or isinstance(field.default, bool)):
         raise _wrong(effect, f"{field.name} has no bounds; give the lowest and the highest value")
 
 
