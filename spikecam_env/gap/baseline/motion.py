@@ -103,8 +103,11 @@ class Motion:
 
 
 def find_motion(condition: Condition, seen: Observation) -> Motion | None:
-    """What moves in a recording of steady light; None where nothing does, or the light is known to change."""
-    if condition.kind not in STEADY:
+    """What moves in a recording of steady light; None where nothing does, or the light is known to change.
+
+    In the dark nothing is shown that could move; what changes there is the camera.
+    """
+    if condition.kind not in STEADY or condition.kind == "dark":
         return None
     counts, frames = whole_blocks(seen)
     kept = np.ones(seen.shape, bool) if condition.static is None else condition.static
