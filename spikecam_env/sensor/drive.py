@@ -128,6 +128,15 @@ def comparators(now: Exposure, effects: Sequence[Effect], memory: Memory) -> Com
     return Comparators(factor, common, field.reshape(-1, pixels), grains_per_mV, sway)
 
 
+def movement(now: Exposure, effect: Effect) -> tuple[Array, Array]:
+    """Variation and range (H or 1, 1) of the reference that an effect moves within frame `now` [thresholds]."""
+    sway = _sway(now, [effect], np.ones((1, 1, 1)), np.zeros((1, 1, 1)))
+    if sway is None:
+        return np.zeros((1, 1)), np.zeros((1, 1))
+    level = sway.factor[0] + sway.common[0] * (1e-3 / now.unit.swing_V.min())
+    return abs(np.diff(level, axis=1)).sum(axis=1, keepdims=True), np.ptp(level, axis=1, keepdims=True)
+
+
 def _sway(now: Exposure, effects: Sequence[Effect], factor: Array, common: Array) -> Sway | None:
     """How the references move within the frames besides factor and common (F or 1, H or 1, 1), which hold for each."""
     parts = intervals(now, effects)

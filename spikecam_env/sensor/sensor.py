@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.sensor import bent_light as bent
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.imaging import Imaging
@@ -22,6 +23,7 @@ from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import UNIT_RANGES, Unit
 
 ENGINES = ("auto", "cuda", "fast", "reference")
+BENT_LIGHT = ("refuse", "allow")
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ class SpikeSensor:
     unit: a camera's own firing law, as measured, in place of one drawn from the model.  The model's fixed patterns and
         noise strengths are then not used; its optics and what its effects do from frame to frame are.
     threads: of the fast engine, default NUMBA_NUM_THREADS; one where several cameras run at once.
+    bent_light: "refuse" (the default) films with keys inside a frame where an effect of the model would be off by more
+        than 1 % of that frame's charge (`bent_light.py`), or "allow" them.
     Raises InputError for an unknown engine, a shape that is not two positive whole numbers, a negative seed, for
     engine="fast" or "cuda" with an effect that it does not carry, for engine="cuda" without a CUDA device, and for a
     unit of another number of pixels or with values that are no firing law.
@@ -74,7 +78,11 @@ class SpikeSensor:
         unit: Unit | None = None,
         *,
         threads: int | None = None,
+        bent_light: str = "refuse",
     ) -> None:
+        if bent_light not in BENT_LIGHT:
+            raise unknown_name("bent_light", bent_light, BENT_LIGHT)
+        self.bent_light = bent_light
         self.threads = None if threads is None else checked_count(threads, "threads")
         self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
         self.shape = checked_shape(shape)
@@ -97,10 +105,13 @@ class SpikeSensor:
         out: an array of that kind, C-contiguous, to be overwritten: fresh memory costs as much as the simulation.
 
         radiance: (H, W) held throughout, or Keyframes on the stream's absolute frame numbers; 1.0 makes the nominal
-        pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light or frames < 1.
+        pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light, frames < 1, and
+        light that bends within a frame where `bent_light` says so; the camera is then as it was.
         """
         frames = checked_count(frames)
         light = as_light(radiance, self.shape)
+        if isinstance(light, Keyframes) and self._looks_for_bends:
+            bent.check_bent(light, self.frame, frames, self._first_exposure(), self._frame_effects, self._imaging.image)
         spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)
         if light is not self._film:
             warn_beside(light, self.frame, frames)
@@ -148,7 +159,8 @@ class SpikeSensor:
 
     def clean_twin(self) -> SpikeSensor:
         """A noise-free camera at frame 0 with this one's initial phase: on the same scene it gives the clean stream."""
-        twin = SpikeSensor(self.model.noise_free(), self.shape, self.seed, self.engine, self.take, threads=self.threads)
+        model, bends = self.model.noise_free(), self.bent_light
+        twin = SpikeSensor(model, self.shape, self.seed, self.engine, self.take, threads=self.threads, bent_light=bends)
         twin._start(self.seed, phase=self.phase)
         return twin
 
@@ -163,6 +175,8 @@ class SpikeSensor:
         noise_seed = seed if self.take == 0 else int(generator(seed, f"take {self.take}").integers(1 << 62))
         self.phase = _read_only(generator(noise_seed, "phase").random(self.shape) if phase is None else phase)
         flat = self.phase.reshape(-1)
+        of_bends = self.bent_light == "refuse" and bent.concerned(self._frame_effects, self._first_exposure())
+        self._looks_for_bends = of_bends
         if self.engine == "fast" and not self._frame_effects:
             self._pixels = ahead.start(self.unit, flat, noise_seed)
         elif self.engine == "fast":

@@ -223,6 +223,21 @@ class Feedback(NamedTuple):
         return self.lost_per_root_rate * np.sqrt(rate) + self.lost_per_rate * rate
 
 
+class Bend(NamedTuple):
+    """How the charge of a frame with keys inside it comes, every pixel's (H, W) [thresholds], dark current included.
+
+    mean: charge of the frame.  uneven: the largest distance of the light at any moment from it [thresholds a frame].
+    moved: charge that comes at another time than if it came evenly.  bent: the largest distance of the light from the
+    straight line with its mean and first moment [thresholds a frame]; off_line: the integral of that distance.
+    """
+
+    mean: Array
+    uneven: Array
+    moved: Array
+    bent: Array
+    off_line: Array
+
+
 @dataclasses.dataclass(frozen=True)
 class Effect:
     """Base of all effects; every hook here does nothing.  Charge is in thresholds of each pixel.
@@ -314,6 +329,11 @@ class Effect:
 
     def lead(self, first: Exposure) -> Array | float:
         """How long before the end of the array's frame each row is read (H, 1) [frames]."""
+        return 0.0
+
+    def off_the_line(self, bend: Bend, now: Exposure) -> Array | float:
+        """How far `collect` may be off in a frame whose light bends (H, W) [thresholds]; `bent_light` adds what
+        `sway` and `feedback` say."""
         return 0.0
 
     def read_out(self, spikes: Spikes, now: Exposure, memory: Any) -> tuple[Spikes, Any]:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Array, Bend, Charge, Effect, Exposure, Stage, Within, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -49,3 +49,6 @@ class ClockJitter(Effect):
         if rises.any():
             read = Charge(read.values + rises * ((end + begin) * length / 2.0), 1.0, rises)
         return read, dark.scaled(length), Edge(edges[-1], memory.rng)
+
+    def off_the_line(self, bend: Bend, now: Exposure) -> Array:
+        return bend.bent * (self.sigma_ns * 1e-9 * now.frame_rate_hz)
