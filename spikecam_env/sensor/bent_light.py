@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Array, Bend, Effect, Exposure, Feedback
-from spikecam_env.sensor.light import GRAINS, Keyframes
+from spikecam_env.sensor.light import GRAINS, INSTANT, Keyframes, course
 
 ALLOWED = 0.01
 """Share of a frame's charge by which an effect may be off: a rate is off by no more."""
@@ -32,9 +32,6 @@ ALLOWED = 0.01
 FAINT = 0.01
 """Charge [thresholds]: of a frame that has less, so much is the whole.  What is off is then a ten-thousandth of a
 threshold a frame at most, less than an electron."""
-
-INSTANT = 1e-9
-"""Time [frames] that a jump of light takes at most: it has no light of its own."""
 
 Picture = NDArray[np.float32]
 
@@ -74,18 +71,11 @@ def frames_with_keys(light: Keyframes, start: int, stop: int) -> Iterator[int]:
     return iter(np.unique(np.floor(times[times != np.floor(times)])).astype(np.int64).tolist())
 
 
-def course(light: Keyframes, frame: int) -> tuple[Array, list[Picture]]:
-    """Light of a frame: times (n,) in it, 0 .. 1, and the picture (H, W) at each; linear between."""
-    after, until = np.searchsorted(light.frame, frame, side="right"), np.searchsorted(light.frame, frame + 1)
-    times = np.concatenate([[0.0], light.frame[after:until] - frame, [1.0]])
-    return times, [light.at(frame), *light.radiance[after:until], light.at(frame + 1)]
-
-
 def bend_of(light: Keyframes, frame: int, now: Exposure, image: Callable[..., Picture]) -> Bend:
     """How the charge of every pixel comes in that frame."""
     times, pictures = course(light, frame)
     gain, dark = (a.astype(np.float64) / GRAINS for a in now.unit.grains_per_frame)
-    levels = np.stack([image(np.ascontiguousarray(p).reshape(-1)) * gain + dark for p in pictures])
+    levels = np.stack([image(p) * gain + dark for p in pictures])
     lasts = np.diff(times) > INSTANT
     length = np.diff(times)[lasts, None]
     low, high = levels[:-1][lasts], levels[1:][lasts]

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Field, Spikes, having
-from spikecam_env.sensor.light import GRAINS
+from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Field, Spikes, Stage, having
+from spikecam_env.sensor.light import GRAINS, Piece
 from spikecam_env.sensor.model import generator
 
 Memory = dict[str, Any]
@@ -65,11 +65,17 @@ def begin(first: Exposure, effects: Sequence[Effect], seed: int, unit_seed: int 
 
 
 def expected_charge(
-    now: Exposure, effects: Sequence[Effect], memory: Memory, mean: Array, rise: Array | float = 0.0
+    now: Exposure,
+    effects: Sequence[Effect],
+    memory: Memory,
+    mean: Array,
+    rise: Array | float = 0.0,
+    pieces: Sequence[Piece] = (),
 ) -> tuple[Charge, Charge]:
     """Charge of the frames from light and in the dark, given that of the light law, mean (F or 1, P) [thresholds].
 
-    rise: of that law within each frame, as mean, where `wants_rise`.
+    rise: of that law within each frame, as mean, where `wants_rise`.  pieces: of the light of one frame that bends
+    within it, where `wants_pieces`.
     The dark part matters, and is worked out, where an effect wants it or where dark charge is free of noise.
     Updates `memory`.
     """
@@ -82,13 +88,54 @@ def expected_charge(
     light = Charge(whole - below, rise=rise if isinstance(rise, float) else rise.reshape(-1, *now.shape))
     dark = Charge(below)
     for effect in acting:
-        light, dark, memory[effect.name] = effect.collect(light, dark, now, memory[effect.name])
+        if pieces and asks_for_pieces(effect):
+            light, memory[effect.name], pieces = _collect_by_pieces(
+                effect, light, dark, now, memory[effect.name], pieces
+            )
+        else:
+            before = light
+            light, dark, memory[effect.name] = effect.collect(light, dark, now, memory[effect.name])
+            if pieces and light is not before:
+                pieces = _in_proportion(pieces, before.values[0], light.values[0])
     return light, dark
+
+
+def _collect_by_pieces(
+    effect: Effect, light: Charge, dark: Charge, now: Exposure, memory: Any, pieces: Sequence[Piece]
+) -> tuple[Charge, Any, list[Piece]]:
+    """What an effect makes of the light of one frame, a piece after another: to its mean and to its rise comes what the
+    effect changes, so that what it leaves alone keeps its bits."""
+    mean, rise, after = light.values, np.broadcast_to(light.rises, light.values.shape), []
+    for start, length, x, d in pieces:
+        given = Charge(x.reshape(1, *now.shape), 1.0, d.reshape(1, *now.shape))
+        made, _, memory = effect.collect(given, dark, now.piece(start, length), memory)
+        more, steeper = made.values - given.values, made.rises - given.rises
+        arm = start + 0.5 * length - 0.5
+        mean = mean + length * more
+        rise = rise + 12.0 * length * (arm * more + length / 12.0 * steeper)
+        after.append(Piece(start, length, made.values.reshape(-1), np.broadcast_to(made.rises, more.shape).reshape(-1)))
+    return Charge(mean, 1.0, rise), memory, after
+
+
+def _in_proportion(pieces: Sequence[Piece], before: Array, after: Array) -> list[Piece]:
+    """Pieces of a frame whose charge (H, W) an effect has changed as a whole."""
+    share = np.divide(after, before, out=np.ones_like(before), where=before > 0.0).reshape(-1)
+    return [piece._replace(mean=piece.mean * share, rise=piece.rise * share) for piece in pieces]
 
 
 def wants_rise(effects: Sequence[Effect]) -> bool:
     """Whether an effect asks how light changes within a frame."""
     return any(effect.within_frame for effect in effects)
+
+
+def wants_pieces(effects: Sequence[Effect]) -> bool:
+    """Whether an effect asks for the pieces of a frame whose light bends."""
+    return any(map(asks_for_pieces, effects))
+
+
+def asks_for_pieces(effect: Effect) -> bool:
+    """Whether an effect acts on light piece by piece; one of the read-out does not, as it says where frames end."""
+    return effect.within_frame and effect.stage < Stage.READOUT
 
 
 def intervals(first: Exposure, effects: Sequence[Effect]) -> int:

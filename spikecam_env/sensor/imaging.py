@@ -38,7 +38,9 @@ class Imaging:
         start = self.image(segment.radiance0)
         held = segment.radiance1 is segment.radiance0
         rise = None if segment.rise is None else self.image(segment.rise)
-        return replace(segment, radiance0=start, radiance1=start if held else self.image(segment.radiance1), rise=rise)
+        course = segment.course and segment.course._replace(pictures=tuple(map(self.image, segment.course.pictures)))
+        stop = start if held else self.image(segment.radiance1)
+        return replace(segment, radiance0=start, radiance1=stop, rise=rise, course=course)
 
     def image(self, picture: Picture) -> Picture:
         """The image (H*W,) of a picture (H*W,); the same array while the picture is the same."""

@@ -23,9 +23,9 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -194,6 +194,28 @@ def check_radiance(radiance: NDArray[np.float32]) -> None:
         raise InputError(f"radiance holds {what}; it must be finite and >= 0 (1.0 = one spike a frame)")
 
 
+class Course(NamedTuple):
+    """Light within a frame that holds keys: times (n,) in it, 0 .. 1, and the picture (H*W,) at each; linear
+    between."""
+
+    times: NDArray[np.float64]
+    pictures: tuple[NDArray[np.float32], ...]
+
+
+class Piece(NamedTuple):
+    """A stretch of a frame in which light is linear: from when and for how long [frames], mean and rise of the light in
+    it (P,), as much a frame."""
+
+    start: float
+    length: float
+    mean: NDArray[np.float64]
+    rise: NDArray[np.float64]
+
+
+INSTANT = 1e-9
+"""Time [frames] that a jump of light takes at most: it has no light of its own."""
+
+
 @dataclass(frozen=True)
 class Segment:
     """Frames first .. first + count of a key interval of `length` frames, light linear over the interval.
@@ -201,6 +223,7 @@ class Segment:
     radiance0, radiance1: (H*W,) float32, light at the start and at the end of the whole interval.
     rise: (H*W,) float32, of a frame with keys inside it, whose mean the two are: by how much more light there is at its
     end than at its start, of the line with its first moment.  None elsewhere, where the two say so.
+    course: of such a frame, where it is asked for.
     """
 
     radiance0: NDArray[np.float32]
@@ -209,19 +232,26 @@ class Segment:
     first: int
     count: int
     rise: NDArray[np.float32] | None = None
+    course: Course | None = None
 
 
-def segments(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> Iterator[Segment]:
+def segments(
+    light: Keyframes | NDArray[np.float32], start: int, frames: int, courses: bool = False
+) -> Iterator[Segment]:
     """Cut frames start .. start + frames into segments.
 
     light: keyframes, or one (H, W) picture held throughout.  How the stream is cut into calls changes no bit:
-    the ramps depend on the keys alone.  A frame with keys inside it is a segment of its own.
+    the ramps depend on the keys alone.  A frame with keys inside it is a segment of its own, with its course where
+    `courses` are asked for.
     """
     at, stop = start, start + frames
     while at < stop:
         pieces = _segments_from(light, at, stop) if isinstance(light, Keyframes) else _held(light, at, stop)
         for segment in pieces:
-            yield segment
+            if courses and segment.rise is not None and isinstance(light, Keyframes):
+                yield replace(segment, course=course(light, at))
+            else:
+                yield segment
             at += segment.count
 
 
@@ -254,6 +284,14 @@ def _frame_with_keys(light: Keyframes, at: int) -> Segment:
     return Segment(held, held, 1, 0, 1, np.clip(rise, -2.0 * mean, 2.0 * mean).astype(np.float32))
 
 
+def course(light: Keyframes, frame: int) -> Course:
+    """Light within a frame."""
+    after, until = np.searchsorted(light.frame, frame, side="right"), np.searchsorted(light.frame, frame + 1)
+    times = np.concatenate([[0.0], light.frame[after:until] - frame, [1.0]])
+    pictures = (light.at(frame), *light.radiance[after:until], light.at(frame + 1))
+    return Course(times, tuple(picture.reshape(-1) for picture in pictures))
+
+
 def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]:
     flat = picture.reshape(-1)
     while at < stop:
@@ -266,13 +304,15 @@ def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]
 class Ramp:
     """The integers of F(k) for every pixel of a segment: i0, B, and r / 2n in 2^-18 (see the module's equation).
 
-    own_rise: (P,) [grains/frame] of a frame with keys inside it.
+    own_rise: (P,) [grains/frame] of a frame with keys inside it; pieces: of such a frame, in thresholds and without
+    dark current, where its course is known.
     """
 
     level: NDArray[np.int32]
     curve: NDArray[np.int32]
     rest: NDArray[np.int32]
     own_rise: NDArray[np.float32] | None = None
+    pieces: tuple[Piece, ...] = ()
 
     @cached_property
     def steady(self) -> bool:
@@ -299,12 +339,26 @@ def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32])
     twice = 2 * segment.length
     curve = np.floor(d.astype(np.float32) * np.float32(1.0 / twice)).astype(np.int32)
     per = -(-(1 << 18) // twice)
-    return Ramp(i0, curve, (d - curve * np.int32(twice)) * np.int32(per), rise_of(segment, gain))
+    rest = (d - curve * np.int32(twice)) * np.int32(per)
+    return Ramp(i0, curve, rest, rise_of(segment, gain), pieces_of(segment, gain))
 
 
 def rise_of(segment: Segment, gain: NDArray[np.float32]) -> NDArray[np.float32] | None:
     """`Ramp.own_rise` of a segment."""
     return None if segment.rise is None else segment.rise * gain
+
+
+def pieces_of(segment: Segment, gain: NDArray[np.float32]) -> tuple[Piece, ...]:
+    """`Ramp.pieces` of a segment."""
+    if segment.course is None:
+        return ()
+    times, pictures = segment.course
+    levels = [picture * (gain.astype(np.float64) / GRAINS) for picture in pictures]
+    return tuple(
+        Piece(float(begin), float(end - begin), 0.5 * (low + high), high - low)
+        for begin, end, low, high in zip(times, times[1:], levels, levels[1:], strict=False)
+        if end - begin > INSTANT
+    )
 
 
 def _grains_per_frame(

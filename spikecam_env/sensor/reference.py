@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from spikecam_env.sensor import drive
 from spikecam_env.sensor.crossing import NEVER, first_crossing
 from spikecam_env.sensor.effects.base import Effect, Exposure, having
-from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Segment, on_grid, ramp
+from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Piece, Segment, on_grid, ramp
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 
@@ -67,18 +67,23 @@ def run(first: Exposure, effects: Sequence[Effect], state: ReferenceState, segme
     for i in range(segment.count):
         after = light.collected(segment.first + i + 1)
         now = replace(first, number=state.frame)
-        spikes[i] = step(now, effects, state, (after - before).astype(np.float64), light.rise)
+        spikes[i] = step(now, effects, state, (after - before).astype(np.float64), light.rise, light.pieces)
         state.frame += 1
         before = after
     return spikes
 
 
 def step(
-    now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array, rise: Array
+    now: Exposure,
+    effects: Sequence[Effect],
+    state: ReferenceState,
+    mean: Array,
+    rise: Array,
+    pieces: Sequence[Piece] = (),
 ) -> NDArray[np.bool_]:
-    """One frame: `mean` (P,) is its expected charge [grains], which rises by `rise` (P,) from its start to its end;
-    returns which pixels report a spike (P,)."""
-    light, dark = drive.expected_charge(now, effects, state.memory, mean / GRAINS, rise / GRAINS)
+    """One frame: `mean` (P,) is its expected charge [grains], which rises by `rise` (P,) from its start to its end, in
+    `pieces` where its light bends; returns which pixels report a spike (P,)."""
+    light, dark = drive.expected_charge(now, effects, state.memory, mean / GRAINS, rise / GRAINS, pieces)
     dark_grains = np.clip(dark.values[0].reshape(-1) * GRAINS, 0.0, MOST_GRAINS)
     mean = np.minimum(np.maximum(light.values[0], 0.0).reshape(-1) * GRAINS + dark_grains, MOST_GRAINS)
     missed = np.minimum(state.missed, mean)

@@ -15,6 +15,7 @@ from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_count, checked_se
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor import bent_light as bent
 from spikecam_env.sensor import reference
+from spikecam_env.sensor.drive import wants_pieces
 from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import ahead, block, fast
@@ -116,7 +117,8 @@ class SpikeSensor:
         if light is not self._film:
             warn_beside(light, self.frame, frames)
         self._film = light if isinstance(light, Keyframes) else None
-        seen = map(self._imaging.seen, segments(light, self.frame, frames))
+        courses = wants_pieces(self._frame_effects)
+        seen = map(self._imaging.seen, segments(light, self.frame, frames, courses))
         if self.engine == "fast" and self._frame_effects:
             block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
         else:

@@ -91,6 +91,8 @@ class Exposure:
 
     number: of its first frame, absolute, from 0.  shape: (rows, columns).  unit: the firing law of every pixel.
     frames: how many, F; one for the hooks that act frame by frame.
+    part: of a frame, where light bends and an effect `within_frame` is asked for pieces: the block is then one piece,
+    `number` 0, `frame_rate_hz` one over its length, and it begins `origin` such lengths after the recording does.
     """
 
     number: int
@@ -98,20 +100,27 @@ class Exposure:
     shape: tuple[int, int]
     unit: Unit
     frames: int = 1
+    part: float = 1.0
+    origin: float = 0.0
 
     @property
     def start(self) -> Array:
         """When each frame begins (F, 1, 1) [frames]."""
-        return (self.number + np.arange(self.frames, dtype=np.float64))[:, None, None]
+        return (self.origin + self.number + np.arange(self.frames, dtype=np.float64))[:, None, None]
 
     @property
     def middle_s(self) -> Array:
         """Time of the middle of each frame (F, 1, 1) [s]."""
-        return ((self.number + np.arange(self.frames, dtype=np.float64) + 0.5) / self.frame_rate_hz)[:, None, None]
+        return (self.start + 0.5) / self.frame_rate_hz
+
+    def piece(self, start: float, length: float) -> Exposure:
+        """A piece of one frame, from `start` in it on [frames]."""
+        rate, origin = self.frame_rate_hz / length, (self.number + start) / length
+        return dataclasses.replace(self, number=0, frame_rate_hz=rate, part=length, origin=origin)
 
     def charge_of(self, current_pA: float) -> Array:
-        """Charge (H, W) that a current brings in a frame [thresholds]."""
-        return (current_pA * 1e3 / self.frame_rate_hz / self.unit.threshold_fC).reshape(self.shape)
+        """Charge (H, W) that a current brings in a frame of the camera [thresholds]."""
+        return (current_pA * 1e3 / (self.frame_rate_hz * self.part) / self.unit.threshold_fC).reshape(self.shape)
 
 
 class Few(NamedTuple):
@@ -248,7 +257,8 @@ class Effect:
     stage: ClassVar[Stage]
     within: ClassVar[Within | None] = None
     within_frame: ClassVar[bool] = False
-    """Whether `collect` asks for the rise of light within a frame."""
+    """Whether `collect` asks for the rise of light within a frame, and, but for effects of the read-out, is given light
+    that bends within one piece by piece: its charge then is that of a frame as bright as the piece."""
     name: ClassVar[str] = "effect"
     strength: ClassVar[str]
     neutral: ClassVar[float] = 0.0

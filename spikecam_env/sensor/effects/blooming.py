@@ -17,17 +17,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import (
-    Array,
-    Bend,
-    Charge,
-    Effect,
-    Exposure,
-    Stage,
-    Within,
-    neighbour_sum,
-    parameter,
-)
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -58,11 +48,6 @@ class Blooming(Effect):
         spread = np.empty(shape)
         _spill_over(x, half, self.share, self.full, spread)
         return Charge(spread, 1.0, light.rises), dark, memory
-
-    def off_the_line(self, bend: Bend, now: Exposure) -> Array:
-        spills = bend.mean + bend.uneven > self.full
-        spilled: Array = np.where(spills, bend.off_line * (0.5 * self.share), 0.0)
-        return spilled + neighbour_sum(spilled) / 4.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)

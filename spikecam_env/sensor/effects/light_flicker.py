@@ -10,11 +10,10 @@ Source: lamps on 50 Hz mains swing at 100 Hz, by per cents (LED) to tens of them
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Array, Bend, Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.within_frame import wave_moments
 
@@ -37,7 +36,3 @@ class LightFlicker(Effect):
         cycles = self.frequency_hz * now.middle_s + self.phase_cycles
         wave = wave_moments(self.modulation, self.frequency_hz / now.frame_rate_hz, cycles)
         return light.modulated(wave), dark, memory
-
-    def off_the_line(self, bend: Bend, now: Exposure) -> Array:
-        angle = 2.0 * math.pi * self.frequency_hz / now.frame_rate_hz
-        return bend.off_line * (self.modulation * min(angle**2 / 8.0, 1.0))

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Array, Bend, Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -33,6 +33,3 @@ class PhotoResponseNonlinearity(Effect):
         if not d.any():
             return Charge(collected), dark, memory
         return Charge(collected - self.beta / 12.0 * d**2, 1.0, d * (1.0 - 2.0 * self.beta * x)), dark, memory
-
-    def off_the_line(self, bend: Bend, now: Exposure) -> Array:
-        return bend.off_line * bend.bent * abs(self.beta)

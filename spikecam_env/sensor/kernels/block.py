@@ -24,7 +24,7 @@ from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, Few, having
 from spikecam_env.sensor.kernels import block_loop, fast, loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
-from spikecam_env.sensor.light import GRAINS, Ramp, Segment, rise_of
+from spikecam_env.sensor.light import GRAINS, Piece, Ramp, Segment, pieces_of, rise_of
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
 
@@ -134,7 +134,7 @@ def run(
         rise = _rise(parts) if drive.wants_rise(effects) else 0.0
         count = sum(part.count for part in parts)
         now = replace(first, number=state.frame, frames=count)
-        _block(now, effects, state, mean, rise, spikes[done : done + count], threads)
+        _block(now, effects, state, (mean, rise, parts[0].light.pieces), spikes[done : done + count], threads)
         state.frame += count
         done += count
     return spikes
@@ -179,7 +179,7 @@ def _parts(law: BlockLaw, segments: Iterable[Segment], longest: int) -> Iterator
         if last is None or light is None or s.length != last.length or not _same_light(s, last):
             ends = fast.compilable(s.radiance0), fast.compilable(s.radiance1)
             light = Ramp(*loop.ramp(*ends, law.gain, law.dark, s.length))
-            light = replace(light, own_rise=rise_of(s, law.gain))
+            light = replace(light, own_rise=rise_of(s, law.gain), pieces=pieces_of(s, law.gain))
         last = s
         most = _most(light, longest)
         for done in range(0, s.count, most):
@@ -191,6 +191,8 @@ def _same_light(one: Segment, other: Segment) -> bool:
 
 
 def _alike(one: Ramp, other: Ramp) -> bool:
+    if one.pieces or other.pieces:
+        return False
     if one is other or not (one.steady or other.steady):
         return True
     return one.steady and other.steady and np.array_equal(one.level, other.level)
@@ -200,12 +202,11 @@ def _block(
     now: Exposure,
     effects: Sequence[Effect],
     state: BlockState,
-    mean: Array,
-    rise: Array | float,
+    charge: tuple[Array, Array | float, Sequence[Piece]],
     spikes: NDArray[np.uint8],
     threads: int | None,
 ) -> None:
-    light, dark = drive.expected_charge(now, effects, state.memory, mean, rise)
+    light, dark = drive.expected_charge(now, effects, state.memory, *charge)
     law = drive.comparators(now, effects, state.memory)
     sway = law.sway or _STILL
     feedback = _sum([e.feedback(now) for e in effects])
