@@ -50,10 +50,19 @@ class Row:
         return "agrees" if self.comparison.agrees else "DIFFERS"
 
 
+@dataclass(frozen=True)
+class Refusal:
+    """A setting that the sensor refuses, and its words."""
+
+    effect: str
+    setting: str
+    words: str
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", metavar="NAME", help="effects to compare, `light` among them; default all")
-    parser.add_argument("--quick", action="store_true", help="one setting each of the eight hardest effects")
+    parser.add_argument("--quick", action="store_true", help="one setting each of the nine hardest effects")
     parser.add_argument("--seed", type=_count, default=1)
     parser.add_argument("--groups", type=_count, help="independent groups of pixels a setting; default by setting")
     parser.add_argument("--frames", type=_count, help="frames a setting, 64 or more; default by setting")
@@ -70,17 +79,26 @@ def main() -> int:
         text = options.page and _page_text(options.page)
     except InputError as error:
         parser.error(str(error))
-    rows = []
+    rows: list[Row] = []
+    refusals: list[Refusal] = []
     for number, case in enumerate(tqdm(chosen, unit="setting")):
+        refusal = refused(case)
+        if refusal:
+            refusals.append(refusal)
+            tqdm.write(f"{refusal.effect:27s} {refusal.setting:32s} REFUSED: {refusal.words}")
+            continue
         for row in compare(case, options.seed * 1000 + number):
             rows.append(row)
             if options.all or not row.comparison.agrees:
                 tqdm.write(_line(row))
-    print(summary(rows))
+    if not rows:
+        print("nothing compared: every setting is refused")
+        return 0
+    print(summary(rows, refusals))
     if options.out:
         write_text_whole(options.out, _written(rows, options.out.suffix))
     if text:
-        write_text_whole(options.page, _between_markers(text, largest_errors(rows)))
+        write_text_whole(options.page, _between_markers(text, largest_errors(rows, refusals)))
     return int(any(not row.comparison.agrees for row in rows))
 
 
@@ -101,6 +119,15 @@ def chosen_cases(
             yield replace(case, groups=groups or case.groups, frames=frames or case.frames)
 
 
+def refused(case: Case) -> Refusal | None:
+    """Whether, and why, the sensor refuses a setting."""
+    try:
+        case.check()
+    except InputError as error:
+        return Refusal(case.effect, case.label, str(error))
+    return None
+
+
 def compare(case: Case, seed: int) -> Iterable[Row]:
     """Every statistic of a setting, by both engines."""
     literal = case.literal(seed)
@@ -110,21 +137,23 @@ def compare(case: Case, seed: int) -> Iterable[Row]:
             yield Row(case.effect, case.label, statistic.name, engine, compared(statistic, literal, spikes))
 
 
-def summary(rows: list[Row]) -> str:
-    """How many differ, of how many, and what chance would give."""
+def summary(rows: list[Row], refusals: list[Refusal]) -> str:
+    """How many differ, of how many, what chance would give, and how many settings are refused."""
     worst = max(rows, key=lambda row: abs(row.comparison.z))
     differ = sum(not row.comparison.agrees for row in rows)
     by_chance = len(rows) * 2.0 * float(stats.norm.sf(LIMIT))
     return (
         f"{len(rows)} comparisons, {differ} beyond |z| = {LIMIT:g}; by chance alone one or more would be in "
-        f"{by_chance:.1%} of runs (Bonferroni)\nlargest: {_line(worst)}\n{'FAIL' if differ else 'PASS'}"
+        f"{by_chance:.1%} of runs (Bonferroni); {len(refusals)} settings are refused\n"
+        f"largest: {_line(worst)}\n{'FAIL' if differ else 'PASS'}"
     )
 
 
-def largest_errors(rows: list[Row]) -> str:
-    """A line an effect: how it acts within a frame, and the comparison with the largest |z|."""
+def largest_errors(rows: list[Row], refusals: list[Refusal]) -> str:
+    """A line an effect: how it acts within a frame, and the comparison with the largest |z|; and what is refused."""
     lines = [
-        f"{len(rows)} comparisons, {sum(not row.comparison.agrees for row in rows)} beyond abs(z) = {LIMIT:g}.",
+        f"{len(rows)} comparisons, {sum(not row.comparison.agrees for row in rows)} beyond abs(z) = {LIMIT:g}; "
+        f"{len(refusals)} settings are refused.",
         "",
         _head(
             "effect", "within a frame", "comparisons", "largest abs(z)", "literal", "engine", "z", "error", "command"
@@ -138,6 +167,9 @@ def largest_errors(rows: list[Row]) -> str:
             f"| {name} | {_within(name)} | {len(own)} | {worst.setting}; {worst.statistic}; {worst.engine_name} | "
             f"{c.literal:.5f} | {c.engine:.5f} | {c.z:+.1f} | {c.error:+.2%} | `{COMMAND} --only {name}` |"
         )
+    if refusals:
+        lines += ["", "Refused, in the sensor's words:", "", _head("effect", "setting", "refusal")]
+        lines += [f"| {r.effect} | {r.setting} | {r.words} |" for r in refusals]
     return "\n".join(lines)
 
 

@@ -104,6 +104,13 @@ class Case:
             ]
         )
 
+    def check(self) -> None:
+        """Raise InputError where the sensor refuses this setting."""
+        keys, levels = self.film(self.frames)
+        radiance = (levels[:, None, None] * self._picture(self.shape)).astype(np.float32)
+        light = Keyframes(keys, np.ascontiguousarray(radiance))
+        SpikeSensor(self.model, self.shape, engine="fast", threads=1).step(light, self.frames)
+
     def engine(self, name: str, seed: int) -> list[Bits]:
         """The same by one of the sensor's engines."""
         cameras, shape = self.cameras
@@ -326,6 +333,7 @@ def _threshold() -> list[Case]:
         Case("20 % at 1 kHz", steady(0.3), ripple(0.2, 1e3), (*STEADY, *line(0.025)), electrons=500.0, groups=32),
         Case("2 % at 17 kHz, cosine light", COSINE, ripple(0.02, 17e3), (*STEADY, *line(0.425)), **fine),
         Case("2 % at 17 kHz, strobe", strobe(0.3, 0.2), ripple(0.02, 17e3), (*STEADY, *line(0.425)), **fine),
+        Case(".9 % at 17 kHz, strobe", strobe(0.3, 0.2), ripple(0.009, 17e3), (*STEADY, *line(0.425)), **fine),
         Case(
             "5 % at 40 kHz, light 1.3", steady(1.3), ripple(0.05, 40e3), (RATE, HISTOGRAM), electrons=100.0, frames=100
         ),
@@ -336,6 +344,7 @@ def _threshold() -> list[Case]:
         Case("-50 mV, tau .25, skew -1.1", steady(0.5), edge(-50.0, 0.25) | skew, (*STEADY, ROWS, *bands(4)), **banded),
         Case("50 mV, tau .1, skew -1.1", steady(0.35), edge(50.0, 0.1) | skew, (*STEADY, ROWS, *bands(4)), **banded),
         Case("-50 mV, cosine light", COSINE, edge(-50.0, 0.25), (*STEADY, ROWS), **banded),
+        Case("-21 mV, cosine light", COSINE, edge(-21.0, 0.25), (*STEADY, ROWS), **banded),
         Case("50 mV, N 500", steady(0.3), mV("reset_noise", 50.0), STEADY, electrons=500.0, groups=32),
         Case("50 mV, N 500", steady(0.3), mV("excess_threshold_noise", 50.0), STEADY, electrons=500.0, groups=32),
         Case("20 mV", steady(0.3), mV("common_threshold_noise", 20.0), (*STEADY, *POPULATION), **common),
@@ -385,14 +394,19 @@ def _reset() -> list[Case]:
         Case("tau .9, cosine light", COSINE, dead(0.9), STEADY),
         Case("tau .5, strobe", strobe(0.4, 0.2, 0.3), dead(0.5), STEADY),
         Case("tau .9, edges at n + .6", edges, dead(0.9), (RATE, VARIANCE, SERIAL, *after(5, 20))),
+        Case("tau .045, cosine light", COSINE, dead(0.045), STEADY),
+        Case("tau .006, strobe", strobe(0.4, 0.2, 0.3), dead(0.006), STEADY),
+        Case("tau .025, edges at n + .6", edges, dead(0.025), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("c .1, light .3", steady(0.3), delay(0.1), STEADY),
         Case("c .5, light .3", steady(0.3), delay(0.5), STEADY),
         Case("c .9, light .1, N 25", steady(0.1), delay(0.9), STEADY, electrons=25.0, frames=600),
         Case("c .3, edges at n + .6", edges, delay(0.3), (RATE, VARIANCE, SERIAL, *after(5, 20))),
+        Case("c .015, edges at n + .6", edges, delay(0.015), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("f .02, tau 10", steady(0.3), left(0.02, 10.0), STEADY),
         Case("f .4, tau 1", steady(0.3), left(0.4, 1.0), STEADY),
-        Case("f .4, tau 3, light .9", steady(0.9), left(0.4, 3.0), STEADY),
+        Case("f .4, tau 3, light .9", steady(0.9), left(0.4, 3.0), STEADY, quick=True),
         Case("f .4, tau 5, edges at n + .6", edges, left(0.4, 5.0), (RATE, VARIANCE, SERIAL, *after(5, 20))),
+        Case("f .055, tau 5, edges at n + .6", edges, left(0.055, 5.0), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("all, light .3", steady(0.3), {"synchronous_reset": {"fraction": 1.0}}, STEADY),
         Case(
             "half, N 1000", steady(0.7), {"synchronous_reset": {"fraction": 0.5}}, STEADY, electrons=1000.0, groups=16
@@ -459,6 +473,8 @@ def _readout() -> list[Case]:
         Case("5 us, light .8", steady(0.8), jitter(5000.0), (*STEADY, *POPULATION), **{**common, "frames": 100}),
         Case("5 us, cosine light", COSINE, jitter(5000.0), (*STEADY, *POPULATION), **common),
         Case("5 us, edges at n + .6", edges, jitter(5000.0), (RATE, *after(5, 20)), **common),
+        Case(".24 us, cosine light", COSINE, jitter(240.0), (*STEADY, *POPULATION), **common),
+        Case(".25 us, edges at n + .6", edges, jitter(250.0), (RATE, *after(5, 20)), **common),
         Case("p .05, 2 frames", steady(0.22), {"afterpulsing": {"probability": 0.05, "delay_frames": 2}}, STEADY),
         Case("p .3, 1 frame", steady(0.7), {"afterpulsing": {"probability": 0.3, "delay_frames": 1}}, STEADY),
         Case("5 %", steady(0.3), {"dead_pixels": {"fraction": 0.05}}, (RATE, SPREAD), separate=True, frames=100),

@@ -96,10 +96,38 @@ def step(
     else:
         fired = fire_in_turn(now, effects, state, mean, gained, law).reshape(now.shape)
     for effect in having("spiked", effects):
-        charge, rate = thresholds(state.charge, now), thresholds(mean, now)
-        charge, state.memory[effect.name] = effect.spiked(charge, fired, rate, now, state.memory[effect.name])
-        state.charge = charge.reshape(-1) * GRAINS
+        spiked(effect, now, state, gained, fired)
+        if effect.feedback(now).left and law.sway is None:
+            again = fired
+            while (again := crossed_again(now, effects, state, mean, again, law)).any():
+                spiked(effect, now, state, gained, again)
     return drive.read_out(now, effects, state.memory, fired[None]).reshape(-1)
+
+
+def spiked(effect: Effect, now: Exposure, state: ReferenceState, gained: Array, fired: NDArray[np.bool_]) -> None:
+    """What an effect does to the charge (P,) when it is known which pixels fired (H, W); gained: in the frame."""
+    charge, rate = thresholds(state.charge, now), thresholds(gained, now)
+    charge, state.memory[effect.name] = effect.spiked(charge, fired, rate, now, state.memory[effect.name])
+    state.charge = charge.reshape(-1) * GRAINS
+
+
+def crossed_again(
+    now: Exposure,
+    effects: Sequence[Effect],
+    state: ReferenceState,
+    mean: Array,
+    fired: NDArray[np.bool_],
+    law: drive.Comparators,
+) -> NDArray[np.bool_]:
+    """Reset those of the pixels that fired (H, W) that what a reset left takes to their threshold once more; returns
+    which did.  Their bit is set already."""
+    compared = references(now, effects, state, law)
+    limit = compared(state.threshold)
+    again: NDArray[np.bool_] = fired.reshape(-1) & (state.charge >= limit)
+    pixels = np.flatnonzero(again)
+    reset(now, effects, state, mean, limit[pixels], pixels)
+    state.threshold[pixels] = draw_threshold(now.unit.kappa[pixels], state.rng)
+    return again.reshape(now.shape)
 
 
 def thresholds(grains: Array, now: Exposure) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.literal.cases import Case, cases, square, steady
+from benchmarks.literal.cases import Case, cases, square, steady, strobe
 from benchmarks.literal.statistics import RATE, SERIAL, VARIANCE, after, compared
 from benchmarks.literal_pixel import BEGIN, END, chosen_cases, compare, main
 from spikecam_env.errors import InputError
@@ -67,12 +67,27 @@ def test_a_literal_lag_delays_its_share() -> None:
     assert abs(response - expected) < 5.0 * error + 0.02  # charge is conserved within a frame but for the spikes
 
 
-@pytest.mark.parametrize("effect", ["light", "light_flicker", "photodiode_lag", "dead_time"])
+@pytest.mark.parametrize("effect", ["light", "light_flicker", "photodiode_lag", "dead_time", "incomplete_reset"])
 def test_engines_agree_with_the_literal_pixel(effect: str) -> None:
     for case in chosen_cases([effect], quick=True, groups=16, frames=160):
         for row in compare(case, seed=3):
             print(row.setting, row.statistic, row.engine_name, row.comparison)
             assert row.comparison.agrees
+
+
+def test_what_the_sensor_refuses_is_listed_and_not_compared(monkeypatch, capsys, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    page = tmp_path / "page.md"
+    page.write_text(f"{BEGIN}\n{END}\n", encoding="utf-8")
+    cases_of_two = [
+        Case("weak", steady(0.3), {"dead_time": {"tau_us": 0.1}}, (RATE,), groups=8, frames=64),
+        Case("strobe", strobe(0.4, 0.2, 0.3), {"dead_time": {"tau_us": 12.5}}, (RATE,), groups=8, frames=64),
+    ]
+    monkeypatch.setattr("benchmarks.literal_pixel.cases", lambda: cases_of_two)
+    monkeypatch.setattr("sys.argv", ["literal_pixel", "--page", str(page)])
+    main()
+    assert "REFUSED" in capsys.readouterr().out
+    written = page.read_text(encoding="utf-8")
+    assert "2 comparisons" in written and "1 settings are refused" in written and "| dead_time | strobe |" in written
 
 
 def test_a_difference_is_seen() -> None:

@@ -43,7 +43,8 @@ class IncompleteReset(Effect):
         over = np.clip(charge.flat[at] / np.maximum(rate.flat[at], 1e-12), 0.0, 1.0)
         crossing, last = now.number + 1.0 - over, memory.copy()
         left = charge.copy()
-        left.flat[at] -= self.fraction * (decayed(np.minimum((crossing - memory.flat[at]) / self.tau(now), LONG)) - 1.0)
+        ended = np.maximum(crossing - memory.flat[at], 0.0)
+        left.flat[at] -= self.fraction * (decayed(np.minimum(ended / self.tau(now), LONG)) - 1.0)
         last.flat[at] = crossing
         return left, last
 

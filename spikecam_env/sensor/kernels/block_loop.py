@@ -285,9 +285,13 @@ def advance(  # type: ignore[no-untyped-def]
                         couple(kick, around[p0 - r * columns :], scratch[line // lines, h0 : h0 + n])
             if left != 0.0:
                 for b in range(together):
-                    x, hit = scratch[b], scratch[b].view(np.uint8)[_HIT : _HIT + BAND]
+                    x, words, hit = (
+                        scratch[b],
+                        scratch[b].view(np.uint32),
+                        scratch[b].view(np.uint8)[_HIT : _HIT + BAND],
+                    )
                     groups = find_live(hit.view(np.uint64), BAND // GROUP, live)
-                    stay(x, hit, live, groups, number + t + 1.0, left, left_tau)
+                    stay(x, words, hit, live, groups, number + t + 1.0, left, left_tau, reset, polynomial)
             if droop != 0.0:
                 for r in range(row_of[line0], row_of[stop - 1] + 1):
                     activity[r] = bits[r * columns : (r + 1) * columns].sum() / columns
@@ -594,7 +598,7 @@ def spike(x, words, o, j, moment, taken, of_pixel, reset, polynomial):  # type: 
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def stay(x, hit, live, groups, end, left, left_tau):  # type: ignore[no-untyped-def]
+def stay(x, words, hit, live, groups, end, left, left_tau, reset, polynomial):  # type: ignore[no-untyped-def]
     """What stays on the photodiode at the resets of the pixels that fired; end: of the frame."""
     draws = x.view(np.float32)
     for g in range(groups):
@@ -610,6 +614,30 @@ def stay(x, hit, live, groups, end, left, left_tau):  # type: ignore[no-untyped-
             x[_HELD + j] = on_grid((held - stays) * _G) if fires else x[_HELD + j]
             x[_PHI + j] = phi if fires else x[_PHI + j]
             x[_LIMIT + j] = limit if fires else x[_LIMIT + j]
+        for j in range(q, q + GROUP):
+            if hit[j] != 0 and x[_HELD + j] >= x[_LIMIT + j]:
+                cross_again(x, words, j, end, left, left_tau, reset, polynomial)
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def cross_again(x, words, j, end, left, left_tau, reset, polynomial):  # type: ignore[no-untyped-def]
+    """Resets of a pixel that what stayed takes to its threshold once more, in the frame whose bit is set already; the
+    law is that of `fire` and `stay`."""
+    per_root_rate, per_rate, kept = reset
+    rate = x[_ARRIVES + j] / _G
+    while x[_HELD + j] >= x[_LIMIT + j]:
+        over, electrons = on_grid(x[_HELD + j] - x[_LIMIT + j]), x[_STANDS + j] * (1.0 / _G)
+        if not (per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0):
+            over, electrons = after_reset(over, rate, x[_STANDS + j], per_root_rate, per_rate, kept)
+        draw = drawn(words[_FIRST + j], words[_SECOND + j], words[_FIRED + j], polynomial)
+        words[_FIRED + j] = _U(words[_FIRED + j] + _U(1))
+        words.view(np.float32)[_DRAW + j] = draw
+        crossed = end - min(max(over / _G / max(rate, 1e-12), 0.0), 1.0)
+        stays = left * (decay(min(max(crossed - x[_CROSSED + j], 0.0) / left_tau, LONG)) - 1.0)
+        phi = needed(electrons + stays, x[_NOISE + j], x[_JITTER + j], draw)
+        x[_ELECTRONS + j], x[_CROSSED + j], x[_PHI + j] = electrons, crossed, phi
+        x[_HELD + j] = on_grid((over / _G - stays) * _G)
+        x[_LIMIT + j] = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
@@ -678,6 +706,10 @@ def jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_t
                     x[_HELD + j] = on_grid((held - stays) * _G) if due else x[_HELD + j]
                     x[_PHI + j] = phi if due else x[_PHI + j]
                     x[_LIMIT + j] = limit if due else x[_LIMIT + j]
+                for j in range(q, q + GROUP):
+                    if words[_DUE + j] > words[_AGAIN + j] and x[_HELD + j] >= x[_LIMIT + j]:
+                        end = number + x[_AT + j]
+                        cross_again(x, words, j, end, left, left_tau, reset, polynomial)
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
