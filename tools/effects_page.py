@@ -153,7 +153,8 @@ That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_sh
 in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
 anew. `within` says how it acts within a frame, and its docstring how far that is exact: charge is integrated over the
 frame, not sampled at its middle. `now.start` is when each frame begins, `spikecam_env/sensor/within_frame.py` has
-closed forms, and with `within_frame = True` a `Charge` says how light rises within the frame.
+closed forms, and with `within_frame = True` a `Charge` says how light rises within the frame; a frame that holds keys
+then comes piece by piece. What an effect cannot do in such a frame it says by `off_the_line`: beyond 1 % it is refused.
 
 The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
 changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is

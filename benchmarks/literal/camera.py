@@ -357,7 +357,8 @@ def dead_time(effect: Any, camera: Camera) -> None:
 
 @law
 def comparator_delay(effect: Any, camera: Camera) -> None:
-    """The comparator trips c / sqrt(x) after the crossing; electrons that arrive meanwhile are lost."""
+    """The comparator trips c / sqrt(x) after the crossing; electrons that arrive meanwhile are lost.  By convention the
+    spike is of the frame in which the threshold is crossed."""
     camera.law["delay"] = effect.delay_us * 1e-6 * camera.frames_per_s
 
 
@@ -369,7 +370,7 @@ def incomplete_reset(effect: Any, camera: Camera) -> None:
 
 @law
 def synchronous_reset(effect: Any, camera: Camera) -> None:
-    """From a crossing to the read-out, each electron is lost with a probability."""
+    """From a crossing to the read-out, a share of the charge is lost."""
     camera.law["synchronous"] = effect.fraction
 
 

@@ -330,7 +330,8 @@ def _threshold() -> list[Case]:
         Case("10 % at 40 kHz", steady(0.3), ripple(0.1, 40e3), STEADY, **fine),
         Case("10 % at 40 kHz, phase .5", steady(0.3), ripple(0.1, 40e3, 0.5), STEADY, **fine),
         Case("30 % at 17 kHz", steady(0.3), ripple(0.3, 17e3), (*STEADY, *line(0.425)), **fine),
-        Case("20 % at 1 kHz", steady(0.3), ripple(0.2, 1e3), (*STEADY, *line(0.025)), electrons=500.0, groups=32),
+        Case("10 % at 17 kHz", steady(0.3), ripple(0.1, 17e3), (*STEADY, *line(0.425)), **fine),
+        Case("10 % at 1 kHz", steady(0.3), ripple(0.1, 1e3), (*STEADY, *line(0.025)), electrons=500.0, groups=32),
         Case("2 % at 17 kHz, cosine light", COSINE, ripple(0.02, 17e3), (*STEADY, *line(0.425)), **fine),
         Case("2 % at 17 kHz, strobe", strobe(0.3, 0.2), ripple(0.02, 17e3), (*STEADY, *line(0.425)), **fine),
         Case(".9 % at 17 kHz, strobe", strobe(0.3, 0.2), ripple(0.009, 17e3), (*STEADY, *line(0.425)), **fine),
@@ -390,7 +391,7 @@ def _reset() -> list[Case]:
         Case("tau .1, light .3", steady(0.3), dead(0.1), STEADY),
         Case("tau .9, light .3", steady(0.3), dead(0.9), STEADY, quick=True),
         Case("tau .9, light .8", steady(0.8), dead(0.9), STEADY),
-        Case("tau .5, light 1.6", steady(1.6), dead(0.5), STEADY, electrons=50.0, frames=200),
+        Case("tau .5, light 1.6", steady(1.6), dead(0.5), STEADY, electrons=500.0, frames=200, groups=32),
         Case("tau .9, cosine light", COSINE, dead(0.9), STEADY),
         Case("tau .5, strobe", strobe(0.4, 0.2, 0.3), dead(0.5), STEADY),
         Case("tau .9, edges at n + .6", edges, dead(0.9), (RATE, VARIANCE, SERIAL, *after(5, 20))),
@@ -414,11 +415,15 @@ def _reset() -> list[Case]:
         Case("all, strobe", strobe(0.4, 0.2, 0.3), {"synchronous_reset": {"fraction": 1.0}}, STEADY),
         Case("k .02, light .22", steady(0.22), kick(0.02), coupled, **beside, quick=True),
         Case("k -.02, light .22", steady(0.22), kick(-0.02), coupled, **beside),
-        Case("k .15, light .22", steady(0.22), kick(0.15), coupled, **beside),
+        Case("k .05, light .22", steady(0.22), kick(0.05), coupled, **beside),
+        Case("k .1, light .22", steady(0.22), kick(0.1), coupled, **beside),
         Case("k .02, light .85", steady(0.85), kick(0.02), coupled, **{**beside, "frames": 100}),
         Case("k -.1, light 1.2", steady(1.2), kick(-0.1), coupled, **{**beside, "electrons": 100.0}),
         Case("k .05, cosine light", COSINE, kick(0.05), coupled, **{**beside, "electrons": 100.0}),
         Case("k .05, edges at n + .6", edges, kick(0.05), (*coupled, *after(5, 20)), **{**beside, "electrons": 100.0}),
+        Case(
+            "k .005, edges at n + .6", edges, kick(0.005), (*coupled, *after(5, 20)), **{**beside, "electrons": 100.0}
+        ),
     ]
 
 

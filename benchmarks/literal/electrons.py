@@ -27,8 +27,10 @@ class Law(NamedTuple):
     electrons: N, of a nominal threshold.  flicker_*, ripple_*: amplitude, cycles a frame, cycles at frame 0.
     beta: loss of the photodiode at one threshold a frame.  lag_*: share of late electrons, mean delay.
     drift_*: rise of the dark rate, its time constant.  trap_*: electrons a frame in the upper state, mean dwell.
-    dead: the reset switch holds the node so long.  delay: of the comparator at one threshold a frame.
-    left_*: share of a threshold left after a long interval, time constant.  synchronous: share lost until the read-out.
+    dead: the reset switch holds the node so long.  delay: of the comparator at one threshold a frame; at_trip: 1 where
+    a spike is reported when the comparator trips, 0 where it is when the threshold is crossed.
+    left_*: share of a threshold left after a long interval, time constant.  synchronous: share of the charge that is
+    lost until the read-out.
     droop: rise of a row's threshold when all of it fired in the frame before.  edge_*: of the array's clock, once a
     frame: height that it adds to the threshold [electrons], moment in the frame, time constant of its decay.
     """
@@ -52,6 +54,7 @@ class Law(NamedTuple):
     edge_tau: float = 1.0
     dead: float = 0.0
     delay: float = 0.0
+    at_trip: float = 0.0
     left: float = 0.0
     left_tau: float = 1.0
     synchronous: float = 0.0
@@ -163,11 +166,11 @@ def meeting(charge, mean, offset, start, end, law):
 @njit(cache=True, error_model="numpy")
 def reset(t, r, c, phi, rate, read, law, pixels, nodes, rng):
     """The node (r, c) crosses phi at t: start again.  rate: thresholds a frame now.  read: when the frame is read.
-    Returns when the comparator trips.
+    Returns when the spike is reported.
 
     comparator:        trips c / sqrt(x) later, the light in between is lost
     dead time:         the switch holds the node for tau
-    synchronous reset: the node stays held until the read-out (of a share of the electrons)
+    synchronous reset: the node stays held until the read-out (of each electron a share is lost)
     incomplete reset:  f (1 - exp(-T/tau)) of a threshold stays, T the interval that ended
     reset noise:       the next threshold is phi (1 + kappa n)
     """
@@ -182,12 +185,12 @@ def reset(t, r, c, phi, rate, read, law, pixels, nodes, rng):
     nodes.limit[r, c] = pixels.threshold[r, c]
     if pixels.kappa[r, c] > 0.0:
         nodes.limit[r, c] *= 1.0 + pixels.kappa[r, c] * rng.standard_normal()
-    return trips
+    return trips if law.at_trip > 0.0 else t
 
 
 @njit(cache=True, error_model="numpy")
 def report(t, n, r, c, edges, spikes):
-    """A comparator that trips at t sets the bit of the frame that is read next."""
+    """A spike at t sets the bit of the frame that is read next."""
     while n < spikes.shape[0] and edges[n + 1, r] <= t:
         n += 1
     if n < spikes.shape[0]:
@@ -248,9 +251,7 @@ def live(n, r, c, start, end, scale, offset, law, pixels, film, nodes, edges, rn
             nodes.upper[r, c] = not nodes.upper[r, c]
         if not arrives or t < nodes.held[r, c]:
             continue
-        if law.synchronous > 0.0 and t < nodes.swept[r, c] and rng.random() < law.synchronous:
-            continue
-        nodes.charge[r, c] += 1.0
+        nodes.charge[r, c] += 1.0 - law.synchronous if t < nodes.swept[r, c] else 1.0
         phi = reference(t, nodes.limit[r, c] * scale, law) + offset
         while nodes.charge[r, c] >= phi:
             now = photocurrent(gain * radiance(t, law, film), own, law) + pixels.dark[r, c] * warming(t, law) + raised

@@ -7,6 +7,7 @@ these are off by at most
     x TV min(moved / x, 1), x range at most      a reference that moves by `sway`: its variation and range in the frame
     tau x uneven + c sqrt(x) uneven              light that is lost while a node is held (`Feedback`)
     f x min(2 moved / (x tau), 1)                charge that a reset leaves, by the interval that has ended
+    4 k moved                                    kicks that come at another time, in another order
     `Effect.off_the_line`                        what an effect says of itself
 
 in thresholds; moved: charge that comes at another time than if evenly; uneven: the largest |L - x|.  More than ALLOWED
@@ -95,6 +96,7 @@ def error(effect: Effect, bend: Bend, now: Exposure) -> Array:
     x, moved_share = bend.mean, np.minimum(bend.moved / np.maximum(bend.mean, 1e-12), 1.0)
     feedback = effect.feedback(now)
     off = (feedback.lost_per_rate * x + feedback.lost_per_root_rate * np.sqrt(x)) * bend.uneven
+    off = off + 4.0 * abs(feedback.kick_at_once) * bend.moved
     off = off + feedback.left * x * np.minimum(2.0 * moved_share / feedback.left_tau, 1.0)
     if _sways(effect, now):
         variation, span = drive.movement(now, effect)
@@ -107,7 +109,12 @@ def _sways(effect: Effect, first: Exposure) -> bool:
 
 
 def _acts(feedback: Feedback) -> bool:
-    return feedback.lost_per_rate > 0.0 or feedback.lost_per_root_rate > 0.0 or feedback.left > 0.0
+    return (
+        feedback.lost_per_rate > 0.0
+        or feedback.lost_per_root_rate > 0.0
+        or feedback.left > 0.0
+        or bool(feedback.kick_at_once)
+    )
 
 
 def _mean_size(begin: Array, end: Array) -> Array:

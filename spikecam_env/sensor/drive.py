@@ -94,6 +94,8 @@ def expected_charge(
             )
         else:
             before = light
+            if pieces and effect.within_frame and effect.overrides("lead"):
+                light = _as_read(light, effect.lead(now), pieces)
             light, dark, memory[effect.name] = effect.collect(light, dark, now, memory[effect.name])
             if pieces and light is not before:
                 pieces = _in_proportion(pieces, before.values[0], light.values[0])
@@ -123,6 +125,22 @@ def _in_proportion(pieces: Sequence[Piece], before: Array, after: Array) -> list
     return [piece._replace(mean=piece.mean * share, rise=piece.rise * share) for piece in pieces]
 
 
+def _as_read(light: Charge, lead: Array | float, pieces: Sequence[Piece]) -> Charge:
+    """Light of one frame, rows of which are read `lead` (H, 1) before its end, or a frame and so much less: its rise is
+    that of the line of which as much comes after that moment."""
+    values = light.values
+    early = lead - (np.asarray(lead) > 1.0)
+    late = np.zeros_like(values)
+    for start, length, x, d in pieces:
+        begin = np.clip(1.0 - early, start, start + length)
+        inside = start + length - begin
+        arm = 0.5 * (begin - start)  # of the middle of what comes after from that of the piece
+        late += inside * (x.reshape(values.shape) + d.reshape(values.shape) * (arm / length))
+    flat = early * (1.0 - early)
+    rise = np.divide(2.0 * (late - early * values), flat, out=np.zeros_like(values), where=flat + 0.0 * values > 0.0)
+    return Charge(values, 1.0, rise)
+
+
 def wants_rise(effects: Sequence[Effect]) -> bool:
     """Whether an effect asks how light changes within a frame."""
     return any(effect.within_frame for effect in effects)
@@ -130,11 +148,11 @@ def wants_rise(effects: Sequence[Effect]) -> bool:
 
 def wants_pieces(effects: Sequence[Effect]) -> bool:
     """Whether an effect asks for the pieces of a frame whose light bends."""
-    return any(map(asks_for_pieces, effects))
+    return any(asks_for_pieces(effect) or effect.overrides("lead") for effect in effects)
 
 
 def asks_for_pieces(effect: Effect) -> bool:
-    """Whether an effect acts on light piece by piece; one of the read-out does not, as it says where frames end."""
+    """Whether an effect acts on light piece by piece; one of the read-out, which says where frames end, does not."""
     return effect.within_frame and effect.stage < Stage.READOUT
 
 

@@ -39,6 +39,7 @@ def camera(name: str, engine: str = "fast", bent_light: str = "refuse", **parame
 AT_BOUND = {
     "dead_time": ("tau_us", 25.0 * 0.01 / (PEAK - MEAN), {}),
     "comparator_delay": ("delay_us", 25.0 * 0.01 * np.sqrt(MEAN) / (PEAK - MEAN), {}),
+    "crosstalk": ("kick", 0.01 / 4.0 / (1.0 - DUTY), {}),
     "incomplete_reset": ("fraction", 0.01, {"tau_us": 25.0}),
     "supply_ripple": ("ripple", 0.01 / 2.0, {"frequency_hz": 40e3}),
     "clock_feedthrough": ("amplitude_mV", -0.01 * 1092.4, {"tau_us": 1.0}),
@@ -90,7 +91,7 @@ def test_a_jump_at_a_whole_frame_bends_nothing() -> None:
 
 def test_an_effect_that_has_no_part_in_it_is_not_concerned() -> None:
     ideal = SensorModel.preset("ideal")
-    for name in ("readout_skew", "common_threshold_noise", "crosstalk", "synchronous_reset"):
+    for name in ("readout_skew", "common_threshold_noise", "light_flicker", "synchronous_reset"):
         sensor = SpikeSensor(ideal.with_effect(CATALOGUE[name]()), SHAPE)
         assert not bent.concerned(sensor._frame_effects, sensor._first_exposure()), name
 

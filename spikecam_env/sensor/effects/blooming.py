@@ -4,8 +4,7 @@
 
 Stage: photodiode.  Seen in: pictures with lights brighter than one spike a frame: a halo in the pixels next to them.
 Twins: optical_blur (at all levels), crosstalk (at all rates).
-Within a frame: integrated over the frame, in light that is linear in it; what a pixel hands on rises as its own light
-does.
+Within a frame: integrated over the frame, between keys; effects after it take a pixel's light to rise as it did before.
 Source: overflow model of CCD and CMOS texts (Janesick, Photon Transfer).  Light counts up to x = 2, the engines' cap.
 """
 

@@ -4,7 +4,8 @@
 
 Stage: read-out.  Seen in: spikes a frame over the whole array: variance 2 (x sigma)^2, lag-1 correlation -1/2.
 Twins: common_threshold_noise (does not grow with light), light_flicker (a line).
-Within a frame: integrated over the frame between its edges, in light that is linear on both sides of each.
+Within a frame: integrated over the frame between its edges, in light that is linear on both sides of each; refused
+where light bends so much that an edge late by sigma is off by 1 %.
 Source: period jitter of a clock; nanoseconds in practice.
 """
 

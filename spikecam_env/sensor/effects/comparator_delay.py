@@ -4,8 +4,10 @@
 
 Stage: reset.  Seen in: flats at several levels (intervals longer by an amount that grows as 1/sqrt(x)).
 Twins: dead_time (the same at all levels), photo_response_nonlinearity.
-Within a frame: at the crossing; the light lost is that of its frame for as long as the node is held: below 1 % of a
-threshold off while d T'^2 < 0.02, d the change of x from one frame to the next and T' = c / sqrt(x).
+Within a frame: at the crossing, whose frame has the spike, by convention: of a camera whose bit is that of the tripped
+comparator, spikes that trip after the frame's end come a frame later, with the same intervals in steady light.  The
+light lost is the mean of its frame for as long as the node is held: below 1 % of a threshold off while d T'^2 < 0.02, d
+the change of x from one frame to the next and T' = c / sqrt(x); refused where light bends by more.
 Source: delay of a comparator on a slow ramp, square root of the time to cross a window (regenerative comparator).
 """
 

@@ -4,8 +4,9 @@
 
 Stage: reset.  Seen in: flats at x > 0.3 (every interval longer by tau, whatever the level).
 Twins: comparator_delay (grows as 1/sqrt(x)), photo_response_nonlinearity.
-Within a frame: at the crossing; the light lost is that of its frame for as long as the node is held: below 1 % of a
-threshold off while d tau^2 < 0.02, d the change of x from one frame to the next.
+Within a frame: at the crossing; the light lost is the mean of its frame for as long as the node is held: below 1 % of a
+threshold off while d tau^2 < 0.02, d the change of x from one frame to the next; refused where light bends by more.
+In light above one spike a frame and of 50 electrons to a threshold, the reference is off by 0.5 % in the rate.
 Source: SCSim's script (0.2 % of a 50 us frame).
 """
 

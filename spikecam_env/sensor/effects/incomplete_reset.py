@@ -5,10 +5,8 @@
 
 Stage: reset.  Seen in: flats over a wide range of levels; steps of light (the first interval after one is off).
 Twins: photodiode_lag (follows the light, in static light nothing), dead_time (the same at all levels).
-Within a frame: at the end of the frame; exact while no pixel crosses twice in one (x + f < 1).  Beyond, a second
-crossing, which should be lost, comes a frame later: intervals 1.7 % short at x = 0.9, f = 0.3, 0.1 % at f = 0.1.
-Reference: a crossing is timed by the electrons after it, which at f = 0.5 takes 2 % off the interval variance at
-N = 500, 0.3 % at 2000.
+Within a frame: at the end of the frame; what is left may take a pixel to its threshold once more in the frame, a spike
+that is lost.  Of light that comes unevenly, the interval is timed as if it came evenly (refused beyond 1 %).
 Source: image lag of a soft reset (Pain et al. 1999, sub-threshold reset); exponential filling of slow states assumed.
 """
 

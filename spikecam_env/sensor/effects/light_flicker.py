@@ -1,10 +1,10 @@
 """Light flicker: the lamp's brightness swings with the mains or its driver.
 
-    L(t) <- L(t) (1 + m sin(2 pi (f t + p)))        integrated over each frame, in light that is linear in it
+    L(t) <- L(t) (1 + m sin(2 pi (f t + p)))        integrated over each frame, between keys
 
 Stage: optics.  Seen in: any lit recording: a line at f in the population's rate, absent in the dark.
 Twins: supply_ripple (also in the dark, and of opposite sign), lamp_drift (no line).
-Within a frame: integrated over the frame, in light that is linear in it.
+Within a frame: integrated over the frame, between keys.
 Source: lamps on 50 Hz mains swing at 100 Hz, by per cents (LED) to tens of them (IEEE 1789); here its first harmonic.
 """
 

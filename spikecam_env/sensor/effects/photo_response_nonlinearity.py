@@ -4,7 +4,7 @@
 
 Stage: photodiode.  Seen in: flats over a wide range of levels, up to x = 0.6.
 Twins: ir_drop (inseparable on flats), dead_time (T = 1/x + tau), comparator_delay.
-Within a frame: integrated over the frame, in light that is linear in it.
+Within a frame: integrated over the frame, between keys.
 Source: second-order term of the response, EMVA 1288 (linearity error); typical 1 % at full scale.
 """
 

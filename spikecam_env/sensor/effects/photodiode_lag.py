@@ -5,8 +5,7 @@
 
 Stage: photodiode.  Seen in: steps and moving light (tails of length tau); static light is unchanged.
 Twins: incomplete_reset (depends on the last interval, not on the last light), optical_blur.
-Within a frame: integrated over the frame, in light that is linear in it; of a jump inside a frame, the late charge of
-that frame is off by 0.06 f of the jump at most, 0.03 f at tau = 1.5 frames.
+Within a frame: integrated over the frame, between keys.
 Source: first-order image lag (Janesick, Photon Transfer); light before frame 0 is taken as steady.
 """
 

@@ -3,7 +3,7 @@
     T = ceil(1/x) for steady light x;  averaged over x: mean interval + 1/2, successive intervals uncorrelated
 
 Stage: reset.  Seen in: flats (intervals locked to whole frames).
-Within a frame: at the crossing, exactly.
+Within a frame: at the crossing, exactly; of a share, each electron after it brings so much less.
 Source: what simulators do that set the accumulator to zero.
 """
 

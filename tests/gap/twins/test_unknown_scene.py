@@ -57,7 +57,7 @@ def test_a_scene_of_the_model_is_not_off():
     [
         (effect("synchronous_reset", fraction=0.3), "clock whole 0"),
         (effect("threshold_flicker_noise", sigma_mV=4.0), "clock A_16 between"),
-        (effect("crosstalk", kick=0.1), "neighbours down 0"),
+        (effect("crosstalk", kick=0.05), "neighbours down 0"),
     ],
 )
 def test_effects_show_in_a_scene(added, statistic):

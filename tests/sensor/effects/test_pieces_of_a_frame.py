@@ -139,3 +139,16 @@ def test_lamp_drift_before_a_response_reaches_its_pieces() -> None:
     error = np.abs(collected((drift, bent)) - (truth - 0.25 * truth**2).mean(axis=1)).max()
     assert factor.std() > 0.05
     assert error < 5e-4
+
+
+@pytest.mark.parametrize("span", [0.3, 0.9, 1.2])
+def test_a_row_that_is_read_early_has_the_light_of_its_own_frame(span: float) -> None:
+    """The one row is read `span` before the frame's end: the integral over the frame that ends then."""
+    light = light_in_time()
+    before = np.concatenate([np.zeros((1, 3)), np.cumsum(light, axis=0)]) / FINE
+    ends = np.round((np.arange(2, FRAMES) + 1 - span) * FINE).astype(int)
+    expected = before[ends] - before[ends - FINE]
+    got = collected((CATALOGUE["readout_skew"](span=span),))[2:]
+    unread = light.reshape(FRAMES, FINE, 3).mean(axis=1)[2:]
+    assert np.abs(expected - unread).max() > 0.05
+    assert np.abs(got - expected).max() < 1e-3  # jumps fall between instants
