@@ -29,22 +29,30 @@ def first_crossing(begin: float, gained: float, since: float, at: Numbers, limit
     begin: charge at the frame's start, if it came as now since then; gained: charge of the frame [grains].
     at: moments of the nodes, 0 .. 1, ascending; limits: at each [grains].
     """
-    k = 1
-    while since > 0.0 and k < len(at) and at[k] <= since:
-        k += 1
-    if k == len(at):
-        return 2.0, 0.0
-    limit = limits[k - 1]
-    if since > at[k - 1]:
-        limit = limit + (limits[k] - limit) * ((since - at[k - 1]) / (at[k] - at[k - 1]))
-    u, over = since, (begin + gained * since) - limit
+    least = min(limits)
+    for k in range(1, len(at)):
+        if begin + gained * at[k] < least:
+            continue
+        moment, taken = crossing_between(begin, gained, since, at[k - 1], at[k], limits[k - 1], limits[k])
+        if moment != NEVER:
+            return moment, taken
+    return NEVER, 0.0
+
+
+def crossing_between(
+    begin: float, gained: float, since: float, u: float, v: float, low: float, high: float
+) -> tuple[float, float]:
+    """As `first_crossing`, between two nodes: the limit goes straight from low at u to high at v [grains]."""
+    if 0.0 < since >= v:
+        return NEVER, 0.0
+    limit = low
+    if since > u:
+        u, limit = since, low + (high - low) * ((since - u) / (v - u))
+    before = (begin + gained * u) - limit
+    if before >= 0.0:
+        return u, limit if u == 0.0 else begin + gained * u
+    over = (begin + gained * v) - high
     if over >= 0.0:
-        return u, limit if since == 0.0 else begin + gained * since
-    while k < len(at):
-        before, over = over, (begin + gained * at[k]) - limits[k]
-        if over >= 0.0:
-            moment = u + (at[k] - u) * (before / (before - over))
-            return moment, begin + gained * moment
-        u = at[k]
-        k += 1
-    return 2.0, 0.0
+        moment = u + (v - u) * (before / (before - over))
+        return moment, begin + gained * moment
+    return NEVER, 0.0

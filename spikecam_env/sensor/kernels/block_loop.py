@@ -25,7 +25,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.crossing import NEVER, first_crossing
+from spikecam_env.sensor.crossing import NEVER, crossing_between
 from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
@@ -37,21 +37,17 @@ BAND = 1024
 GROUP = 16
 """Pixels that are worked out together where one of them fires (LLVM would make no vector instructions of fewer)."""
 
-AT_ONCE = 4
-"""Nodes of a moving reference that are worked out together: a charge comes near its limit in two or three parts of a
-frame."""
-
 WORTH, SPARSE = 4, 0.5
 """Frames of a block from which on, and spikes a pixel and frame up to which, going from spike to spike is faster than
 going from frame to frame."""
 
-DRAWS, DECAY, CROSSING = 0x3BD9BCE3, 0xFDEE1FA, 0x37EDD6BF
+DRAWS, DECAY, CROSSING = 0x3BD9BCE3, 0xFDEE1FA, 0x5E51F3E0
 """Checksums of the draws, the decay and the crossings within a frame compiled in: numba's cache sees a change of this
 file, not of those it imports from."""
 
 decay = njit(inline="always")(decayed)
 on_grid = njit(inline="always")(rounded)
-crossing = njit(nogil=True, error_model="numpy", boundscheck=False)(first_crossing)
+between = njit(inline="always")(crossing_between)
 
 _U = np.uint32
 _Q = np.uint64
@@ -66,7 +62,7 @@ _HELD, _LIMIT, _PHI, _ARRIVES, _STANDS, _MOVED, _FACTOR, _LOAD, _NOISE, _JITTER,
 _PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _DUE, _AWAKE, _AGAIN, _EXTRA = (
     (28 + row) * BAND for row in range(9)
 )  # of 32 bits
-_HIT = 8 * 19 * BAND  # of 8 bits
+_HIT, _SEEN = (8 * 19 * BAND + row * BAND for row in range(2))  # of 8 bits
 _SCRATCH = 20 * BAND
 _NONE = 0xFFFFFFFF
 _LEAST = 1e-30  # what arrives where nothing does, to divide by
@@ -140,8 +136,7 @@ def advance(  # type: ignore[no-untyped-def]
     moves = light_moves or dark_moves or field_moves or droop != 0.0
     moves = moves or differ(light_factor) or differ(dark_factor) or differ(factor) or differ(common)
     sways = at.shape[1] > 0
-    at_moves, f_moves, f_rolls = at.shape[0] > 1, swayed_factor.shape[0] > 1, swayed_factor.shape[1] > 1
-    c_moves, c_rolls = swayed_common.shape[0] > 1, swayed_common.shape[1] > 1
+    f_moves, c_moves = swayed_factor.shape[0] > 1, swayed_common.shape[0] > 1
     alone = not moves and not sways and kick == 0.0 and frames >= WORTH
     whole = kick != 0.0 or at_once != 0.0
     jumps = False
@@ -250,24 +245,16 @@ def advance(  # type: ignore[no-untyped-def]
                     continue
                 wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_high)
                 if sways and groups:
-                    for line in range(begin, end):
-                        r, p0, n, h0 = row_of[line], pixel_of[line], width_of[line], slot_of[line]
-                        fire_within(
-                            x,
-                            words,
-                            hit,
-                            h0,
-                            at[r * at_moves],
-                            (swayed_factor[t * f_moves, r * f_rolls], swayed_common[t * c_moves, r * c_rolls]),
-                            fields[p0 : p0 + n],
-                            grains_per_mV[p0 : p0 + n],
-                            1.0 + droop * activity[r],
-                            reset,
-                            polynomial,
-                        )
+                    waves = swayed_factor[t * f_moves], swayed_common[t * c_moves]
+                    band = row_of[begin:end], pixel_of[begin:end], width_of[begin:end], slot_of[begin:end]
+                    loads = 1.0 + droop * activity
+                    fire_within(
+                        x, words, hit, live, groups, band, at, waves, fields, grains_per_mV, loads, reset, polynomial
+                    )
                 elif groups and fire(x, words, hit, live, groups, reset, polynomial):
                     while groups:
-                        groups = fire_again(x, words, live, groups, reset, polynomial)
+                        find_due(x, words, live, groups)
+                        groups = fire_due(x, words, live, groups, reset, polynomial)
                 for line in range(begin, end):
                     p0, n, h0 = pixel_of[line], width_of[line], slot_of[line]
                     copy(hit[h0 : h0 + n], bits[p0 : p0 + n])
@@ -413,10 +400,19 @@ def fire(x, words, hit, live, groups, reset, polynomial):  # type: ignore[no-unt
     return again
 
 
+@njit(inline="always")
+def find_due(x, words, live, groups):  # type: ignore[no-untyped-def]
+    """Mark the pixels of live groups that are at their limit."""
+    for g in range(groups):
+        q = live[g] & _INSIDE
+        for j in range(q, q + GROUP):
+            words[_DUE + j] = _U(x[_HELD + j] >= x[_LIMIT + j])
+
+
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-untyped-def]
-    """One further spike of a frame, seen as one with those before, of the pixels that are at their limit already; what
-    is kept of the others is as it was.  Lists the groups in which some are again, and returns their number.
+def fire_due(x, words, live, groups, reset, polynomial):  # type: ignore[no-untyped-def]
+    """As `fire`, of the pixels that are due; what is kept of the others is as it was, as after a spike before it in the
+    frame.  Lists the groups in which some are at their limit again, and returns their number.
 
     The law is that of `fire`, written out: of a function that returned it LLVM would make no vector instructions.
     """
@@ -426,8 +422,6 @@ def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-un
     still = 0
     for g in range(groups):
         q = live[g] & _INSIDE
-        for j in range(q, q + GROUP):
-            words[_DUE + j] = _U(x[_HELD + j] >= x[_LIMIT + j])
         for j in range(q, q + GROUP):
             draw = drawn(words[_FIRST + j], words[_SECOND + j], words[_FIRED + j], polynomial)
             floats[_DRAW + j] = draw if words[_DUE + j] != 0 else floats[_DRAW + j]
@@ -451,22 +445,50 @@ def fire_again(x, words, live, groups, reset, polynomial):  # type: ignore[no-un
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire_within(x, words, hit, h0, at, waves, field, grains_per_mV, load, reset, polynomial):  # type: ignore[no-untyped-def]
-    """As `fire` and `fire_again`, of a line whose references move within the frame; hit: of those that came near, those
+def fire_within(  # type: ignore[no-untyped-def]
+    x, words, hit, live, groups, band, at, waves, field, grains_per_mV, loads, reset, polynomial
+):
+    """As `fire` and `fire_due`, of a band whose references move within the frame; hit: of those that came near, those
     that fired."""
-    limits = np.empty(at.size)
-    for i in range(field.size):
+    seen = words.view(np.uint8)[_SEEN : _SEEN + BAND]
+    near = np.empty(BAND, np.int64)
+    for g in range(groups):
+        q = live[g] & _INSIDE
+        for j in range(q, q + GROUP):
+            x[_AT + j] = 0.0
+    seen[:] = 0
+    while groups:
+        for line in range(band[0].size):
+            r, p0, n, h0 = band[0][line], band[1][line], band[2][line], band[3][line]
+            of_row = at[r if len(at) > 1 else 0], row_waves(r, waves)
+            meet(x, hit, h0, n, near, of_row, field[p0 : p0 + n], grains_per_mV[p0 : p0 + n], loads[r])
+        for j in range(BAND):
+            words[_DUE + j] = hit[j]
+            seen[j] |= hit[j]
+        groups = fire_due(x, words, live, groups, reset, polynomial)
+        for j in range(BAND):
+            hit[j] &= x[_HELD + j] >= x[_LIMIT + j]
+    copy(seen, hit)
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def meet(x, hit, h0, n, near, of_row, field, grains_per_mV, load):  # type: ignore[no-untyped-def]
+    """Of a line of n pixels from place h0 on, those that hit their least limit: who fires, from moment AT on, at which
+    moment, at which charge (in LIMIT), and where the reference stands then."""
+    at, (factor, common) = of_row
+    came = 0
+    for i in range(n):
+        near[came] = i
+        came += hit[h0 + i]
+    for c in range(came):
+        i = near[c]
         j = h0 + i
-        if hit[j] == 0:
-            continue
-        moment, hit[j] = 0.0, 0
-        while True:
-            of_pixel = at, waves, field[i], grains_per_mV[i], load
-            moment, taken = next_crossing(x, 0, j, moment, of_pixel, limits)
-            if moment == NEVER:
-                break
-            hit[j] = 1
-            spike(x, words, 0, j, moment, taken, of_pixel, reset, polynomial)
+        of_pixel = field[i], grains_per_mV[i], load
+        moment, taken = next_crossing(x, 0, j, x[_AT + j], at, factor, common, of_pixel)
+        hit[j] = moment != NEVER
+        if moment != NEVER:
+            x[_AT + j], x[_LIMIT + j] = moment, taken
+            x[_STANDS + j] = stands_at(moment, at, factor, common, of_pixel)
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
@@ -480,7 +502,6 @@ def fire_in_turn(  # type: ignore[no-untyped-def]
     x, words, hits = scratch.reshape(-1), scratch.reshape(-1).view(np.uint32), scratch.reshape(-1).view(np.uint8)
     rows, columns = loads.size, bits.size // loads.size
     pieces = lines.shape[1] // rows
-    limits = np.empty(at.shape[1])
     moments, takes, last = np.full(bits.size, NEVER), np.zeros(bits.size), np.full(bits.size, -1.0)
     turns = [(0.0, 0) for _ in range(0)]
     bits[:] = 0
@@ -490,8 +511,8 @@ def fire_in_turn(  # type: ignore[no-untyped-def]
             if hits[8 * o + _HIT + h0 + i] == 0:
                 continue
             hits[8 * o + _HIT + h0 + i] = 0
-            of_pixel = pixel_law(p0 + i, columns, at, waves, field, grains_per_mV, loads)
-            moments[p0 + i], takes[p0 + i] = next_crossing(x, o, h0 + i, 0.0, of_pixel, limits)
+            wave = pixel_law(p0 + i, columns, at, waves, field, grains_per_mV, loads)
+            moments[p0 + i], takes[p0 + i] = next_crossing(x, o, h0 + i, 0.0, wave[0], wave[1], wave[2], wave[3])
             if moments[p0 + i] != NEVER:
                 heappush(turns, (moments[p0 + i], p0 + i))
     while len(turns) > 0:
@@ -500,10 +521,12 @@ def fire_in_turn(  # type: ignore[no-untyped-def]
             continue
         row, column = p // columns, p % columns
         o, j = place_of(row, column, pieces, lines)
-        of_pixel = pixel_law(p, columns, at, waves, field, grains_per_mV, loads)
+        wave = pixel_law(p, columns, at, waves, field, grains_per_mV, loads)
         bits[p], hits[8 * o + _HIT + j], last[p] = 1, 1, u
-        spike(x, words, o, j, u, takes[p], of_pixel, reset, polynomial)
-        moments[p], takes[p] = next_crossing(x, o, j, u, of_pixel, limits)
+        spike(x, words, o, j, u, takes[p], wave, reset, polynomial)
+        moments[p] = NEVER
+        if x[o + _HELD + j] >= x[o + _LIMIT + j]:
+            moments[p], takes[p] = next_crossing(x, o, j, u, wave[0], wave[1], wave[2], wave[3])
         if moments[p] != NEVER:
             heappush(turns, (moments[p], p))
         for down, right in ((-1, 0), (0, -1), (0, 1), (1, 0)):
@@ -511,10 +534,12 @@ def fire_in_turn(  # type: ignore[no-untyped-def]
                 continue
             q = p + down * columns + right
             o, j = place_of(row + down, column + right, pieces, lines)
-            of_pixel = pixel_law(q, columns, at, waves, field, grains_per_mV, loads)
             held, phi, limit = x[o + _HELD + j], x[o + _PHI + j], x[o + _LIMIT + j]
             kicked(x, o, j, kick)
-            moment, taken = next_crossing(x, o, j, u, of_pixel, limits)
+            moment, taken = NEVER, 0.0
+            if x[o + _HELD + j] >= x[o + _LIMIT + j]:
+                wave = pixel_law(q, columns, at, waves, field, grains_per_mV, loads)
+                moment, taken = next_crossing(x, o, j, u, wave[0], wave[1], wave[2], wave[3])
             if moment == u and last[q] == u:
                 x[o + _HELD + j], x[o + _PHI + j], x[o + _LIMIT + j] = held, phi, limit
                 continue
@@ -542,50 +567,69 @@ def place_of(row, column, pieces, lines):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def pixel_law(p, columns, at, waves, field, grains_per_mV, loads):  # type: ignore[no-untyped-def]
-    """How one pixel's reference moves: nodes, waves (factor, common) there, field, grains_per_mV, load."""
-    row = p // columns
+def row_waves(row, waves):  # type: ignore[no-untyped-def]
+    """Of one row: factor and common (n,) at its nodes."""
     factor, common = waves
-    of_row = factor[row if len(factor) > 1 else 0], common[row if len(common) > 1 else 0]
-    return at[row if len(at) > 1 else 0], of_row, field[p], grains_per_mV[p], loads[row]
+    return factor[row if len(factor) > 1 else 0], common[row if len(common) > 1 else 0]
+
+
+@njit(inline="always")
+def pixel_law(p, columns, at, waves, field, grains_per_mV, loads):  # type: ignore[no-untyped-def]
+    """How one pixel's reference moves: nodes, factor and common there, field, grains_per_mV, load."""
+    row = p // columns
+    factor, common = row_waves(row, waves)
+    return at[row if len(at) > 1 else 0], factor, common, (field[p], grains_per_mV[p], loads[row])
+
+
+@njit(inline="always")
+def limit_at(phi, factor, common, of_pixel):  # type: ignore[no-untyped-def]
+    """What a threshold [grains] is compared with, however low; of_pixel: its field [mV], grains_per_mV, its load."""
+    field, grains_per_mV, load = of_pixel
+    return (phi * factor + grains_per_mV * (common + field)) * load
+
+
+@njit(inline="always")
+def next_crossing(x, o, j, since, at, factor, common, of_pixel):  # type: ignore[no-untyped-def]
+    """`crossing.first_crossing` of place j of the scratch that begins at o, whose charge is up to its least limit by
+    the end of the frame: looked for from the node on before which it is not up to that."""
+    held, gained, phi, least = x[o + _HELD + j], x[o + _ARRIVES + j], x[o + _PHI + j], x[o + _LIMIT + j]
+    begin = held - gained
+    last = at.size - 1
+    k = int(max(min((least - begin) / max(gained, _LEAST), 1.0), 0.0) * last)
+    while k > 0 and begin + gained * at[k] >= least:
+        k -= 1
+    while k + 1 < last and begin + gained * at[k + 1] < least:
+        k += 1
+    low, moment, taken = max(limit_at(phi, factor[k], common[k], of_pixel), _TRIPS), NEVER, 0.0
+    while k < last and moment == NEVER:
+        high = max(limit_at(phi, factor[k + 1], common[k + 1], of_pixel), _TRIPS)
+        moment, taken = between(begin, gained, since, at[k], at[k + 1], low, high)
+        low = high
+        k += 1
+    return moment, taken
+
+
+@njit(inline="always")
+def stands_at(moment, at, factor, common, of_pixel):  # type: ignore[no-untyped-def]
+    """Where the reference of the nominal threshold stands at a moment [grains]."""
+    last = at.size - 1
+    k = int(moment * last)
+    while k > 0 and at[k] > moment:
+        k -= 1
+    while k + 1 < last and at[k + 1] <= moment:
+        k += 1
+    share = (moment - at[k]) / (at[k + 1] - at[k]) if at[k + 1] > at[k] else 1.0
+    low = limit_at(_G, factor[k], common[k], of_pixel)
+    high = limit_at(_G, factor[k + 1], common[k + 1], of_pixel)
+    return low + (high - low) * share
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def next_crossing(x, o, j, since, of_pixel, limits):  # type: ignore[no-untyped-def]
-    """`crossing.first_crossing` of place j of the scratch that begins at o; limits: (n,), overwritten.
-
-    Nodes are looked at from where the charge comes up to the least limit of the frame, a few at a time.
-    """
-    held, gained, phi = x[o + _HELD + j], x[o + _ARRIVES + j], x[o + _PHI + j]
-    if held < x[o + _LIMIT + j]:
-        return NEVER, 0.0
-    at, (factor, common), field, grains_per_mV, load = of_pixel
-    begin, least, start = held - gained, x[o + _LIMIT + j], 0
-    while start + 2 < at.size and begin + gained * at[start + 1] < least:
-        start += 1
-    while True:
-        stop = min(start + AT_ONCE, at.size)
-        for k in range(start, stop):
-            limits[k] = max((phi * factor[k] + grains_per_mV * (common[k] + field)) * load, _TRIPS)
-        of_these = at[start:stop], limits[start:stop]
-        moment, taken = crossing(begin, gained, max(since, at[start]), of_these[0], of_these[1])
-        if moment != NEVER or stop == at.size:
-            return moment, taken
-        start = stop - 1
-
-
-@njit(nogil=True, error_model="numpy", boundscheck=False)
-def spike(x, words, o, j, moment, taken, of_pixel, reset, polynomial):  # type: ignore[no-untyped-def]
+def spike(x, words, o, j, moment, taken, wave, reset, polynomial):  # type: ignore[no-untyped-def]
     """Reset a pixel that fires at that moment, and draw its next threshold; the law is that of `fire`."""
     per_root_rate, per_rate, kept = reset
-    at, (factor, common), field, grains_per_mV, load = of_pixel
-    k, w = 1, 2 * o
-    while k < at.size - 1 and at[k] <= moment:
-        k += 1
-    share = (moment - at[k - 1]) / (at[k] - at[k - 1]) if at[k] > at[k - 1] else 1.0
-    low = (_G * factor[k - 1] + grains_per_mV * (common[k - 1] + field)) * load
-    high = (_G * factor[k] + grains_per_mV * (common[k] + field)) * load
-    stands = low + (high - low) * share
+    at, factor, common, of_pixel = wave
+    w, stands = 2 * o, stands_at(moment, at, factor, common, of_pixel)
     over, electrons = on_grid(x[o + _HELD + j] - taken), stands * (1.0 / _G)
     if not (per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0):
         over, electrons = after_reset(over, x[o + _ARRIVES + j] / _G, stands, per_root_rate, per_rate, kept)
@@ -646,7 +690,7 @@ def jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_t
     fires or gets something else.  spikes: (F, P), set where a pixel fires.
 
     of_few: light, dark, their factors (n,) and what comes besides (F, n) of the pixels whose number is in row EXTRA.
-    The law is that of `fire` and `stay`, written out as in `fire_again`.
+    The law is that of `fire` and `stay`, written out as in `fire_due`.
     """
     per_root_rate, per_rate, kept = reset
     whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
