@@ -66,6 +66,9 @@ def _check_identification(effect: type[Effect], known: Mapping[str, Field[Any]])
         raise unknown_name(f"kind of share of {effect.name}", declared.share[1], COUNTED)
     if not math.isfinite(declared.shape_step) or declared.shape_step == 0:
         raise _wrong(effect, f"shape_step = {shown(declared.shape_step)}; it is a step, -0.5 as a rule")
+    for name in declared.start_with:
+        if name not in declared.acts_through:
+            raise _wrong(effect, f"start_with names {name}, which is not in acts_through")
     for name, values in declared.shapes.items():
         if not values:
             raise _wrong(effect, f"shapes of {name} are empty; give values to start from")

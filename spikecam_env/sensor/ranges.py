@@ -27,6 +27,7 @@ def parameter(
     bounds: tuple[float, float] | None = None,
     largest: float | None = None,
     choices: tuple[str, ...] = (),
+    periodic: bool = False,
     doc: str,
 ) -> Any:
     """Declare a field: its default, unit, allowed range and meaning.
@@ -35,10 +36,18 @@ def parameter(
     bounds: lowest and highest value, both allowed; None for a switch.
     largest: where the upper bound is infinite, the largest value besides infinity.
     choices: of a name, those that it may be.
+    periodic: whether the bounds are the same value, as those of a phase are.
     """
     return dataclasses.field(
         default=default,
-        metadata={"unit": unit, "bounds": bounds, "largest": largest, "choices": choices, "doc": doc},
+        metadata={
+            "unit": unit,
+            "bounds": bounds,
+            "largest": largest,
+            "choices": choices,
+            "periodic": periodic,
+            "doc": doc,
+        },
     )
 
 

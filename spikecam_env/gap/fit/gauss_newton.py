@@ -1,4 +1,4 @@
-"""Gauss-Newton over the parameters of effects, in their logarithms, on twins of the same draws as the null's.
+"""Gauss-Newton over the parameters of effects (`coordinates.py`), on twins of the same draws as the null's.
 
 Derivatives cost a twin a parameter: they are taken once, and then corrected by what each step turns out to change
 (Broyden), unless it was a long one.
@@ -18,6 +18,7 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import Null, Prediction, own_variance
 from spikecam_env.gap.compare.step import change_of, step_of
 from spikecam_env.gap.compare.thresholds import BY_CHANCE, TO_STEP
+from spikecam_env.gap.fit.coordinates import moved_value
 from spikecam_env.gap.fit.predict import settled_unit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.unit.indirect_inference import has_converged
@@ -121,13 +122,13 @@ def broyden(columns: Array, step: Array, change: Array, noise: Array | float = 0
 
 
 def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[SensorModel, BaseFit]:
-    """The model and the unit with the logarithms of these parameters moved."""
+    """The model and the unit with the coordinates of these parameters moved."""
     for (name, key), s in zip(free, step, strict=True):
         if (name, key) == WHITE:
             base = replace(base, white=base.white * float(np.exp(s)))
             continue
         here = next(e for e in model.effects if e.name == name).parameters()
-        model = with_effect(model, name, bounded(name, {**here, key: here[key] * float(np.exp(s))}))
+        model = with_effect(model, name, bounded(name, {**here, key: moved_value(name, key, here[key], float(s))}))
     return model, base
 
 

@@ -14,6 +14,7 @@ from spikecam_env.gap.compare.step import step_of
 from spikecam_env.gap.compare.thresholds import BY_CHANCE
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import TWINS_IN_THE_END, confirmed
+from spikecam_env.gap.fit.coordinates import error_of, is_apart
 from spikecam_env.gap.fit.gauss_newton import WHITE, Free, Probe, descend, longest_of, moved, prior_sd
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of, with_held_out
@@ -79,7 +80,7 @@ def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, E
     errors: Errors = {name: {} for name in names}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
         if (name, key) != WHITE:
-            errors[name][key] = float(abs(values[name][key]) * e)
+            errors[name][key] = error_of(name, key, values[name][key], float(e))
     errors[found.name] = no_smaller(errors[found.name], found.sd)
     own: Mapping[str, float] = values[found.name]
     best = replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name])
@@ -128,11 +129,11 @@ def _stepped(problem: Problem, best: Fit, free: Free, columns: Array, step: Arra
 
 
 def agree(before: Fit, after: Fit, errors: Errors) -> bool:
-    """Whether the logarithms of parameters moved by no more than their errors allow."""
+    """Whether parameters moved by no more than their errors allow."""
     then = {e.name: e.parameters() for e in after.model.effects}
     here = {e.name: e.parameters() for e in before.model.effects}
-    known = [(here[n][k], then[n][k], sd) for n, by in errors.items() for k, sd in by.items() if sd > 0]
-    return all(a * b > 0 and abs(np.log(b / a)) < AGREEMENT * sd / abs(a) for a, b, sd in known)
+    known = [(n, k, sd) for n, by in errors.items() for k, sd in by.items() if sd > 0]
+    return not any(is_apart(n, k, then[n][k], here[n][k], AGREEMENT * sd) for n, k, sd in known)
 
 
 def _probe(problem: Problem, found: Fit, names: Sequence[str]) -> Probe:

@@ -16,6 +16,7 @@ from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Prediction
 from spikecam_env.gap.compare.thresholds import TO_STEP_SHAPE
 from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.coordinates import error_of
 from spikecam_env.gap.fit.gauss_newton import descend
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
@@ -59,7 +60,7 @@ def with_fitted_shapes(problem: Problem, found: Fit) -> Fit:
     return replace(
         found,
         parameters={k: values[k] for k in found.parameters},
-        sd={k: float(abs(values[k]) * e) for k, e in zip(names, errors, strict=True)},
+        sd={k: error_of(found.name, k, values[k], float(e)) for k, e in zip(names, errors, strict=True)},
         prediction=end.prediction,
         base=end.base,
         rho=rho,

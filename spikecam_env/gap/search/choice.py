@@ -53,7 +53,10 @@ def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) ->
         or is_rival(null, draws, seen, first, f.prediction)
     ]
     behind = {f.name: lead(null, values, first, f.prediction) for f in close}
-    parameters = {f.name: len(candidate(f.name).fitted) for f in close}
+    had = {e.name for e in here.model.effects}
+    parameters = {
+        f.name: sum(len(candidate(e.name).fitted) for e in f.model.effects if e.name not in had) for f in close
+    }
     close.sort(key=lambda f: behind[f.name] + TO_PREFER * parameters[f.name])
     best = close[0]
     left = residual(null, values, best.prediction)

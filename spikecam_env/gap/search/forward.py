@@ -29,6 +29,7 @@ from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.screen.screen import screen
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
+from spikecam_env.gap.search.joint_start import fit_pairs, one_by_one, with_pairs
 from spikecam_env.gap.search.neighbours import (
     may_try_without_earlier,
     try_cancelling_pair,
@@ -94,6 +95,7 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         rounds.append(turn)
         if not turn.fits or not has_candidate(turn, here.null):
             break
+        rounds[-1:] = one_by_one(turn)
         together = joined(problem, rounds, chance)
         best = together[-1].fits[0]
         weak = turn.misfit - turn.fits[0].misfit < TO_ADD
@@ -124,10 +126,12 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
     starts = starts_to_fit(screened, robust_squares(distance, null.weight), groups_that_stand_out(null, distance))
     confirm = partial(confirmed, here)
     fits, tries = fits_of(here, turn.misfit, starts)
+    if len(problem.model.effects) + MOST_EFFECTS - len(here.model.effects) > 1:
+        fits = with_pairs(fits, fit_pairs(here, left))
     visible = [f for f in fits if is_visible(null, f)]
     done, rest = confirmed_in_order(visible, confirm, enough=turn.misfit - turn.to_join)
     rest = [*rest, *(f for f in fits if not is_visible(null, f))]
-    if done and turn.misfit - done[0].misfit > turn.to_join:
+    if done and done[0].name in {s.name for s in tries} and turn.misfit - done[0].misfit > turn.to_join:
         anew = [confirm(f) for f in try_other_starts(here, done[0], turn.misfit, screened, tries)]
         done[0] = min((done[0], *anew), key=lambda f: f.misfit)
     done, rivals = chosen_of(here, problem.null.draws, done)

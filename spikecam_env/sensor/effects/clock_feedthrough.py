@@ -37,7 +37,9 @@ class ClockFeedthrough(Effect):
     amplitude_mV: float = parameter(
         -9.0, unit="mV", bounds=(-200.0, 200.0), doc="height a of the edge; below 0 the threshold falls"
     )
-    phase_frames: float = parameter(0.1, unit="frames", bounds=(0.0, 1.0), doc="moment v0 of the array's frame")
+    phase_frames: float = parameter(
+        0.1, unit="frames", bounds=(0.0, 1.0), periodic=True, doc="moment v0 of the array's frame"
+    )
     tau_us: float = parameter(
         6.0,
         unit="us",
@@ -53,7 +55,6 @@ class ClockFeedthrough(Effect):
         fitted=("amplitude_mV", "phase_frames", "tau_us"),
         shapes={"phase_frames": (0.1, 0.35, 0.6, 0.85), "tau_us": (6.0,)},
         needs=Needs.STEADY,
-        shape_step=-0.15,
         experiment="flats whose intervals are whole numbers of frames, and a hundredth more and less",
     )
 

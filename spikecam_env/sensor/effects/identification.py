@@ -55,6 +55,8 @@ class Identification:
     what simulations scatter; a level of light from which something begins leads elsewhere by it.
     needs: recordings without which it cannot be seen.
     acts_through: effects of a model through which it shows in recordings that could not show it by itself.
+    start_with: of these, those that show as little without it there, and values of parameters, its own and theirs, from
+    which both are fitted at once.
     experiment: what would distinguish it from others that do the same.
     """
 
@@ -65,6 +67,7 @@ class Identification:
     mixed: bool = False
     needs: Needs = Needs.NOTHING
     acts_through: tuple[str, ...] = ()
+    start_with: Mapping[str, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
     only_contrast: bool = False
     random_course: bool = False
     events: bool = False

@@ -38,7 +38,17 @@ class ReadoutSkew(Effect):
     strength = "span"
     within_frame = True
     identification = Identification(
-        family="readout", needs=Needs.MOTION, acts_through=("clock_feedthrough", "supply_ripple"), only_contrast=True
+        family="readout",
+        needs=Needs.MOTION,
+        acts_through=("clock_feedthrough", "supply_ripple"),
+        start_with={
+            "clock_feedthrough": {
+                "span": (0.25, 0.5, 1.0, -0.25, -0.5, -1.0),
+                "phase_frames": (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875),
+                "tau_us": (8.0,),
+            }
+        },
+        only_contrast=True,
     )
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:

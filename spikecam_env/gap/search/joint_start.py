@@ -1,0 +1,129 @@
+"""Two effects of which neither shows alone, fitted at once from a grid of starts.
+
+An edge of the array's clock gathers pixels in every row, and is seen as late and early spikes where rows are read at
+its moment: in a static scene a read-out that rolls through the rows shows by the edge alone, and the edge, without it,
+fits no row but few.  An effect says which other it starts with, and from which strengths (`start_with`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.table import LACKING, candidate
+from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
+from spikecam_env.gap.compare.step import scale_to
+from spikecam_env.gap.compare.thresholds import TO_PREFER, TO_STEP_SHAPE
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.coordinates import error_of
+from spikecam_env.gap.fit.gauss_newton import descend
+from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
+from spikecam_env.sensor import CATALOGUE, SensorModel
+
+LARGEST_FACTOR = 2.0
+"""Factor by which a strength of the grid is scaled, without another twin, to say how good a start is."""
+
+DESCENTS = 2
+"""Starts of a grid from which both effects are fitted, the best ones."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """`first`, which recordings of their kind show, and `second`, which shows by it alone."""
+
+    first: str
+    second: str
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Both."""
+        return self.first, self.second
+
+
+def pairs(problem: Problem, names: Collection[str]) -> list[Pair]:
+    """Pairs among the candidates `names` that are to be fitted at once: of scenes that nobody measured, where the
+    second effect does not show without the first."""
+    if not problem.case.scenes_only:
+        return []
+    lacking = [n for n in names if LACKING[candidate(n).needs](problem.case.conditions) is not None]
+    return [Pair(first, second) for second in lacking for first in candidate(second).start_with if first in names]
+
+
+def fit_pairs(here: Problem, names: Collection[str]) -> list[Fit]:
+    """A fit of each pair, as one of its first effect, whose model has both; those that the budget allows."""
+    return [found for pair in pairs(here, names) if (found := _fit_pair(here, pair)) is not None]
+
+
+def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
+    starts = candidate(pair.second).start_with[pair.first]
+    grid = [dict(zip(starts, values, strict=True)) for values in product(*starts.values())]
+    only = here.affected(pair.names)
+    free = [(name, key) for name in pair.names for key in candidate(name).fitted]
+    if not here.allows(
+        f"{pair.first} with {pair.second}", len(only) * (len(grid) + DESCENTS * (1 + len(free))), needed=True
+    ):
+        return None
+    key = candidate(pair.first).strength
+
+    def start(parameters: dict[str, float]) -> tuple[float, SensorModel]:
+        second, first = (CATALOGUE[name]().parameters() | bounded(name, parameters) for name in reversed(pair.names))
+        model = with_effect(here.model, pair.second, second)
+        tried = with_effect(model, pair.first, first)
+        predicted = here.predict(tried, constrained_refit(tried, here.case.base), 1, only)
+        scale, _ = scale_to(here.null, here.seen, predicted)
+        scale = float(np.sign(scale) * np.clip(abs(scale), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
+        scaled = bounded(pair.first, {**first, key: first[key] * scale})
+        return here.misfit(with_change_scaled(here.null, predicted, scale)), with_effect(model, pair.first, scaled)
+
+    def probe(there: SensorModel, base: BaseFit) -> Prediction:
+        return here.predict(there, constrained_refit(there, base), 1, only)
+
+    def fitted(model: SensorModel) -> Fit:
+        end = descend(here, probe, model, constrained_refit(model, here.case.base), free, TO_STEP_SHAPE)
+        rho, left = here.residual_and_misfit(end.prediction)
+        values = {e.name: e.parameters() for e in end.model.effects}
+        errors = np.sqrt(np.diag(end.covariance))
+        sd = {
+            k: error_of(n, k, values[n][k], float(e)) for (n, k), e in zip(free, errors, strict=True) if n == pair.first
+        }
+        parameters = {k: values[pair.first][k] for k in candidate(pair.first).fitted}
+        return Fit(pair.first, parameters, sd, end.prediction, end.base, rho, left, end.model)
+
+    with ThreadPoolExecutor(here.case.jobs) as pool:
+        best = sorted(pool.map(start, grid), key=lambda s: s[0])[:DESCENTS]
+        fits = list(pool.map(fitted, [model for _, model in best]))
+    return min(fits, key=lambda f: f.misfit)
+
+
+def with_pairs(fits: Sequence[Fit], of_pairs: Sequence[Fit]) -> list[Fit]:
+    """Fits of single candidates, with those of pairs in place of the first effect's where they leave TO_PREFER
+    less."""
+    alone = {f.name: f.misfit for f in fits}
+    better = {f.name: f for f in of_pairs if f.misfit < alone.get(f.name, np.inf) - TO_PREFER}
+    return [*better.values(), *(f for f in fits if f.name not in better)]
+
+
+def brought_along(turn: Round) -> list[str]:
+    """Effects that the best of a round has in its model besides itself and what the round stands on."""
+    best = turn.fits[0]
+    has = {e.name for e in turn.model.effects}
+    return [e.name for e in best.model.effects if e.name not in has and e.name != best.name]
+
+
+def one_by_one(turn: Round) -> list[Round]:
+    """The round; where its best has brought another effect along, as two, the second of that one."""
+    best = turn.fits[0]
+    rounds = [turn]
+    for name in brought_along(turn):
+        effect = next(e for e in best.model.effects if e.name == name)
+        parameters = {k: effect.parameters()[k] for k in candidate(name).fitted}
+        own = replace(best, name=name, parameters=parameters, sd={})
+        rounds.append(replace(turn, model=best.model.without(name), fits=(own,), rivals=()))
+    return rounds
