@@ -10,6 +10,9 @@ from typing import Any
 
 import gymnasium
 
+from spikecam_env.envs.aiming import MAX_EPISODE_STEPS
+from spikecam_env.envs.tasks import TASKS
+
 SCENE = "spikecam_env.envs.scene:SceneEnv"
 
 NAMED = (
@@ -38,7 +41,15 @@ ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
 } | {f"spikecam_env/{name}-v0": (SCENE, {"scene": name.lower()}) for name in NAMED}
 """Id -> where its class is, and what it is made with.  `Scene-v0` is a random world, or what `scene=` says."""
 
-MAX_EPISODE_STEPS = 500
+FULL_SHAPE = (250, 400)
+"""Of the camera; the tasks are 64 x 64 without."""
+
+TASK_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
+    f"spikecam_env/{name}{size}-v1": ("spikecam_env.envs.tasks.env:TaskEnv", {"task": name} | options)
+    for name in TASKS
+    for size, options in (("", {}), ("-Full", {"shape": FULL_SHAPE}))
+}
+"""As ENVIRONMENTS.  Their episodes end by themselves, in the task's time whatever `frames_per_step` is."""
 
 
 def register() -> None:
@@ -46,3 +57,6 @@ def register() -> None:
     for name, (entry_point, options) in ENVIRONMENTS.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, entry_point, max_episode_steps=MAX_EPISODE_STEPS, kwargs=options)
+    for name, (entry_point, options) in TASK_ENVIRONMENTS.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(name, entry_point, kwargs=options)
