@@ -13,7 +13,7 @@ from scenes.protocol import Gaze, Scene
 from spikecam_env.envs.episode import Episode, Standing
 from spikecam_env.envs.motor import Motor
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
-from spikecam_env.envs.task import REWARDS, closeness, distance_from_middle
+from spikecam_env.envs.task import REWARDS, distance_from_middle
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
 MAX_EPISODE_STEPS = 500
@@ -151,7 +151,7 @@ class AimingEnv(SpikeCameraEnv):
         last = self.standing
         self._standing = now = self._stands(before, last)
         end = self.episode.end(now)
-        reward = REWARDS[self.reward](closeness(last.distance_px, self.shape), closeness(now.distance_px, self.shape))
+        reward = REWARDS[self.reward](self.episode.worth(last), self.episode.worth(now))
         return reward + OUTCOME * (end is True), end is not None, end is None and now.step >= self.episode.steps
 
     def _stands(self, before: tuple[float, float], last: Standing | None) -> Standing:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from scenes.protocol import Gaze, Placed, Scene
-from spikecam_env.envs.task import is_inside
+from spikecam_env.envs.task import closeness, is_inside
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,10 @@ class Episode:
     def is_on(self, frame: float, distance_px: float) -> bool:
         """Whether this distance, at this frame, counts as being on the target."""
         return distance_px <= self.success_px
+
+    def worth(self, standing: Standing) -> float:
+        """How good things are, 1 at best: what the rewards of `envs.task` are made of."""
+        return closeness(standing.distance_px, self.scene.shape)
 
     def end(self, standing: Standing) -> bool | None:
         """None: it goes on.  Over otherwise: True where that is a success, False where it is a failure."""

@@ -32,5 +32,7 @@ def oracle(env: AimingEnv) -> NDArray[np.float32]:
     now, then = (np.array(env.episode.aim(frame, at_rest)) for frame in (first, stop))
     change = env.motor.most_change_px_s(env.step_s) * env.step_s
     move = then - now + approach(now - [(columns - 1) / 2, (rows - 1) / 2], change)
-    action = np.concatenate([(move / (env.motor.top_px_s * env.step_s))[: env.axes], env.episode.rest(env.standing, first, stop)])
+    action = np.concatenate(
+        [(move / (env.motor.top_px_s * env.step_s))[: env.axes], env.episode.rest(env.standing, first, stop)]
+    )
     return np.clip(action, -1.0, 1.0).astype(np.float32)

@@ -1,4 +1,4 @@
-"""When a scene starts over, so that what was followed is suddenly elsewhere: a ball is thrown again, a train comes back.
+"""When a scene starts over, so that what was followed is elsewhere at once: a ball is thrown again, a train is back.
 
 A follower that knows everything looks at the target, and goes on as the target does; where the target is then out of
 its picture, nothing that turns could have followed.

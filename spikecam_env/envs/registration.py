@@ -51,6 +51,8 @@ TASK_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """As ENVIRONMENTS.  Their episodes end by themselves, in the task's time whatever `frames_per_step` is."""
 
+SMALL_TASKS = tuple(name for name in TASK_ENVIRONMENTS if "-Full" not in name)
+
 
 def register() -> None:
     """Register every id that is not registered yet."""

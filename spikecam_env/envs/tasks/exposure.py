@@ -124,7 +124,15 @@ class Lit(Episode):
 
     def is_on(self, frame: float, distance_px: float) -> bool:
         """Looked at, and well exposed."""
-        return super().is_on(frame, distance_px) and abs(self._ambient(frame) + self.iris(frame)) <= self.tolerance
+        return super().is_on(frame, distance_px) and self._off(frame) <= self.tolerance
+
+    def worth(self, standing: Standing) -> float:
+        """Closeness, less the share of `most` by which the light is off."""
+        return super().worth(standing) - self._off(standing.frame) / self.most
+
+    def _off(self, frame: float) -> float:
+        """From the light that the scene is made for [decades], either way."""
+        return abs(self._ambient(frame) + self.iris(frame))
 
     def _ambient(self, frame: float) -> float:
         assert isinstance(self.scene, Dimmed)

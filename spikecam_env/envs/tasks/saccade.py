@@ -22,8 +22,9 @@ class Saccade(Task):
     room: as of `Track`."""
 
     duration_s: float = 0.2
-    hold_s: float = 0.01
-    speed: tuple[float, float] = (0.05, 0.3)
+    success_side: float = 1 / 16
+    hold_s: float = 0.02
+    speed: tuple[float, float] = (0.2, 0.5)
     radius: float = 1 / 9
     start: tuple[float, float] = (0.25, 0.35)
     room: float = 0.6

@@ -65,7 +65,7 @@ def wander(
 PIECE_S = 0.001
 """Length of a straight piece of a path [s]: a step of 40 frames at 40 kHz."""
 TURN = 4.0
-"""[radians/sqrt(s)] Standard deviation of the heading after a second: in half a second it turns by half a turn or so."""
+"""[radians/sqrt(s)] Standard deviation of the heading after a second; after half of one it is 160 degrees."""
 
 
 @lru_cache(maxsize=256)
