@@ -16,9 +16,6 @@ from spikecam_env.envs.spike_camera import SpikeCameraEnv
 from spikecam_env.envs.task import REWARDS, distance_from_middle
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
-MAX_EPISODE_STEPS = 500
-"""Half a second at 40 frames a step and 40 kHz."""
-
 OUTCOME = 10.0
 """Reward, beside the other, of a success that ends an episode; a failure that ends one takes nothing."""
 

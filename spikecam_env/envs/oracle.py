@@ -4,7 +4,7 @@ Where the target is, and how it moves in the next step, is known; what it does a
 u, the target's motion in the step, e, its distance from the middle now, and a, the most the gaze's motion changes from
 step to step, the gaze moves by
 
-    u + w,   |w| = 2 |e| / (1 + sqrt(1 + 8 |e| / a))       [pixels/step]
+    u + w,   |w| = min(|e|, 4 |e| / (1 + sqrt(1 + 8 |e| / a)))       [pixels/step]
 
 the largest w from which slowing down by a each step (w, w - a, ...) stops on the target: w (w / a + 1) / 2 = |e|.
 """
@@ -21,7 +21,7 @@ from spikecam_env.envs.aiming import AimingEnv
 def approach(error: NDArray[np.float64], most_change: float) -> NDArray[np.float64]:
     """w of the head of this file, of every axis [pixels/step]."""
     size = np.abs(error)
-    return np.sign(error) * 2 * size / (1 + np.sqrt(1 + 8 * size / most_change))
+    return np.sign(error) * np.minimum(size, 4 * size / (1 + np.sqrt(1 + 8 * size / most_change)))
 
 
 def oracle(env: AimingEnv) -> NDArray[np.float32]:

@@ -10,9 +10,6 @@ from typing import Any
 
 import gymnasium
 
-from spikecam_env.envs.aiming import MAX_EPISODE_STEPS
-from spikecam_env.envs.tasks import TASKS
-
 SCENE = "spikecam_env.envs.scene:SceneEnv"
 
 NAMED = (
@@ -41,12 +38,18 @@ ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
 } | {f"spikecam_env/{name}-v0": (SCENE, {"scene": name.lower()}) for name in NAMED}
 """Id -> where its class is, and what it is made with.  `Scene-v0` is a random world, or what `scene=` says."""
 
+MAX_EPISODE_STEPS = 500
+"""Half a second at 40 frames a step and 40 kHz."""
+
+TASK_NAMES = ("Track", "Saccade", "Catch", "ReadSpin", "LowLight", "Exposure")
+"""As of `envs.tasks.TASKS`, which is not imported here: `import spikecam_env` registers, and imports nothing else."""
+
 FULL_SHAPE = (250, 400)
 """Of the camera; the tasks are 64 x 64 without."""
 
 TASK_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
     f"spikecam_env/{name}{size}-v1": ("spikecam_env.envs.tasks.env:TaskEnv", {"task": name} | options)
-    for name in TASKS
+    for name in TASK_NAMES
     for size, options in (("", {}), ("-Full", {"shape": FULL_SHAPE}))
 }
 """As ENVIRONMENTS.  Their episodes end by themselves, in the task's time whatever `frames_per_step` is."""

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scenes.disk import RotatingDisk
-from spikecam_env.envs.aiming import MAX_EPISODE_STEPS, SUCCESS_SHARE, AimingEnv
+from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
 from spikecam_env.envs.episode import Episode
+from spikecam_env.envs.registration import MAX_EPISODE_STEPS
 from spikecam_env.errors import InputError, unknown_name
 
 

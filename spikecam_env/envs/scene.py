@@ -13,9 +13,10 @@ from scenes.later import Later
 from scenes.protocol import Placed
 from scenes.renderers.choose import chosen
 from scenes.world import World
-from spikecam_env.envs.aiming import MAX_EPISODE_STEPS, SUCCESS_SHARE, AimingEnv
+from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
 from spikecam_env.envs.episode import Episode
 from spikecam_env.envs.passes import Passes, passes
+from spikecam_env.envs.registration import MAX_EPISODE_STEPS
 from spikecam_env.envs.task import is_inside
 from spikecam_env.errors import InputError, unknown_name
 

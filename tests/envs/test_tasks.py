@@ -13,8 +13,9 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import spikecam_env.envs  # noqa: F401
 from spikecam_env.envs.oracle import approach
-from spikecam_env.envs.registration import SMALL_TASKS, TASK_ENVIRONMENTS
+from spikecam_env.envs.registration import SMALL_TASKS, TASK_ENVIRONMENTS, TASK_NAMES
 from spikecam_env.envs.score import BASELINES, play, score
+from spikecam_env.envs.tasks import TASKS
 from spikecam_env.errors import InputError
 
 
@@ -54,6 +55,10 @@ def test_same_seed_same_bits_and_a_copy_goes_on_as_the_original(name: str) -> No
     assert data_equivalence(first, rollout(gymnasium.make(name).unwrapped, 3), exact=True)
     other, action = pickle.loads(pickle.dumps(env)), np.zeros(env.action_space.shape, np.float32)
     assert data_equivalence(env.step(action), other.step(action), exact=True)
+
+
+def test_every_task_has_its_ids() -> None:
+    assert tuple(TASKS) == TASK_NAMES
 
 
 def test_splits_share_no_episode_and_no_other_option_is_taken() -> None:
