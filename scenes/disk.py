@@ -15,8 +15,6 @@ at most `motion_per_key` pixels between two, down to one a frame, and are painte
 from __future__ import annotations
 
 import copy
-import dataclasses
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -24,23 +22,18 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
 
 from scenes.keys import interval_for, painted
+from scenes.painted_disk import Texels, paint_disk, paint_tile, prefiltered
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
 from spikecam_env.checked import (
     LARGEST_DERIVED_SEED,
     MOST_RPM,
-    checked_memory,
     checked_number,
     checked_seed,
     checked_shape,
 )
-from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
-
-TEXELS_PER_PIXEL = 5
-"""Of the prefiltered texture.  At a key the default disk is 0.75 % rms of full scale off 16 x 16 supersampling at 5,
-0.86 % at 3, 0.72 % at 8; the rest is the pixel's square, which turns over the texture and is taken as round."""
 
 MOST_RADIUS = 6000.0
 """[pixels] Texels are counted in 32 bits, TEXELS_PER_PIXEL^2 of them to a pixel of the disk's square."""
@@ -106,10 +99,10 @@ class RotatingDisk:
         textures, backgrounds = np.random.default_rng(seed).spawn(2)
         size = int(np.clip(10 * self.radius, 128, 1024))
         values = disk_texture(textures, size) if texture is None else _checked_texture(texture)
-        self._disk = _Texels.of(_prefiltered(light[0] + (light[1] - light[0]) * values, self.radius))
+        self._disk = Texels.of(prefiltered(light[0] + (light[1] - light[0]) * values, self.radius))
         self._tile = _background_tile(background, backgrounds, self.shape, light)
         self._background = np.empty(self.shape, np.float32)
-        _paint_tile(self._tile, 0.0, 0.0, self._background)
+        paint_tile(self._tile, 0.0, 0.0, self._background)
 
     def __repr__(self) -> str:
         return (
@@ -162,7 +155,7 @@ class RotatingDisk:
         """The same disk and background with `gain` times their light; shares the textures."""
         other, by = copy.copy(self), np.float32(gain)
         other.light = (self.light[0] * gain, self.light[1] * gain)
-        other._disk = dataclasses.replace(self._disk, low=self._disk.low * by, step=self._disk.step * by)
+        other._disk = self._disk.lit(gain)
         other._tile, other._background = self._tile * by, self._background * by
         return other
 
@@ -200,28 +193,9 @@ class RotatingDisk:
             behind = self._background
         else:
             behind = np.empty_like(picture)
-            _paint_tile(self._tile, pan, tilt, behind)
+            paint_tile(self._tile, pan, tilt, behind)
         x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
-        angle, texels = self.angle_at(frame), self._disk
-        scale = (texels.side - 2 * _MARGIN) / (2 * self.radius)
-        cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
-        middle = (texels.side - 1) / 2
-        u, v = middle - cosine * x + sine * y, middle - sine * x - cosine * y
-        _paint_disk(
-            behind,
-            texels.pairs,
-            np.int32(texels.side),
-            texels.low,
-            texels.step,
-            x,
-            y,
-            self.radius,
-            u,
-            v,
-            cosine,
-            sine,
-            picture,
-        )
+        paint_disk(self._disk, (x, y), self.radius, self.angle_at(frame), behind, picture)
 
 
 def _checked(name: str, value: float) -> float:
@@ -257,8 +231,6 @@ def disk_texture(rng: np.random.Generator, size: int = 1024) -> Texture:
 
 
 _AT_REST = Gaze.fixed(0.0, 0.0)
-_MARGIN = 10
-"""Texels around the prefiltered texture, so that the rim is interpolated from texture on both sides."""
 
 
 def _sectors(turn: NDArray[np.float32], count: int) -> NDArray[np.float32]:
@@ -278,33 +250,6 @@ def _round_text(
     return cv2.remap(strip, turn * width, across, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) / np.float32(255)
 
 
-def _prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.float32]:
-    """Resampled to `TEXELS_PER_PIXEL` over the disk's square and averaged over a pixel's area, whatever the angle.
-
-    Resampling by area (m texels a pixel) and bilinear interpolation blur too, by 1 / 12 m^2 and 1 / 6 m^2
-    pixels^2; a box of side sqrt(1 - 3 / m^2) makes up the pixel's 1 / 12.  The border is repeated outward.
-    """
-    texels = max(2, round(2 * radius * TEXELS_PER_PIXEL))
-    checked_memory(20 * texels**2, f"a disk of radius {radius:g} pixels")
-    way = cv2.INTER_AREA if texels < len(texture) else cv2.INTER_LINEAR
-    resampled = cv2.resize(texture.astype(np.float32), (texels, texels), interpolation=way)
-    wide = np.pad(resampled, _MARGIN, mode="edge")
-    box = _turned_box(TEXELS_PER_PIXEL * np.sqrt(1 - 3 / TEXELS_PER_PIXEL**2))
-    return np.asarray(cv2.filter2D(wide, -1, box, borderType=cv2.BORDER_REPLICATE), np.float32)
-
-
-def _turned_box(side: float) -> NDArray[np.float32]:
-    """Kernel (n, n): a square of this side [texels] about the middle, averaged over all angles; sum 1."""
-    fine, reach = 16, int(np.ceil(side / np.sqrt(2) + 0.5))
-    size = 2 * reach + 1
-    axis = (np.arange(size * fine) + 0.5) / fine - size / 2
-    distance = np.hypot(axis[:, None], axis[None, :])
-    towards_side = np.arccos(np.clip(side / 2 / np.maximum(distance, side / 2), 0, 1))
-    share = np.clip(1 - towards_side / (np.pi / 4), 0, 1)
-    kernel = share.reshape(size, fine, size, fine).mean(axis=(1, 3))
-    return (kernel / kernel.sum()).astype(np.float32)
-
-
 def _background_tile(
     background: float | ArrayLike | None,
     rng: np.random.Generator,
@@ -319,104 +264,6 @@ def _background_tile(
     if tile.ndim != 2 or not tile.size or not np.isfinite(tile).all() or tile.min() < 0:
         raise InputError("background must be a radiance or a (rows, columns) tile of it, finite and 0 or more")
     return np.ascontiguousarray(tile)
-
-
-@njit(cache=True, nogil=True)
-def _paint_tile(tile, pan, tilt, picture):  # pragma: no cover - compiled
-    """The repeated tile seen from offset (pan, tilt), bilinear."""
-    height, width = tile.shape
-    left, top = int(np.floor(pan)), int(np.floor(tilt))
-    right_share, lower_share = np.float32(pan - left), np.float32(tilt - top)
-    column = (left + np.arange(picture.shape[1] + 1)) % width
-    mixed = np.empty(picture.shape[1] + 1, np.float32)
-    for r in range(picture.shape[0]):
-        upper, lower = (top + r) % height, (top + r + 1) % height
-        for c in range(len(mixed)):
-            above = tile[upper, column[c]]
-            mixed[c] = above + lower_share * (tile[lower, column[c]] - above)
-        for c in range(picture.shape[1]):
-            picture[r, c] = mixed[c] + right_share * (mixed[c + 1] - mixed[c])
-
-
-@dataclass(frozen=True, eq=False)
-class _Texels:
-    """A square picture as the processor reads it fastest, in steps of 1 / 65535 of its range.
-
-    pairs  (side * side,) uint32, row by row: a texel in the lower 16 bits, the one below it in the upper.  So the four
-           around a place are two neighbours in memory, and most often one line of cache.
-    A texel is worth low + step * its bits.
-    """
-
-    pairs: NDArray[np.uint32]
-    side: int
-    low: np.float32
-    step: np.float32
-
-    @classmethod
-    def of(cls, picture: NDArray[np.float32]) -> _Texels:
-        low = picture.min()
-        step = np.float32(max((picture.max() - low) / 65535, 1e-30))
-        bits = np.round((picture - low) / step).astype(np.uint32)
-        pairs = bits | np.vstack([bits[1:], bits[-1:]]) << 16
-        return cls(pairs.reshape(-1), len(picture), low, step)
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def _paint_disk(
-    behind, pairs, side, low, step, x, y, radius, u0, v0, cosine, sine, picture
-):  # pragma: no cover - compiled
-    """The disk over what is behind it (H, W), another array; a pixel on the rim is covered by the share inside (of a
-    half-plane).
-
-    pairs, side, low, step: see `_Texels`; the picture's (column, row) is read at
-    (u0 + cosine column - sine row, v0 + sine column + cosine row), bilinear.  Each row goes through short loops,
-    places, texels, light: the first and the last are vectors then.  Nothing but the rim is blended.
-    """
-    reach, solid = np.float32(radius + 0.5), np.float32(max(radius - 0.5, 0.0))
-    du, dv = np.float32(cosine), np.float32(sine)
-    rows, columns = picture.shape
-    place, here, right = np.empty(columns, np.uint32), np.empty(columns, np.uint32), np.empty(columns, np.uint32)
-    right_share, lower_share = np.empty(columns, np.float32), np.empty(columns, np.float32)
-    one, bits, half = np.uint32(1), np.uint32(0xFFFF), np.uint32(16)
-    for r in range(rows):
-        dy = np.float32(r - y)
-        if abs(dy) >= reach:
-            picture[r] = behind[r]
-            continue
-        chord = np.sqrt(reach * reach - dy * dy)
-        first = min(max(int(np.ceil(x - chord)), 0), columns)
-        stop = max(min(int(np.floor(x + chord)) + 1, columns), first)
-        u_first = np.float32(u0 - sine * r + cosine * first)
-        v_first = np.float32(v0 + cosine * r + sine * first)
-        for k in range(stop - first):
-            u, v = u_first + du * np.float32(k), v_first + dv * np.float32(k)
-            column, row = np.int32(u), np.int32(v)
-            place[k] = row * side + column
-            right_share[k], lower_share[k] = u - np.float32(column), v - np.float32(row)
-        for k in range(stop - first):
-            here[k], right[k] = pairs[place[k]], pairs[place[k] + one]
-        for k in range(stop - first):
-            upper_left, lower_left = np.float32(np.int32(here[k] & bits)), np.float32(np.int32(here[k] >> half))
-            upper_right, lower_right = np.float32(np.int32(right[k] & bits)), np.float32(np.int32(right[k] >> half))
-            to_left = upper_left + lower_share[k] * (lower_left - upper_left)
-            to_right = upper_right + lower_share[k] * (lower_right - upper_right)
-            picture[r, first + k] = low + step * (to_left + right_share[k] * (to_right - to_left))
-        rim = past = stop
-        if abs(dy) < solid:
-            inner = np.sqrt(solid * solid - dy * dy)
-            rim, past = min(int(np.ceil(x - inner)), stop), max(int(np.floor(x + inner)) + 1, first)
-        _blend_rim(behind[r], first, rim, x, dy, reach, picture[r])
-        _blend_rim(behind[r], past, stop, x, dy, reach, picture[r])
-        picture[r, :first], picture[r, stop:] = behind[r, :first], behind[r, stop:]
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def _blend_rim(behind, start, stop, x, dy, reach, row):  # pragma: no cover - compiled
-    """Pixels of a row that the disk covers in part."""
-    for c in range(start, stop):
-        dx = np.float32(c - x)
-        cover = min(max(reach - np.sqrt(dx * dx + dy * dy), np.float32(0.0)), np.float32(1.0))
-        row[c] = behind[c] + cover * (row[c] - behind[c])
 
 
 def _checked_texture(texture: ArrayLike) -> NDArray[np.float32]:

@@ -15,11 +15,13 @@ class Later(Derived):
 
     frames   whole frames
     offset   (pan, tilt) [pixels]
+    drift    (pan, tilt) velocity of the mount that the camera is on [pixels/frame]; the offset is at frame 0
     """
 
     scene: Placed
     frames: int = 0
     offset: tuple[float, float] = (0.0, 0.0)
+    drift: tuple[float, float] = (0.0, 0.0)
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, at their frames here."""
@@ -35,12 +37,17 @@ class Later(Derived):
         return self.scene.places(frame + self.frames, self._there(gaze))
 
     def _there(self, gaze: Gaze | None) -> Gaze | None:
-        if gaze is None and self.offset == (0.0, 0.0):
+        if gaze is None and self.offset == self.drift == (0.0, 0.0):
             return None
         gaze = gaze or Gaze.fixed(0.0, 0.0)
-        (pan, tilt), (first, last) = self.offset, gaze.frames
+        first, last = gaze.frames
         return Gaze(
-            (gaze.start[0] + pan, gaze.start[1] + tilt),
-            (gaze.stop[0] + pan, gaze.stop[1] + tilt),
-            (first + self.frames, last + self.frames),
+            self._moved(gaze.start, first), self._moved(gaze.stop, last), (first + self.frames, last + self.frames)
+        )
+
+    def _moved(self, gaze: tuple[float, float], frame: float) -> tuple[float, float]:
+        """A gaze of the camera at a frame, as the scene has it."""
+        return (
+            gaze[0] + self.offset[0] + self.drift[0] * frame,
+            gaze[1] + self.offset[1] + self.drift[1] * frame,
         )

@@ -1,4 +1,4 @@
-"""`spikecam evaluate`: how much a denoiser helps."""
+"""`spikecam evaluate`: how much a denoiser helps, and how well agents' tasks are done."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import tyro
 from spikecam_env.checked import checked_count
 from spikecam_env.cli.evaluate_spikezoo import SpikeZoo
 from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
+from spikecam_env.cli.evaluate_tasks import Tasks
 from spikecam_env.cli.evaluate_truth import Truth
 from spikecam_env.cli.options import Checked, Seed
 
@@ -50,7 +51,7 @@ class Quick:
 
 @dataclass
 class Evaluate:
-    """How much a denoiser helps (docs/tables.md, docs/evaluation.md).
+    """How much a denoiser helps (docs/tables.md, docs/evaluation.md), and agents' tasks (docs/environments.md).
 
     example:  spikecam evaluate quick --out evaluation
     """
@@ -63,6 +64,7 @@ class Evaluate:
         | Annotated[Table4, tyro.conf.subcommand("table4", prefix_name=False)]
         | Annotated[StillScenes, tyro.conf.subcommand("still", prefix_name=False)]
         | Annotated[SpikeZoo, tyro.conf.subcommand("spikezoo", prefix_name=False)]
+        | Annotated[Tasks, tyro.conf.subcommand("tasks", prefix_name=False)]
         | Annotated[Truth, tyro.conf.subcommand("truth", prefix_name=False)]
     ) = field(default_factory=Quick)
 

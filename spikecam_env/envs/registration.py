@@ -39,6 +39,22 @@ ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
 """Id -> where its class is, and what it is made with.  `Scene-v0` is a random world, or what `scene=` says."""
 
 MAX_EPISODE_STEPS = 500
+"""Half a second at 40 frames a step and 40 kHz."""
+
+TASK_NAMES = ("Track", "Saccade", "Catch", "ReadSpin", "LowLight", "Exposure")
+"""As of `envs.tasks.TASKS`, which is not imported here: `import spikecam_env` registers, and imports nothing else."""
+
+FULL_SHAPE = (250, 400)
+"""Of the camera; the tasks are 64 x 64 without."""
+
+TASK_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
+    f"spikecam_env/{name}{size}-v1": ("spikecam_env.envs.tasks.env:TaskEnv", {"task": name} | options)
+    for name in TASK_NAMES
+    for size, options in (("", {}), ("-Full", {"shape": FULL_SHAPE}))
+}
+"""As ENVIRONMENTS.  Their episodes end by themselves, in the task's time whatever `frames_per_step` is."""
+
+SMALL_TASKS = tuple(name for name in TASK_ENVIRONMENTS if "-Full" not in name)
 
 
 def register() -> None:
@@ -46,3 +62,6 @@ def register() -> None:
     for name, (entry_point, options) in ENVIRONMENTS.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, entry_point, max_episode_steps=MAX_EPISODE_STEPS, kwargs=options)
+    for name, (entry_point, options) in TASK_ENVIRONMENTS.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(name, entry_point, kwargs=options)

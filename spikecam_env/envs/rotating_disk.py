@@ -8,24 +8,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scenes.disk import RotatingDisk
-from scenes.protocol import Gaze
-from spikecam_env.envs.spike_camera import SpikeCameraEnv
-from spikecam_env.envs.task import in_the_middle
+from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
+from spikecam_env.envs.episode import Episode
+from spikecam_env.envs.registration import MAX_EPISODE_STEPS
 from spikecam_env.errors import InputError, unknown_name
 
 
-class RotatingDiskEnv(SpikeCameraEnv):
+class RotatingDiskEnv(AimingEnv):
     """The disk starts off the middle and drifts slowly; the camera turns after it.
 
-        reward = 1 - distance of the disk's centre from the picture's middle / half the picture's diagonal
-
-    at the end of the step: 1 in the middle, 0 in a corner.  The episode terminates when the disk's centre
-    leaves the picture, and is truncated after 500 steps (0.5 s at 40 frames a step).
+    The reward is "distance" of `envs.task` unless `reward="progress"`: 1 in the middle, 0 in a corner.  The episode
+    terminates when the disk's centre leaves the picture, and is truncated after 500 steps (0.5 s at 40 frames a step).
+    On the target: within an eighth of the shorter side.
 
     start_offset_px   most the disk starts off the middle; default a quarter of the shorter side
     drift_px_s        most it drifts; default 0.8 of the shorter side a second
     shape, rpm, radius, light, texture, background, texture_seed: as `scenes.RotatingDisk` has them
-    camera            keywords of `SpikeCameraEnv`: model, frames_per_step, packed, ground_truth, ...
+    camera            keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
 
     Options of reset: centre (x, y) [pixels], drift_px_s (x, y), angle [radians] fix what is drawn otherwise.
     """
@@ -44,14 +43,14 @@ class RotatingDiskEnv(SpikeCameraEnv):
         drift_px_s: float | None = None,
         **camera: Any,
     ) -> None:
-        super().__init__(self._draw, judge, shape=shape, **camera)
+        super().__init__(self._draw, shape=shape, **camera)
         self.start_offset_px = _limit("start_offset_px", start_offset_px, 0.25 * min(self.shape))
         self.drift_px_s = _limit("drift_px_s", drift_px_s, 0.8 * min(self.shape))
         self._disk = RotatingDisk(
             self.shape, rpm, radius, light, texture, background, texture_seed, self.model.frame_rate_hz
         )
 
-    def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> RotatingDisk:
+    def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Episode:
         """The disk of one episode: always the same number of draws, so that an option changes nothing else."""
         middle_x, middle_y = self._disk.centre
         x, y = _within(rng, self.start_offset_px)
@@ -63,12 +62,8 @@ class RotatingDiskEnv(SpikeCameraEnv):
         for name in options:
             if name not in drawn:
                 raise unknown_name("option of reset", name, drawn)
-        return self._disk.placed(**{**drawn, **options})
-
-
-def judge(disk: RotatingDisk, frame: float, gaze: Gaze) -> tuple[float, bool]:
-    """(reward, terminated) at a frame; see `RotatingDiskEnv`."""
-    return in_the_middle(disk.centre_at(frame, gaze), disk.shape)
+        disk = self._disk.placed(**{**drawn, **options})
+        return Episode(disk, "disk", SUCCESS_SHARE * min(self.shape), MAX_EPISODE_STEPS)
 
 
 def _within(rng: np.random.Generator, most: float) -> tuple[float, float]:

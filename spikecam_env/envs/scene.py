@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -9,38 +10,60 @@ import numpy as np
 from scenes.catalogue import SCENES, exposed, unexposed_scene
 from scenes.exposure import checked_interval
 from scenes.later import Later
-from scenes.protocol import Gaze, Placed
+from scenes.protocol import Placed
 from scenes.renderers.choose import chosen
 from scenes.world import World
-from spikecam_env.envs.spike_camera import SpikeCameraEnv
-from spikecam_env.envs.task import in_the_middle, is_inside
+from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
+from spikecam_env.envs.episode import Episode
+from spikecam_env.envs.passes import Passes, passes
+from spikecam_env.envs.registration import MAX_EPISODE_STEPS
+from spikecam_env.envs.task import is_inside
 from spikecam_env.errors import InputError, unknown_name
 
 LATEST_START = 40_000
 """Frames: a second into the scene."""
 
+LEAST_STEPS = 40
+"""Steps that an episode has before the scene starts over, where one of the moments drawn has as many."""
+
+SLOWEST_GAZE = 4.0
+"""[shorter sides/s] The gaze's top rate at least."""
+
+GAZE_OVER_TARGET = 2.0
+"""The gaze's top rate over the target's."""
+
+RANDOM_TOP = 100.0
+"""[shorter sides/s] Top speed of the targets of random worlds, taken for all alike so that an action means the same in
+each: `envs.passes` gives 22 as the median of 60 worlds, 97 as the 99 % quantile, 130 as the highest."""
+
+MOUNT_DRIFT = 0.8
+"""[shorter sides/s] Most that the camera's mount drifts, as the disk of `RotatingDisk-v0`: nothing stays in view by
+itself, also where the target turns on the spot."""
+
 _STARTS = 64
-"""Moments drawn for an episode to start at; the first with the target in view is taken."""
+"""Moments drawn for an episode to start at; the first is taken that has the target in view, and time left."""
 
 
-class SceneEnv(SpikeCameraEnv):
+class SceneEnv(AimingEnv):
     """A scene of the catalogue, or a new random world every episode; the camera turns after one thing in it.
 
-        reward = 1 - distance of the target's middle from the picture's / half the picture's diagonal
+    The reward is "distance" of `envs.task` unless `reward="progress"`: 1 in the middle, 0 in a corner, less beyond.
+    On the target: within an eighth of the shorter side.  The episode terminates when the target's middle leaves the
+    picture.  It is truncated when the scene starts over (a ball is thrown again), and after 500 steps (0.5 s at 40
+    frames a step).  At first the camera, on a mount that drifts slowly, looks past the target by `start_offset_px` or
+    half of it.
 
-    at the end of the step: 1 in the middle, 0 in a corner, less beyond.  The episode terminates when the target's
-    middle leaves the picture, and is truncated after 500 steps (0.5 s at 40 frames a step).
+    scene               a name of `scenes.catalogue.SCENES`; "random" is another world in every episode
+    target              name of what is to be followed (`poses` of the truth has them); default: the first that moves
+    scene_seed          of a named scene: textures, poses; episodes differ by where and when they start
+    start_offset_px     most the camera looks past the target at first; default a quarter of the shorter side
+    mean_interval       of the exposure [frames]
+    shape               (rows, columns)
+    max_gaze_rate_px_s  default twice the target's top speed, 4 of the shorter side a second at least
+    camera              keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
 
-    scene             a name of `scenes.catalogue.SCENES`; "random" is another world in every episode
-    target            name of what is to be followed (`poses` of the truth has them); default: the first that moves
-    scene_seed        of a named scene: textures, poses; episodes differ by where and when they start
-    start_offset_px   most the camera looks away from its place at first; default a quarter of the shorter side
-    mean_interval     of the exposure [frames]
-    shape             (rows, columns)
-    camera            keywords of `SpikeCameraEnv`: model, frames_per_step, packed, ground_truth, ...
-
-    Options of reset: start_frame, offset (pan, tilt) [pixels] and, of random worlds, seed fix what is drawn otherwise.
-    Info: `target` (2,) float64 is where the target's middle is seen at the end of the step [pixels].
+    Options of reset: start_frame, offset (pan, tilt) [pixels], drift_px_s (pan, tilt) and, of random worlds, seed fix
+    what is drawn otherwise.
     Errors: InputError for an unknown scene or target, and for a scene in which nothing moves.
     """
 
@@ -53,9 +76,10 @@ class SceneEnv(SpikeCameraEnv):
         scene_seed: int = 0,
         start_offset_px: float | None = None,
         mean_interval: float = 10.0,
+        max_gaze_rate_px_s: float | None = None,
         **camera: Any,
     ) -> None:
-        super().__init__(self._draw, self._judge_target, shape=shape, **camera)
+        super().__init__(self._draw, shape=shape, max_gaze_rate_px_s=max_gaze_rate_px_s, **camera)
         if scene not in SCENES:
             raise unknown_name("scene", scene, SCENES)
         self.start_offset_px = 0.25 * min(self.shape) if start_offset_px is None else float(start_offset_px)
@@ -64,6 +88,12 @@ class SceneEnv(SpikeCameraEnv):
         self.scene_name, self.target, self.mean_interval = scene, target, checked_interval(mean_interval)
         self._unexposed = None if scene == "random" else self._build(scene_seed)
         self._named: Placed | None = None
+        self._passes = Passes(RANDOM_TOP * min(self.shape), np.zeros(0, np.int64))
+        if self._unexposed is not None:
+            last = LATEST_START + MAX_EPISODE_STEPS * self.frames_per_step
+            self._passes = _passes(scene, target, self.shape, scene_seed, self.model.frame_rate_hz, last)
+        if max_gaze_rate_px_s is None:
+            self.set_top_rate(max(SLOWEST_GAZE * min(self.shape), GAZE_OVER_TARGET * self._passes.top_px_s))
         if scene == "random" or isinstance(self._unexposed, World):
             chosen()  # in this process, once: workers forked from it need not try again
 
@@ -74,29 +104,39 @@ class SceneEnv(SpikeCameraEnv):
 
     def _build(self, seed: int) -> Placed:
         """The scene of this seed, not yet exposed; raises InputError where there is nothing to follow in it."""
-        scene = unexposed_scene(self.scene_name, self.shape, seed, self.model.frame_rate_hz)
-        places = scene.places(0.0) if isinstance(scene, Placed) else {}
-        if not isinstance(scene, Placed) or not places:
-            raise InputError(f"nothing moves in the scene {self.scene_name!r}, so there is nothing to follow")
-        if self.target is not None and self.target not in places:
-            raise unknown_name(f"target in the scene {self.scene_name!r}:", self.target, places)
-        return scene
+        return _followed(self.scene_name, self.target, self.shape, seed, self.model.frame_rate_hz)
 
-    def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Later:
-        """The scene of one episode: always the same number of draws, so that an option changes nothing else."""
+    def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Episode:
+        """One episode: always the same number of draws, so that an option changes nothing else."""
         seed, starts = int(rng.integers(2**31)), rng.integers(LATEST_START, size=_STARTS)
-        distance, direction = self.start_offset_px * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi)
-        known = ("start_frame", "offset", *(("seed",) if self._unexposed is None else ()))
+        past = _polar(self.start_offset_px * rng.uniform(0.5, 1.0), rng.uniform(0, 2 * np.pi))
+        drift = _polar(MOUNT_DRIFT * min(self.shape) * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi))
+        known = ("start_frame", "offset", "drift_px_s", *(("seed",) if self._unexposed is None else ()))
         for name in options:
             if name not in known:
                 raise unknown_name("option of reset", name, known)
         scene = self._named or self._exposed(int(options.get("seed", seed)))
-        pan, tilt = options.get("offset", (distance * np.cos(direction), distance * np.sin(direction)))
-        offset = (float(pan), float(tilt))
-        if "start_frame" in options:
-            return Later(scene, int(options["start_frame"]), offset)
-        episodes = [Later(scene, int(start), offset) for start in starts]
-        return next((e for e in episodes if is_inside(self._place(e, 0.0, None), e.shape)), episodes[0])
+        target = self.target or next(iter(scene.places(0.0)))
+        start = int(options["start_frame"]) if "start_frame" in options else self._start(scene, target, starts)
+        pan, tilt = options["offset"] if "offset" in options else self._beside(scene, target, start, past)
+        across, down = (float(rate) / self.model.frame_rate_hz for rate in options.get("drift_px_s", drift))
+        frames = min(self._passes.end(start) - start, (MAX_EPISODE_STEPS + 1) * self.frames_per_step)
+        steps = max(1, int(frames // self.frames_per_step) - 1)  # the first block is reset's
+        later = Later(scene, start, (float(pan), float(tilt)), (across, down))
+        return Episode(later, target, SUCCESS_SHARE * min(self.shape), steps)
+
+    def _start(self, scene: Placed, target: str, starts: Any) -> int:
+        """The first moment with the target in the scene's own view and time left; else the one with most time left."""
+        left = {int(start): self._passes.end(int(start)) - start for start in starts}
+        least = (LEAST_STEPS + 1) * self.frames_per_step
+        good = (s for s, frames in left.items() if frames >= least and is_inside(scene.places(s)[target], scene.shape))
+        return next(good, max(left, key=lambda s: left[s]))
+
+    def _beside(self, scene: Placed, target: str, start: int, past: tuple[float, float]) -> tuple[float, float]:
+        """(pan, tilt) of a camera that looks past the target by so much when its first block is over."""
+        x, y = scene.places(start + self.frames_per_step)[target]
+        rows, columns = scene.shape
+        return x - (columns - 1) / 2 + past[0], y - (rows - 1) / 2 + past[1]
 
     def _exposed(self, seed: int) -> Placed:
         """The scene of an episode.  Its first picture is rendered here, not at construction: a vector environment makes
@@ -107,12 +147,25 @@ class SceneEnv(SpikeCameraEnv):
             self._named = scene
         return scene
 
-    def _place(self, scene: Placed, frame: float, gaze: Gaze | None) -> tuple[float, float]:
-        places = scene.places(frame, gaze)
-        return places[self.target or next(iter(places))]
 
-    def _judge_target(self, scene: Placed, frame: float, gaze: Gaze) -> tuple[float, bool]:
-        return in_the_middle(self._place(scene, frame, gaze), scene.shape)
+def _followed(name: str, target: str | None, shape: tuple[int, int], seed: int, frame_rate_hz: float) -> Placed:
+    scene = unexposed_scene(name, shape, seed, frame_rate_hz)
+    places = scene.places(0.0) if isinstance(scene, Placed) else {}
+    if not isinstance(scene, Placed) or not places:
+        raise InputError(f"nothing moves in the scene {name!r}, so there is nothing to follow")
+    if target is not None and target not in places:
+        raise unknown_name(f"target in the scene {name!r}:", target, places)
+    return scene
 
-    def _info(self, scene: Any, gaze: Gaze) -> dict[str, Any]:
-        return super()._info(scene, gaze) | {"target": np.array(self._place(scene, gaze.frames[1], gaze))}
+
+@lru_cache(maxsize=64)
+def _passes(
+    name: str, target: str | None, shape: tuple[int, int], seed: int, frame_rate_hz: float, last: int
+) -> Passes:
+    """Kept, since environments of a kind are made in numbers, and a scene of many bodies takes a second."""
+    scene = _followed(name, target, shape, seed, frame_rate_hz)
+    return passes(scene, target or next(iter(scene.places(0.0))), last)
+
+
+def _polar(distance: float, direction: float) -> tuple[float, float]:
+    return float(distance * np.cos(direction)), float(distance * np.sin(direction))

@@ -1,22 +1,41 @@
-"""The task of these environments: keep something in the middle of the view."""
+"""What these environments reward: a place that comes nearer to the middle of the view.
+
+    closeness = 1 - distance from the middle of the picture / half the picture's diagonal
+    reward "distance" = closeness at the end of the step
+    reward "progress" = PROGRESS (closeness at the end - closeness at the beginning)
+
+"distance" pays for every step in view, so standing still earns most of it; "progress" pays for coming nearer only.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+PROGRESS = 20.0
+"""Reward for the whole way from a corner to the middle: of the order of ten, so that usual learning rates fit."""
 
-def in_the_middle(place: tuple[float, float], shape: tuple[int, int]) -> tuple[float, bool]:
-    """(reward, terminated) for a thing seen at (x, y) [pixels].
 
-    reward = 1 - its distance from the middle of the picture / half the picture's diagonal; it is over when the thing
-    is outside the picture.
-    """
+def distance_from_middle(place: tuple[float, float], shape: tuple[int, int]) -> float:
+    """Of a place (x, y) in the picture [pixels]."""
     rows, columns = shape
-    distance = np.hypot(place[0] - (columns - 1) / 2, place[1] - (rows - 1) / 2)
-    return 1.0 - float(distance) / float(np.hypot(rows, columns) / 2), not is_inside(place, shape)
+    return float(np.hypot(place[0] - (columns - 1) / 2, place[1] - (rows - 1) / 2))
+
+
+def closeness(distance_px: float, shape: tuple[int, int]) -> float:
+    """1 in the middle, 0 in a corner, less beyond."""
+    return 1.0 - distance_px / float(np.hypot(*shape) / 2)
 
 
 def is_inside(place: tuple[float, float], shape: tuple[int, int]) -> bool:
     """Whether a place (x, y) [pixels] is in the picture."""
     rows, columns = shape
     return -0.5 <= place[0] <= columns - 0.5 and -0.5 <= place[1] <= rows - 0.5
+
+
+REWARDS: dict[str, Callable[[float, float], float]] = {
+    "distance": lambda before, after: after,
+    "progress": lambda before, after: PROGRESS * (after - before),
+}
+"""By name: (closeness before the step, after it) -> reward of the step."""

@@ -89,7 +89,7 @@ def test_following_beats_standing_still() -> None:
         env = make("spikecam_env/Disk-v0", frames_per_step=40)
         _, info = env.reset(seed=5)
         rewards = []
-        for _ in range(40):
+        for _ in range(60):
             error = info["target"] - [15.5, 11.5]
             _, reward, _, _, info = env.step(np.clip(error, -1, 1) if follow else np.zeros(2))
             rewards.append(reward)

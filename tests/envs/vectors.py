@@ -16,7 +16,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 import spikecam_env.envs  # noqa: F401
 from denoiser import DenoiseObservation
-from spikecam_env.envs.registration import ENVIRONMENTS
+from spikecam_env.envs.registration import ENVIRONMENTS, SMALL_TASKS
 
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20}
 STEPS = 2
@@ -38,7 +38,8 @@ def seen(vector: Any) -> dict[str, np.ndarray]:
     """Observations, rewards and places of an episode's first steps; closes the environments."""
     observation, info = vector.reset(seed=3)
     found = {"observation": [observation.copy()], "reward": [], "gaze": []}
-    for action in np.random.default_rng(0).uniform(-0.2, 0.2, (STEPS, 2, 2)).astype(np.float32):
+    actions = (STEPS, 2, *vector.single_action_space.shape)
+    for action in np.random.default_rng(0).uniform(-0.2, 0.2, actions).astype(np.float32):
         observation, reward, _, _, info = vector.step(action)
         found["observation"].append(observation.copy())
         found["reward"].append(reward.copy())
@@ -71,7 +72,7 @@ def use_every_pool() -> None:
 
 def every_id() -> None:
     """Forked from a fresh process; then the same here; then forked again, from a process that has used every pool."""
-    names = list(ENVIRONMENTS)
+    names = [*ENVIRONMENTS, *SMALL_TASKS]
     vector = gymnasium.make_vec("spikecam_env/Fan-v0", num_envs=2, vectorization_mode="async", **SMALL)
     vector.reset(seed=0)
     vector.close()

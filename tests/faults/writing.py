@@ -115,6 +115,7 @@ TRUTH: Work = {
     "denoiser.evaluate.truth:evaluate_truth": _result,
     "denoiser.evaluate.truth:report": lambda _: "figures\n" * 200,
 }
+TASKS: Work = {"spikecam_env.envs.score:evaluate": lambda *_, **__: [{"task": "x" * 9000}]}
 CALIBRATION: Work = {"spikecam_env.calibration:calibrate": cache(calibrate)}
 DIAGNOSIS: Work = {"spikecam_env.gap.diagnose:diagnose": lambda *_, **__: made_up._plain("none", "No gap.")}
 LADDER: Work = {
@@ -146,6 +147,7 @@ WRITINGS: dict[str, Writing] = {
         {},
     ),
     "evaluate spikezoo": Writing("evaluate spikezoo {recordings} --out {out}", "evaluation", SPIKEZOO),
+    "evaluate tasks": Writing("evaluate tasks --tasks Catch-v1 --episodes 1 --json {out}", "tasks.json", TASKS),
     "evaluate truth": Writing("evaluate truth --out {out}", "evaluation", TRUTH),
     "export": Writing("export {recording} --frames 33 --out {out}", "exported", {}),
     "calibrate": Writing("calibrate {campaign} --out {out}", "calibrated", CALIBRATION),

@@ -251,6 +251,10 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         ("evaluate", "spikezoo", "{here}", "--out", "{out}"),
         {"--rate": FLOATS, "--best": ("{here}/a.dat",)},
     ),
+    "evaluate tasks": (
+        ("evaluate", "tasks", "--json", "{out}.json", "--tasks", "Catch-v1", "--episodes", 1),
+        {"--tasks": ("", "Cath-v1", "\x00"), "--episodes": (*COUNTS, 1001), "--seed": SEEDS, "--size": SIZES},
+    ),
     "evaluate truth": (
         ("evaluate", "truth", "--out", "{out}"),
         {

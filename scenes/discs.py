@@ -1,0 +1,162 @@
+"""Discs on a plane: textured discs that move along paths before a tiled background.  Flat, cheap, truth in closed form.
+
+    centre(t) = path(t) - gaze(t),  angle(t) = angle(0) + 2 pi rpm t / (60 frame_rate_hz)
+
+The plane has no end: the background repeats, and a camera may turn as far as it likes.  Later discs hide earlier ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.keys import interval_for, painted
+from scenes.painted_disk import Texels, paint_disk, paint_tile
+from scenes.protocol import Gaze, Truth
+from spikecam_env.sensor import Keyframes
+
+MOTION_PER_KEY = 0.6
+"""Most that anything moves between two keys [pixels], as of `scenes.disk`: 1.2 % rms of a frame's light."""
+
+_AT_REST = Gaze.fixed(0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Straight pieces from place to place; at rest before the first and after the last.
+
+    frame  (n,) rising [frames]
+    place  (n, 2) x, y [pixels]
+    """
+
+    frame: NDArray[np.float64]
+    place: NDArray[np.float64]
+
+    @classmethod
+    def still(cls, x: float, y: float) -> Path:
+        """Always there."""
+        return cls(np.zeros(1), np.array([[x, y]]))
+
+    @classmethod
+    def straight(cls, start: tuple[float, float], velocity: tuple[float, float], frames: float) -> Path:
+        """From `start` on for so many frames, at a velocity [pixels/frame]."""
+        ends = np.array([start, np.asarray(start) + frames * np.asarray(velocity)], np.float64)
+        return cls(np.array([0.0, frames]), ends)
+
+    def at(self, frame: float) -> tuple[float, float]:
+        """(x, y) at a frame [pixels]."""
+        x, y = (float(np.interp(frame, self.frame, self.place[:, axis])) for axis in (0, 1))
+        return x, y
+
+    def velocity(self, frame: float) -> tuple[float, float]:
+        """(x, y) [pixels/frame] of the piece that a frame lies in."""
+        piece = int(np.searchsorted(self.frame, frame, side="right"))
+        if not 0 < piece < len(self.frame):
+            return 0.0, 0.0
+        step = self.place[piece] - self.place[piece - 1]
+        x, y = step / (self.frame[piece] - self.frame[piece - 1])
+        return float(x), float(y)
+
+    @cached_property
+    def speed(self) -> float:
+        """Of the fastest piece [pixels/frame]."""
+        if len(self.frame) < 2:
+            return 0.0
+        return float((np.linalg.norm(np.diff(self.place, axis=0), axis=1) / np.diff(self.frame)).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Disc:
+    """texels: its square in light, `scenes.painted_disk`; radius [pixels]; rpm: positive is counter-clockwise."""
+
+    texels: Texels
+    radius: float
+    path: Path
+    rpm: float = 0.0
+    angle: float = 0.0
+
+    def turn(self, frame_rate_hz: float) -> float:
+        """[radians/frame]"""
+        return 2 * np.pi * self.rpm / (60 * frame_rate_hz)
+
+
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """Scene: see the head of this file.
+
+    shape          (rows, columns)
+    frame_rate_hz  frames a second
+    tile           (h, w) float32 radiance of the background, repeated; its first texel is pixel (0, 0)
+    discs          by name, from the back
+
+    Truth: object n is the n-th disc; poses[name] is (x, y, angle).
+    """
+
+    shape: tuple[int, int]
+    frame_rate_hz: float
+    tile: NDArray[np.float32]
+    discs: dict[str, Disc]
+
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
+        """Keys that cover frames [start, stop], see `scenes.keys.painted`."""
+        interval = interval_for(self._own_speed + (float(np.hypot(*gaze.rate)) if gaze else 0.0), MOTION_PER_KEY)
+        return painted(self.shape, start, stop, interval, gaze, lambda t, picture: self._paint(t, gaze, picture))
+
+    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
+        """Ground truth at a frame; see `scenes.protocol.Truth`."""
+        gaze = gaze or _AT_REST
+        radiance = np.empty(self.shape, np.float32)
+        self._paint(frame, gaze, radiance)
+        flow, owner = np.zeros((*self.shape, 2), np.float32), np.zeros(self.shape, np.int32)
+        rows, columns = np.indices(self.shape)
+        poses: dict[str, tuple[float, ...]] = {"camera": gaze.at(frame)}
+        for number, (name, disc) in enumerate(self.discs.items(), 1):
+            x, y = self._centre(disc, frame, gaze)
+            vx, vy = disc.path.velocity(frame)
+            turn = disc.turn(self.frame_rate_hz)
+            inside = (columns - x) ** 2 + (rows - y) ** 2 <= disc.radius**2
+            flow[inside, 0], flow[inside, 1] = (turn * (rows - y) + vx)[inside], (vy - turn * (columns - x))[inside]
+            owner[inside] = number
+            poses[name] = (x, y, (disc.angle + turn * frame) % (2 * np.pi))
+        return Truth(radiance, flow - np.asarray(gaze.rate, np.float32), owner, None, poses)
+
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """Where the discs' middles are seen, see `scenes.protocol.Placed`."""
+        return {name: self._centre(disc, frame, gaze or _AT_REST) for name, disc in self.discs.items()}
+
+    def lit(self, gain: float) -> Discs:
+        """The same with `gain` times its light."""
+        lit = {name: replace(disc, texels=disc.texels.lit(gain)) for name, disc in self.discs.items()}
+        return replace(self, tile=self.tile * np.float32(gain), discs=lit)
+
+    @cached_property
+    def _own_speed(self) -> float:
+        """Of the fastest point [pixels/frame], before a camera at rest."""
+        speeds = [d.path.speed + abs(d.turn(self.frame_rate_hz)) * d.radius for d in self.discs.values()]
+        return max(speeds, default=0.0)
+
+    def _centre(self, disc: Disc, frame: float, gaze: Gaze) -> tuple[float, float]:
+        (x, y), (pan, tilt) = disc.path.at(frame), gaze.at(frame)
+        return x - pan, y - tilt
+
+    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+        """The radiance at a frame, into `picture` (H, W)."""
+        gaze = gaze or _AT_REST
+        seen = [(disc, self._centre(disc, frame, gaze)) for disc in self.discs.values()]
+        seen = [(disc, (x, y)) for disc, (x, y) in seen if self._in_view(x, y, disc.radius)]
+        front, behind = picture, np.empty_like(picture)
+        if len(seen) % 2:
+            front, behind = behind, front
+        paint_tile(self.tile, *gaze.at(frame), front)
+        for disc, centre in seen:
+            front, behind = behind, front
+            angle = disc.angle + disc.turn(self.frame_rate_hz) * frame
+            paint_disk(disc.texels, centre, disc.radius, angle, behind, front)
+
+    def _in_view(self, x: float, y: float, radius: float) -> bool:
+        rows, columns = self.shape
+        reach = radius + 1
+        return -reach < x < columns - 1 + reach and -reach < y < rows - 1 + reach

@@ -1,0 +1,100 @@
+"""An episode: a scene, the place in it that is to come to the middle of the view, and when this is over.
+
+`Episode` is the plain case: follow one thing for so many steps, and lose it when it leaves the picture.  A task with
+another end overrides `end` and `performance`; one whose action does more than turn the camera overrides `acted` and
+`rest`, and `through` where that changes the light.  An episode is a value: what an action changes is a new one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scenes.protocol import Gaze, Placed, Scene
+from spikecam_env.envs.task import closeness, is_inside
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where an episode stands at the end of a step.
+
+    frame       the sensor's
+    step        steps so far; 0 after reset
+    place       (x, y) where the target is seen [pixels]
+    distance_px of it from the middle
+    on_target   whether the episode counts this as being on it
+    steps_on    steps so far that ended on it
+    held        steps in a row, up to this one, that ended on it
+    """
+
+    frame: int
+    step: int
+    place: tuple[float, float]
+    distance_px: float
+    on_target: bool
+    steps_on: int
+    held: int
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """scene; target: its name in `places`; success_px: how near is on it [pixels]; steps: the most there are."""
+
+    scene: Placed
+    target: str
+    success_px: float
+    steps: int
+
+    def aim(self, frame: float, gaze: Gaze) -> tuple[float, float]:
+        """Where the target is seen, (x, y) [pixels]."""
+        return self.scene.places(frame, gaze)[self.target]
+
+    def is_on(self, frame: float, distance_px: float) -> bool:
+        """Whether this distance, at this frame, counts as being on the target."""
+        return distance_px <= self.success_px
+
+    def worth(self, standing: Standing) -> float:
+        """How good things are, 1 at best: what the rewards of `envs.task` are made of."""
+        return closeness(standing.distance_px, self.scene.shape)
+
+    def end(self, standing: Standing) -> bool | None:
+        """None: it goes on.  Over otherwise: True where that is a success, False where it is a failure."""
+        return None if is_inside(standing.place, self.scene.shape) else False
+
+    def is_success(self, standing: Standing) -> bool:
+        """Whether the task is done, as things stand."""
+        return standing.on_target
+
+    def performance(self, standing: Standing) -> float:
+        """0 to 1, of the whole episode if it ended here: the share of its steps that ended on the target."""
+        return standing.steps_on / self.steps
+
+    def acted(self, rest: tuple[float, ...], first: int, stop: int) -> Episode:
+        """The episode in which the action's further numbers, in [-1, 1], apply over frames [first, stop]."""
+        return self
+
+    def through(self, scene: Scene) -> Scene:
+        """The scene as the camera sees it through what actions have set; after reset it sees the scene itself."""
+        return scene
+
+    def rest(self, standing: Standing, first: int, stop: int) -> tuple[float, ...]:
+        """The further numbers of an action that knows everything."""
+        return ()
+
+
+@dataclass(frozen=True, eq=False)
+class Reaching(Episode):
+    """An episode that ends in success when the target has been held for `hold` steps in a row."""
+
+    hold: int = 1
+
+    def end(self, standing: Standing) -> bool | None:
+        """See `Episode.end`."""
+        return True if standing.held >= self.hold else None
+
+    def is_success(self, standing: Standing) -> bool:
+        """See `Episode.is_success`."""
+        return standing.held >= self.hold
+
+    def performance(self, standing: Standing) -> float:
+        """1 for a success, 0 for none."""
+        return float(self.is_success(standing))

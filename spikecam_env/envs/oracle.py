@@ -1,0 +1,38 @@
+"""An agent that knows the true state and obeys the same motor: the upper end of every score.
+
+Where the target is, and how it moves in the next step, is known; what it does after that is not looked at.  With
+u, the target's motion in the step, e, its distance from the middle now, and a, the most the gaze's motion changes from
+step to step, the gaze moves by
+
+    u + w,   |w| = min(|e|, 4 |e| / (1 + sqrt(1 + 8 |e| / a)))       [pixels/step]
+
+the largest w from which slowing down by a each step (w, w - a, ...) stops on the target: w (w / a + 1) / 2 = |e|.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.protocol import Gaze
+from spikecam_env.envs.aiming import AimingEnv
+
+
+def approach(error: NDArray[np.float64], most_change: float) -> NDArray[np.float64]:
+    """w of the head of this file, of every axis [pixels/step]."""
+    size = np.abs(error)
+    return np.sign(error) * np.minimum(size, 4 * size / (1 + np.sqrt(1 + 8 * size / most_change)))
+
+
+def oracle(env: AimingEnv) -> NDArray[np.float32]:
+    """The action of the next step."""
+    first, stop = env.sensor.frame, env.sensor.frame + env.frames_per_step
+    rows, columns = env.shape
+    at_rest = Gaze.fixed(*env.gaze)
+    now, then = (np.array(env.episode.aim(frame, at_rest)) for frame in (first, stop))
+    change = env.motor.most_change_px_s(env.step_s) * env.step_s
+    move = then - now + approach(now - [(columns - 1) / 2, (rows - 1) / 2], change)
+    action = np.concatenate(
+        [(move / (env.motor.top_px_s * env.step_s))[: env.axes], env.episode.rest(env.standing, first, stop)]
+    )
+    return np.clip(action, -1.0, 1.0).astype(np.float32)

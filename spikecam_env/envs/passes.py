@@ -1,0 +1,56 @@
+"""When a scene starts over, so that what was followed is elsewhere at once: a ball is thrown again, a train is back.
+
+A follower that knows everything looks at the target, and goes on as the target does; where the target is then out of
+its picture, nothing that turns could have followed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.protocol import Gaze, Placed
+from spikecam_env.envs.task import is_inside
+
+EVERY_S = 0.005
+"""From look to look [s].  What vibrates at 40 Hz and 80 shorter sides a second, the fastest of random worlds, leaves a
+straight line by a quarter of a side in it; a scene that starts over leaps by more than one."""
+
+TOP_QUANTILE = 0.99
+"""Of the target's speeds: its top speed without the instants in which a scene starts over."""
+
+
+@dataclass(frozen=True)
+class Passes:
+    """top_px_s: the target's top speed [pixels/s]; cuts: frames by which the scene is about to start over, rising."""
+
+    top_px_s: float
+    cuts: NDArray[np.int64]
+
+    def end(self, frame: int) -> float:
+        """Last frame of the pass that `frame` lies in; infinite where none ends after it."""
+        later = self.cuts[self.cuts > frame]
+        return float(later[0]) if later.size else np.inf
+
+
+def passes(scene: Placed, target: str, last: int) -> Passes:
+    """Of a target, from frame 0 to `last`."""
+    every = max(1, round(EVERY_S * scene.frame_rate_hz))
+    rows, columns = scene.shape
+    middle = np.array([(columns - 1) / 2, (rows - 1) / 2])
+
+    def seen(frame: float, gaze: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array(scene.places(frame, Gaze.fixed(float(gaze[0]), float(gaze[1])))[target])
+
+    gaze, speeds, cuts = np.zeros(2), [], []
+    for frame in range(0, last + every, every):
+        place = seen(frame, gaze)
+        if frame and not is_inside((place[0], place[1]), scene.shape):
+            cuts.append(frame - every)
+        gaze = gaze + place - middle
+        velocity = seen(frame + 1, gaze) - middle
+        speeds.append(float(np.hypot(*velocity)))
+        gaze = gaze + every * velocity
+    return Passes(float(np.quantile(speeds, TOP_QUANTILE)) * scene.frame_rate_hz, np.array(cuts, np.int64))

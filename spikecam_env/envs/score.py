@@ -1,0 +1,137 @@
+"""How good an agent is at a task: 0 is doing nothing, 1 is the oracle.
+
+    score = (performance - nothing's) / (oracle's - nothing's)
+
+Each is the mean over the same episodes of `info["performance"]` at their end; rewards do not count, so that agents that
+learned from different ones compare.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike
+from tqdm import tqdm
+
+from spikecam_env.envs.aiming import AimingEnv
+from spikecam_env.envs.oracle import oracle
+
+Policy = Callable[[Any, AimingEnv], ArrayLike]
+"""(observation, environment) -> action.  An agent looks at the observation alone; the oracle at the environment."""
+
+
+def act_oracle(observation: Any, env: AimingEnv) -> ArrayLike:
+    """See `envs.oracle`."""
+    return oracle(env)
+
+
+def act_nothing(observation: Any, env: AimingEnv) -> ArrayLike:
+    """Zeros."""
+    return np.zeros(env.action_space.shape or (), np.float32)
+
+
+def act_random(observation: Any, env: AimingEnv) -> ArrayLike:
+    """Evenly from the action space; `play` seeds it."""
+    return env.action_space.sample()
+
+
+BASELINES: dict[str, Policy] = {"oracle": act_oracle, "nothing": act_nothing, "random": act_random}
+
+
+@dataclass(frozen=True)
+class Played:
+    """Means over episodes.
+
+    returns      undiscounted sum of rewards
+    performance  `info["performance"]` at the end, 0 to 1
+    success      share of episodes with `info["is_success"]` at the end
+    distance_px  over all steps
+    ms_a_step    of the environment alone [ms]
+    steps        an episode
+    """
+
+    returns: float
+    performance: float
+    success: float
+    distance_px: float
+    ms_a_step: float
+    steps: float
+
+
+def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int]) -> Played:
+    """A policy's episodes, one a seed.  env: of an id of this package, wrapped or not."""
+    inner = env.unwrapped
+    if not isinstance(inner, AimingEnv):
+        raise TypeError(f"{type(inner).__name__} is no AimingEnv: it has no performance")
+    rows = [_episode(env, inner, policy, seed) for seed in seeds]
+    returns, performance, success, distance, seconds, steps = (np.array(column) for column in zip(*rows, strict=True))
+    return Played(
+        returns=float(returns.mean()),
+        performance=float(performance.mean()),
+        success=float(success.mean()),
+        distance_px=float(distance.sum() / steps.sum()),
+        ms_a_step=float(1e3 * seconds.sum() / steps.sum()),
+        steps=float(steps.mean()),
+    )
+
+
+def score(performance: float, nothing: float, best: float) -> float:
+    """See the head of this file; NaN where the oracle does no better than nothing."""
+    return (performance - nothing) / (best - nothing) if best > nothing else float("nan")
+
+
+def _episode(
+    env: gymnasium.Env[Any, Any], inner: AimingEnv, policy: Policy, seed: int
+) -> tuple[float, float, bool, float, float, int]:
+    """(return, performance, success, distances' sum, seconds in steps, steps)."""
+    inner.action_space.seed(seed)
+    observation, _ = env.reset(seed=seed)
+    total, distance, seconds, steps, over = 0.0, 0.0, 0.0, 0, False
+    while not over:
+        action = np.asarray(policy(observation, inner), np.float32)
+        began = time.perf_counter()
+        observation, reward, terminated, truncated, info = env.step(action)
+        seconds += time.perf_counter() - began
+        over = terminated or truncated
+        total, distance, steps = total + float(reward), distance + info["distance_px"], steps + 1
+    return total, info["performance"], info["is_success"], distance, seconds, steps
+
+
+def evaluate(
+    ids: Sequence[str], episodes: int = 20, seed: int = 0, progress: bool = False, **options: Any
+) -> list[dict[str, Any]]:
+    """The baselines of every id, on the episodes of seeds `seed`, `seed` + 1, ...; test episodes where an id has them.
+
+    options  keywords of every environment, e.g. shape
+    A row an id: task, the oracle's performance, return and success, nothing's performance, return and success, the
+    score of random actions, mean distances of the oracle and of nothing [pixels], milliseconds a step.
+    """
+    return [_row(name, range(seed, seed + episodes), options) for name in tqdm(ids, unit="task", disable=not progress)]
+
+
+def _row(name: str, seeds: range, options: dict[str, Any]) -> dict[str, Any]:
+    split = {"split": "test"} if name.endswith("-v1") else {}
+    env = gymnasium.make(name, **{**split, **options})
+    try:
+        played = {baseline: play(env, policy, seeds) for baseline, policy in BASELINES.items()}
+    finally:
+        env.close()
+    best, nothing, chance = played["oracle"], played["nothing"], played["random"]
+    return {
+        "task": name.removeprefix("spikecam_env/"),
+        "oracle": best.performance,
+        "nothing": nothing.performance,
+        "score of random": score(chance.performance, nothing.performance, best.performance),
+        "oracle's return": best.returns,
+        "nothing's return": nothing.returns,
+        "oracle's success": best.success,
+        "nothing's success": nothing.success,
+        "oracle's distance [px]": best.distance_px,
+        "nothing's distance [px]": nothing.distance_px,
+        "ms a step": best.ms_a_step,
+    }

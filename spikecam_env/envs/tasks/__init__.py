@@ -1,0 +1,23 @@
+"""The tasks by name, a file each: `spikecam_env/NAME-v1` at 64 x 64, `spikecam_env/NAME-Full-v1` at 250 x 400.
+
+A task is a frozen dataclass (`base.Task`) whose `draw` gives an episode; `env.TaskEnv` plays it.
+"""
+
+from __future__ import annotations
+
+from spikecam_env.envs.tasks.base import Task
+from spikecam_env.envs.tasks.catch import Catch
+from spikecam_env.envs.tasks.exposure import Exposure
+from spikecam_env.envs.tasks.low_light import LowLight
+from spikecam_env.envs.tasks.read_spin import ReadSpin
+from spikecam_env.envs.tasks.saccade import Saccade
+from spikecam_env.envs.tasks.track import Track
+
+TASKS: dict[str, type[Task]] = {
+    "Track": Track,
+    "Saccade": Saccade,
+    "Catch": Catch,
+    "ReadSpin": ReadSpin,
+    "LowLight": LowLight,
+    "Exposure": Exposure,
+}

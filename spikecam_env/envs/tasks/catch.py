@@ -1,0 +1,90 @@
+"""Catch: a ball flies towards a bright line and crosses it 5 to 20 ms after it is first seen; be there.
+
+The camera rides on the paddle, which slides along the line: its place is the middle column.  It pans and does not tilt.
+A galvanometer mirror turns as fast as this motor does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from scenes.discs import Discs, Path
+from scenes.protocol import Gaze
+from spikecam_env.envs.episode import Episode, Standing
+from spikecam_env.envs.tasks.base import Task, View
+from spikecam_env.envs.tasks.things import BRIGHT, background, disc_of, number_of
+
+
+@dataclass(frozen=True)
+class Catch(Task):
+    """crossing_s: earliest and latest [s]; paddle: half its width [shorter sides], `success_side`; away: nearest that
+    the ball crosses from where the paddle begins, and farthest, which is less where the motor cannot be in time;
+    start, line: rows where the ball is first seen and where the line is; radius [shorter sides]."""
+
+    top_sides_s: float = 100.0
+    rise_s: float = 0.002
+    duration_s: float = 0.03
+    success_side: float = 1 / 16
+    crossing_s: tuple[float, float] = (0.005, 0.02)
+    away: tuple[float, float] = (0.12, 0.45)
+    radius: float = 1 / 16
+    start: float = 0.1
+    line: float = 0.85
+
+    frames_per_step: ClassVar[int] = 20
+    axes: ClassVar[int] = 1
+
+    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+        """See `Task.draw`."""
+        seconds = rng.uniform(*self.crossing_s)
+        away = min(self.away[1], self.reach(seconds - REACTION_S))
+        to = view.middle[0] + rng.choice([-1.0, 1.0]) * view.side * rng.uniform(self.away[0], max(away, self.away[0]))
+        begin = np.array([view.middle[0] + view.side * rng.uniform(-0.2, 0.2), self.start * view.side])
+        crossing = np.array([to, self.line * view.side])
+        frames = view.frames(seconds) + view.frames_per_step  # the first block is reset's
+        path = Path.straight((float(begin[0]), float(begin[1])), tuple((crossing - begin) / frames), 2 * frames)
+        ball = disc_of("plain", number_of(rng, view), self.radius * view.side, path)
+        tile = background(number_of(rng, view), view.shape).copy()
+        row, width = int(self.line * view.side), max(1, int(view.side / 64))
+        tile[row : row + width] = BRIGHT
+        scene = Discs(view.shape, view.frame_rate_hz, tile, {"ball": ball})
+        return Meeting(scene, "ball", **self.common(view), crossing=(float(crossing[0]), frames))
+
+    def reach(self, seconds: float) -> float:
+        """How far the motor comes from rest to wherever it is then [shorter sides]."""
+        rising = min(seconds, self.rise_s)
+        return self.top_sides_s * (rising**2 / (2 * self.rise_s) + (seconds - rising))
+
+
+REACTION_S = 0.0025
+"""Time that an agent has to see where the ball goes, at least [s]: five steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting(Episode):
+    """crossing: (x in an unmoved picture [pixels], frame)."""
+
+    crossing: tuple[float, float] = (0.0, 0.0)
+
+    def aim(self, frame: float, gaze: Gaze) -> tuple[float, float]:
+        """Where the ball crosses, as seen now; from then on, as it was seen then."""
+        place, when = self.crossing
+        return place - gaze.at(min(frame, when))[0], (self.scene.shape[0] - 1) / 2
+
+    def end(self, standing: Standing) -> bool | None:
+        """The ball has crossed."""
+        return None if not self._crossed(standing) else standing.on_target
+
+    def is_success(self, standing: Standing) -> bool:
+        """It has, and was met."""
+        return self._crossed(standing) and standing.on_target
+
+    def performance(self, standing: Standing) -> float:
+        """1 where it was met."""
+        return float(self.is_success(standing))
+
+    def _crossed(self, standing: Standing) -> bool:
+        return standing.frame >= self.crossing[1]

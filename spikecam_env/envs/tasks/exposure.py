@@ -1,0 +1,139 @@
+"""Exposure: Track under a light that changes a hundredfold, with an iris before the camera.
+
+    log10(ambient(t)) = swing sin(2 pi t / period + phase),   light on the sensor = scene * ambient * iris
+    log10(iris) changes by the action's third number * iris_decades_s                               [1/s]
+
+On the target: it is looked at, and the light on the sensor is within `tolerance` of what the scene is made for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from scenes.derived import Derived
+from scenes.protocol import Gaze, Placed, Scene, Truth
+from spikecam_env.envs.episode import Episode, Standing
+from spikecam_env.envs.tasks.base import View
+from spikecam_env.envs.tasks.track import Track
+from spikecam_env.sensor import Keyframes
+
+
+@dataclass(frozen=True)
+class Exposure(Track):
+    """decades: of the light, from its middle to its ends; period_s: shortest and longest [s]; iris_decades_s: the
+    iris's top rate [decades/s], its range; tolerance: factor of light either way that is well exposed."""
+
+    decades: float = 1.5
+    period_s: tuple[float, float] = (0.2, 0.4)
+    iris_decades_s: float = 50.0
+    tolerance: float = 2.0
+
+    further: ClassVar[int] = 1
+
+    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+        """See `Task.draw`."""
+        plane = self.plane(rng, view)
+        period, phase = view.frames(rng.uniform(*self.period_s)), rng.uniform(0, 2 * np.pi)
+        return Lit(
+            Dimmed(plane, Ambient(self.decades, period, phase)),
+            "target",
+            **self.common(view),
+            rate=self.iris_decades_s / view.frame_rate_hz,
+            tolerance=float(np.log10(self.tolerance)),
+            most=self.decades + IRIS_BEYOND,
+        )
+
+
+IRIS_BEYOND = 0.5
+"""Decades by which the iris's range is wider than the light's, either way."""
+
+
+@dataclass(frozen=True)
+class Ambient:
+    """Decades of light at a frame; the head of this file has the law."""
+
+    decades: float
+    period: float
+    phase: float
+
+    def __call__(self, frame: float) -> float:
+        return self.decades * float(np.sin(2 * np.pi * frame / self.period + self.phase))
+
+
+@dataclass(frozen=True)
+class Iris:
+    """Decades at a frame: straight from one value to the next over these frames, and even before and after."""
+
+    values: tuple[float, float] = (0.0, 0.0)
+    frames: tuple[float, float] = (0.0, 1.0)
+
+    def __call__(self, frame: float) -> float:
+        return float(np.interp(frame, self.frames, self.values))
+
+
+@dataclass(frozen=True)
+class Dimmed(Derived):
+    """Scene: another one's light times 10 ^ law(frame); law: `Ambient` or `Iris`."""
+
+    scene: Placed
+    law: Ambient | Iris
+
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
+        """The scene's keys, each in the light of its frame."""
+        keys = self.scene.radiance(start, stop, gaze)
+        gain = np.array([10 ** self.law(frame) for frame in keys.frame], np.float32)
+        return Keyframes.known(keys.frame, keys.radiance * gain[:, None, None])
+
+    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
+        """The scene's truth, its radiance in the light of the frame."""
+        truth = self.scene.truth(frame, gaze)
+        return replace(truth, radiance=truth.radiance * np.float32(10 ** self.law(frame)))
+
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """The scene's places."""
+        return self.scene.places(frame, gaze)
+
+
+@dataclass(frozen=True, eq=False)
+class Lit(Episode):
+    """rate: of the iris [decades/frame]; tolerance, most: [decades]; iris: of the step."""
+
+    rate: float = 0.0
+    tolerance: float = 0.0
+    most: float = 0.0
+    iris: Iris = Iris()
+
+    def acted(self, rest: tuple[float, ...], first: int, stop: int) -> Lit:
+        """With the iris on its way."""
+        before = self.iris.values[1]
+        after = float(np.clip(before + rest[0] * self.rate * (stop - first), -self.most, self.most))
+        return replace(self, iris=Iris((before, after), (first, stop)))
+
+    def through(self, scene: Scene) -> Scene:
+        """The scene through the iris."""
+        assert isinstance(scene, Placed)
+        return Dimmed(scene, self.iris)
+
+    def rest(self, standing: Standing, first: int, stop: int) -> tuple[float, ...]:
+        """The iris's rate that makes up for the light at the end of the step."""
+        wanted = -self._ambient(stop) - self.iris.values[1]
+        return (float(np.clip(wanted / (self.rate * (stop - first)), -1.0, 1.0)),)
+
+    def is_on(self, frame: float, distance_px: float) -> bool:
+        """Looked at, and well exposed."""
+        return super().is_on(frame, distance_px) and self._off(frame) <= self.tolerance
+
+    def worth(self, standing: Standing) -> float:
+        """Closeness, less the share of `most` by which the light is off."""
+        return super().worth(standing) - self._off(standing.frame) / self.most
+
+    def _off(self, frame: float) -> float:
+        """From the light that the scene is made for [decades], either way."""
+        return abs(self._ambient(frame) + self.iris(frame))
+
+    def _ambient(self, frame: float) -> float:
+        assert isinstance(self.scene, Dimmed)
+        return self.scene.law(frame)

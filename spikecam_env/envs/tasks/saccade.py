@@ -1,0 +1,46 @@
+"""Saccade: several discs move; look at the one with spokes, and hold it, before the time is over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenes.discs import Disc, Discs
+from spikecam_env.envs.episode import Episode, Reaching
+from spikecam_env.envs.tasks.base import Task, View
+from spikecam_env.envs.tasks.things import background, disc_of, number_of, wander
+
+CUE = "spokes"
+OTHERS = ("rings", "halves", "islands")
+"""Textures of the discs to leave alone; half of the light is theirs too."""
+
+
+@dataclass(frozen=True)
+class Saccade(Task):
+    """hold_s: how long the cued disc is to be held [s]; speed: of the discs, over the gaze's top speed; radius, start,
+    room: as of `Track`."""
+
+    duration_s: float = 0.2
+    success_side: float = 1 / 16
+    hold_s: float = 0.02
+    speed: tuple[float, float] = (0.2, 0.5)
+    radius: float = 1 / 9
+    start: tuple[float, float] = (0.25, 0.35)
+    room: float = 0.6
+
+    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+        """See `Task.draw`."""
+        first, kinds = rng.uniform(0, 2 * np.pi), rng.permutation([CUE, *OTHERS])
+        x, y = view.middle
+        discs: dict[str, Disc] = {}
+        for number, kind in enumerate(kinds):
+            direction = first + 2 * np.pi * number / len(kinds)
+            distance = view.side * rng.uniform(*self.start)
+            start = (float(x + distance * np.cos(direction)), float(y + distance * np.sin(direction)))
+            speed = self.top_sides_s * rng.uniform(*self.speed)
+            path = wander(rng, view, start, speed, self.duration_s, self.room)
+            discs[str(kind)] = disc_of(str(kind), number_of(rng, view), self.radius * view.side, path)
+        discs[CUE] = discs.pop(CUE)  # in front, so that it is never hidden
+        scene = Discs(view.shape, view.frame_rate_hz, background(number_of(rng, view), view.shape), discs)
+        return Reaching(scene, CUE, **self.common(view), hold=view.steps(self.hold_s))
