@@ -45,4 +45,10 @@ def register() -> None:
     """Register every id that is not registered yet."""
     for name, (entry_point, options) in ENVIRONMENTS.items():
         if name not in gymnasium.registry:
-            gymnasium.register(name, entry_point, max_episode_steps=MAX_EPISODE_STEPS, kwargs=options)
+            gymnasium.register(
+                name,
+                entry_point,
+                max_episode_steps=MAX_EPISODE_STEPS,
+                kwargs=options,
+                vector_entry_point=f"spikecam_env.envs.vector_of:{entry_point.replace(':', '.')}",
+            )
