@@ -30,7 +30,7 @@ RENDER_FRAMES = 40
 """Frames a rendered picture counts spikes over, at least."""
 
 
-class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
+class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     """Each step exposes `frames_per_step` spike frames while the camera turns at the rate the action gives.
 
     Observation   what `obs` names; a fresh array each step.  By default the step's frames, (K, H, W) int8 of 0 and 1
@@ -96,8 +96,8 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         self.observation, self.obs_state = _observation(obs, packed), obs_state
         self.render_mode = render_mode
         self._make_scene, self._judge = make_scene, judge
-        self._options = {"engine": engine, "threads": threads}
-        self._sensor: SpikeSensor | None = SpikeSensor(self.model, self.shape, 0, **self._options)
+        self._engine, self._threads = engine, threads
+        self._sensor: SpikeSensor | None = self._unit_of(self.model, seed=0)
         self._scene: Scene | None = None
         self._drawn: Any = None  # the scene as it was drawn: in its own light, and with all that its task knows of it
         self._seen: Any = None
@@ -108,9 +108,7 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         picture = self.observation.space(self.view)
         self.observation_space: spaces.Space[Any] = with_state_space(picture) if obs_state else picture
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new episode; `options` but for `model` and `light` go to `make_scene`."""
         self._open()
         given = dict(options or {})
@@ -127,7 +125,7 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         observation, info, _ = self._expose((0.0, 0.0))
         return observation, info
 
-    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Turn the camera at the action's rate for K frames.  Never truncates: that is `TimeLimit`'s."""
         rate = np.asarray(action, np.float64)
         if rate.shape != (2,) or not np.isfinite(rate).all():
@@ -191,14 +189,17 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         if model == self.sensor.model:
             self.sensor.reset(seed=seed)
         else:
-            self._sensor = SpikeSensor(model, self.shape, seed, **self._options)
+            self._sensor = self._unit_of(model, seed)
+
+    def _unit_of(self, model: SensorModel, seed: int) -> SpikeSensor:
+        return SpikeSensor(model, self.shape, seed, self._engine, threads=self._threads)
 
     def _not_ready(self) -> NotReadyError:
         if self._sensor is None:
             return NotReadyError("the environment is closed; make a new one")
         return NotReadyError("the environment has no scene yet; call reset first")
 
-    def _expose(self, rate: tuple[float, float]) -> tuple[NDArray[Any], dict[str, Any], Gaze]:
+    def _expose(self, rate: tuple[float, float]) -> tuple[Any, dict[str, Any], Gaze]:
         """The next K frames while the gaze moves at `rate` [pixels/frame]: (observation, info, the gaze's path)."""
         scene = self.scene
         first, stop = self.sensor.frame, self.sensor.frame + self.frames_per_step

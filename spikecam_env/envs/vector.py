@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from copy import deepcopy
 from functools import partial
 from typing import Any, TypeVar
@@ -71,7 +71,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         self.num_envs = checked_count(num_envs, "num_envs")
         self.max_episode_steps = max_episode_steps
         self.render_mode = render_mode
-        make = load_env_creator(single) if isinstance(single, str) else single
+        make: Any = load_env_creator(single) if isinstance(single, str) else single
         options |= {"render_mode": render_mode, "threads": options.get("threads", 1)}
         self.envs: list[SpikeCameraEnv] = [make(**{**options, **own}) for own in _own_models(models, self.num_envs)]
         self._workers = [
@@ -121,7 +121,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
             self._seen = restarted(self.observation, self._view, self._seen, fresh)
         return self._together(outcomes)
 
-    def render(self) -> tuple[NDArray[np.uint8] | None, ...] | None:
+    def render(self) -> tuple[Any, ...] | None:
         """N pictures (H, W, 3) uint8, or None without a render mode."""
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 
@@ -153,10 +153,8 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         shares: list[Future[list[T]]] = [
             worker.submit(partial(_all, work, range(n, self.num_envs, count))) for n, worker in enumerate(self._workers)
         ]
-        done = [share.exception() or share.result() for share in shares]
-        for results in done:
-            if isinstance(results, BaseException):
-                raise results
+        wait(shares)
+        done = [share.result() for share in shares]
         return [done[n % count][n // count] for n in range(self.num_envs)]
 
     def _together(
@@ -189,7 +187,7 @@ def _all(work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
     if seed is None:
         return [None] * count
-    seeds = [int(seed) + n for n in range(count)] if isinstance(seed, (int, np.integer)) else list(seed)
+    seeds: list[int | None] = list(range(seed, seed + count)) if isinstance(seed, int) else list(seed)
     if len(seeds) != count:
         raise InputError(f"seed has {len(seeds)} numbers; it must be one an environment, {count}, or one for all")
     return seeds

@@ -72,7 +72,7 @@ class FrameCamera(Observation):
             raise InputError("a frame camera needs the light on the sensor, which this environment does not know")
         period = blocks.frame_rate_hz / self.rate_hz
         exposure = period if self.exposure_s is None else self.exposure_s * blocks.frame_rate_hz
-        after = Shutter(*(array.copy() for array in state))
+        after = Shutter._make(array.copy() for array in state)
         for own, light in zip(_streams(after), blocks.light, strict=True):
             start, stop = float(own.now), float(own.now) + blocks.spikes.shape[1]
             for opened, closed, whole in shutter_open(start, stop, period, exposure):
@@ -90,7 +90,7 @@ class FrameCamera(Observation):
 
 def _streams(state: Shutter) -> Iterator[Shutter]:
     """Views of one stream each, to be written to."""
-    return (Shutter(*(array[n, ...] for array in state)) for n in range(len(state.now)))
+    return (Shutter._make(array[n, ...] for array in state) for n in range(len(state.now)))
 
 
 def shutter_open(start: float, stop: float, period: float, exposure: float) -> Iterator[tuple[float, float, bool]]:
