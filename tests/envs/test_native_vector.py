@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -10,6 +12,7 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 
+from spikecam_env.bench.environments import bench_environments
 from spikecam_env.envs.observations import OBSERVATIONS
 from spikecam_env.envs.registration import ENVIRONMENTS, register
 from spikecam_env.envs.rotating_disk import RotatingDiskEnv
@@ -133,3 +136,19 @@ def test_bad_calls_are_named() -> None:
     env.close()
     with pytest.raises(NotReadyError, match="closed"):
         env.reset(seed=0)
+
+
+def test_the_page_about_observations_runs() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "observations.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    assert len(blocks) == 1
+    exec(compile(blocks[0], "docs/observations.md", "exec"), {})
+
+
+def test_the_bench_has_a_row_for_each_way() -> None:
+    rows = bench_environments(counts=(1, 2), observations=("tfp",), seconds=0.01)
+    assert [(row["how"], row["environments"]) for row in rows] == [
+        ("single", 1),
+        *((how, count) for count in (1, 2) for how in ("sync", "async", "native")),
+    ]
+    assert all(row["steps/s"] > 0 for row in rows) and rows[0]["x single"] == 1.0
