@@ -61,9 +61,14 @@ class Chain:
 
     def push(self, chunk: NDArray[np.uint8]) -> Iterator[tuple[int, Rates]]:
         """(K, H, W) more frames -> the passes they complete: first frame, and rates (count, H, W)."""
+        return map(self._passed, self.windows(chunk))
+
+    def windows(self, chunk: NDArray[np.uint8]) -> Iterator[Window]:
+        """`push` for a caller that runs the network: the passes that (K, H, W) more frames complete.  Each is to go
+        through `passed` before the next is asked for."""
         skip = min(self._first - self._skipped, len(chunk))
         self._skipped += skip
-        return map(self._passed, self._window.push(chunk[skip:]))
+        return self._window.push(chunk[skip:])
 
     def end(self) -> Iterator[tuple[int, Rates]]:
         """The stream is over -> the passes that are left."""
@@ -85,11 +90,26 @@ class Chain:
         self._held, self._carried = copy.deepcopy(state["held"]), copy.deepcopy(tuple(state["carried"]))
         self._skipped = int(state["skipped"])
 
-    def _passed(self, window: Window) -> tuple[int, Rates]:
-        if window.start % self._stride == 0 or self._held is None:
-            self._held, self._carried = infer.rates(self._network, window, self._type, self._carried)
+    @property
+    def carried(self) -> infer.Carried:
+        """What the last pass left for the next."""
+        return self._carried
+
+    def wants(self, window: Window) -> bool:
+        """Whether the network is to be run for this window, or its last plane held."""
+        return window.start % self._stride == 0 or self._held is None
+
+    def passed(self, window: Window, found: tuple[Rates, infer.Carried] | None) -> tuple[int, Rates]:
+        """The first frame of a pass, and its rates; found: what the network gave, None where it was not run."""
+        if found is not None:
+            self._held, self._carried = found
+        assert self._held is not None
         self._window.learn(window, self._held)
         return self._first + window.start, self._held
+
+    def _passed(self, window: Window) -> tuple[int, Rates]:
+        wanted = self.wants(window)
+        return self.passed(window, infer.rates(self._network, window, self._type, self._carried) if wanted else None)
 
 
 class Crossfade:

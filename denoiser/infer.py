@@ -1,8 +1,9 @@
-"""One pass of a network over one window."""
+"""One pass of a network over one window, or over windows of many streams at once."""
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import numpy as np
 import torch
@@ -34,20 +35,37 @@ def rates(
     network: nn.Module, window: Window, number_type: torch.dtype, carried: Carried = ()
 ) -> tuple[NDArray[np.float32], Carried]:
     """Rates (count, H, W) float32 of the frames that the window covers, in [0, 1] [spikes/frame]; what is carried."""
-    return where_torch_can(lambda: _rates(network, window, number_type, carried))
+    return rates_of_many(network, [window], number_type, [carried])[0]
+
+
+def rates_of_many(
+    network: nn.Module, windows: Sequence[Window], number_type: torch.dtype, carried: Sequence[Carried]
+) -> list[tuple[NDArray[np.float32], Carried]]:
+    """`rates` of windows of one size, of as many streams, in one pass of the network."""
+    return where_torch_can(lambda: _rates(network, windows, number_type, carried))
 
 
 def _rates(
-    network: nn.Module, window: Window, number_type: torch.dtype, carried: Carried
-) -> tuple[NDArray[np.float32], Carried]:
+    network: nn.Module, windows: Sequence[Window], number_type: torch.dtype, carried: Sequence[Carried]
+) -> list[tuple[NDArray[np.float32], Carried]]:
     layout, device = torch.channels_last, next(network.parameters()).device
-    spikes = torch.from_numpy(np.ascontiguousarray(window.spikes))[None].to(device, number_type)
-    planes = torch.from_numpy(window.planes)[None].to(device)
-    before = tuple(torch.from_numpy(array)[None].to(device) for array in carried) or None
+    spikes = torch.from_numpy(np.stack([w.spikes for w in windows])).to(device, number_type)
+    planes = torch.from_numpy(np.stack([w.planes for w in windows])).to(device)
+    before = tuple(torch.from_numpy(array).to(device) for array in _stacked(carried)) or None
     with torch.inference_mode(), torch.autocast(device.type, number_type, enabled=number_type != torch.float32):
         rate, kept = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout), before)
-    whole = np.ascontiguousarray(rate[0, : window.count].float().clamp(0.0, 1.0).cpu().numpy())
-    return whole, tuple(np.ascontiguousarray(k[0].float().cpu().numpy()) for k in kept or ())
+    whole = rate.float().clamp(0.0, 1.0).cpu().numpy()
+    left = [k.float().cpu().numpy() for k in kept or ()]
+    return [
+        (np.ascontiguousarray(whole[i, : w.count]), tuple(np.ascontiguousarray(k[i]) for k in left))
+        for i, w in enumerate(windows)
+    ]
+
+
+def _stacked(carried: Sequence[Carried]) -> Carried:
+    """What each stream carries, (N, n, h, w); zeros, which is what a network begins with, where one carries nothing."""
+    some = next((c for c in carried if c), ())
+    return tuple(np.stack([c[i] if c else np.zeros_like(like) for c in carried]) for i, like in enumerate(some))
 
 
 def number_type(precision: str) -> torch.dtype:

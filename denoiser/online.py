@@ -25,7 +25,7 @@ from denoiser.chain import Chain, Crossfade, Rates
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
 from denoiser.weights import digest, load_weights, pretrained_path
-from denoiser.window import check_like
+from denoiser.window import Window, check_like
 from spikecam_env.calibration import Calibration
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.sensor.sensor import checked_count
@@ -111,6 +111,11 @@ class OnlineDnSS:
         return other
 
     @property
+    def overlap(self) -> bool:
+        """Whether two chains of passes overlap."""
+        return self._overlap
+
+    @property
     def latency(self) -> int:
         """Frames between a frame's going in and its coming out, at most."""
         return self._recipe.layout.latency
@@ -180,12 +185,20 @@ class OnlineDnSS:
         self._chains, self._mixing = other._chains, other._mixing
         self._decoding, self._ended = other._decoding, other._ended
 
-    def _begin(self, shape: tuple[int, int]) -> None:
+    def chain(self, shape: tuple[int, int], first: int = 0) -> Chain:
+        """Passes of this network over another stream, from its frame `first` on: for those who denoise many."""
         if self._unit is not None and self._unit.gain.shape != shape:
             raise InputError(f"the calibration map has shape {self._unit.gain.shape}, the stream's frames {shape}")
-        options: dict[str, Any] = {"unit": self._unit, "stride": self._stride}
+        options: dict[str, Any] = {"unit": self._unit, "stride": self._stride, "first": first}
+        return Chain(self._recipe, self._network, self._type, shape, **options)
+
+    def passes(self, windows: list[Window], carried: list[infer.Carried]) -> list[tuple[Rates, infer.Carried]]:
+        """Rates of the windows of as many streams, and what each leaves, in one pass of the network."""
+        return infer.rates_of_many(self._network, windows, self._type, carried)
+
+    def _begin(self, shape: tuple[int, int]) -> None:
         firsts = (0, self._recipe.layout.planes // 2) if self._overlap else (0,)
-        self._chains = [Chain(self._recipe, self._network, self._type, shape, first=n, **options) for n in firsts]
+        self._chains = [self.chain(shape, first) for first in firsts]
         self._mixing = Crossfade(self._recipe.layout.planes, shape) if self._overlap else None
         self._decoding = _DECODERS[self._decoder].start(shape)
 

@@ -15,6 +15,7 @@ from denoiser.recipe import RECIPES
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
 OUTPUTS = ("spikes", "rate")
+WARM_UPS = ("black", "noisy")
 
 
 class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
@@ -23,25 +24,36 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
     mode: "best", "paper", the path of a checkpoint (.pt), or an `OnlineDnSS` of your own, of which the wrapper takes
     another one: the same weights, stride and precision, a stream of its own.
     output: "spikes" (same space) or "rate" (float32 in [0, 1]).
-    The first `denoiser_latency` frames of an episode are zero; `info["denoiser_latency"]` says how late the block is.
+    warm_up: what the first `denoiser_latency` frames of an episode show, which nothing was denoised for: "black", or
+        "noisy", the first block: its frames over again, or their mean rate.
+    Info: denoiser_latency, how late the block is; denoised_frames, how many of its frames, the last ones, are denoised.
     Errors: InputError for packed or other observations, an unknown mode or output, and an unusable checkpoint;
     NotReadyError for a step before the first reset or after `close`.
     """
 
     def __init__(
-        self, env: gymnasium.Env, mode: str | os.PathLike[str] | OnlineDnSS = "best", output: str = "spikes"
+        self,
+        env: gymnasium.Env,
+        mode: str | os.PathLike[str] | OnlineDnSS = "best",
+        output: str = "spikes",
+        *,
+        warm_up: str = "black",
     ) -> None:
-        gymnasium.utils.RecordConstructorArgs.__init__(self, mode=mode, output=output)
+        gymnasium.utils.RecordConstructorArgs.__init__(self, mode=mode, output=output, warm_up=warm_up)
         super().__init__(env)
         space = env.observation_space
         if not isinstance(output, str) or output not in OUTPUTS:
             raise unknown_name("output", output, OUTPUTS)
+        if not isinstance(warm_up, str) or warm_up not in WARM_UPS:
+            raise unknown_name("warm_up", warm_up, WARM_UPS)
         if space.shape is None or len(space.shape) != 3:
             raise InputError(
                 f"observations are {space}; the denoiser needs unpacked spike blocks (frames, rows, columns)"
             )
         self._denoiser: OnlineDnSS | None = _denoiser(mode, output)
         self._type = space.dtype if output == "spikes" else np.dtype(np.float32)
+        self._warm_up = warm_up
+        self._undone = 0  # frames that are due and not denoised
         self._due: NDArray[Any] | None = None  # frames that are denoised and not seen yet; None before the first reset
         if output == "rate":
             self.observation_space = gymnasium.spaces.Box(0.0, 1.0, space.shape, np.float32)
@@ -51,14 +63,16 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         denoiser = self._open()
         observation, info = self.env.reset(seed=seed, options=options)
         denoiser.reset()
-        self._due = np.zeros((denoiser.latency, *observation.shape[1:]), self._type)
-        return self._late(observation), self._with_latency(info)
+        self._due = self._first_frames(observation, denoiser.latency)
+        self._undone = denoiser.latency
+        return self._late(observation), self._with_latency(info, len(observation))
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Step the environment and denoise what it saw."""
         self._open()
         observation, reward, terminated, truncated, info = self.env.step(action)
-        return self._late(observation), reward, terminated, truncated, self._with_latency(info)
+        late = self._late(observation)
+        return late, reward, terminated, truncated, self._with_latency(info, len(late))
 
     def close(self) -> None:
         """Close the environment, and give back the denoiser; may be called again."""
@@ -73,8 +87,18 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         self._due = due[len(block) :]
         return due[: len(block)].copy()
 
-    def _with_latency(self, info: dict[str, Any]) -> dict[str, Any]:
-        return {**info, "denoiser_latency": self._open().latency}
+    def _first_frames(self, block: NDArray[Any], count: int) -> NDArray[Any]:
+        """(count, H, W) what is shown of frames before any is denoised."""
+        if self._warm_up == "black":
+            return np.zeros((count, *block.shape[1:]), self._type)
+        if self._type == np.float32:
+            return np.repeat(block.mean(axis=0, dtype=np.float32)[None], count, axis=0)
+        return block[np.arange(count) % len(block)].astype(self._type)
+
+    def _with_latency(self, info: dict[str, Any], frames: int) -> dict[str, Any]:
+        undone = min(self._undone, frames)
+        self._undone -= undone
+        return {**info, "denoiser_latency": self._open().latency, "denoised_frames": frames - undone}
 
     def _open(self) -> OnlineDnSS:
         if self._denoiser is None:

@@ -35,7 +35,13 @@ def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = No
     mean = float(np.mean([(metered or scene).truth(frame).radiance.mean() for frame in METERED_FRAMES]))
     if not mean > 0:
         raise InputError("the scene has no light to expose; give it a lamp, an emission or a background")
-    gain = 1.0 / (mean_interval * mean)
+    return lit(scene, 1.0 / (mean_interval * mean))
+
+
+def lit(scene: Scene, gain: float) -> Scene:
+    """The scene with `gain` times its light."""
+    if gain == 1.0:
+        return scene
     return scene.lit(gain) if isinstance(scene, Dimmable) else Exposed(scene, gain)
 
 

@@ -12,22 +12,24 @@ import tyro
 
 @dataclass
 class Bench:
-    """Measure speed on this machine: the sensor's engines, effects, the online denoiser, scenes, renderers, datasets.
+    """Measure speed on this machine: sensor engines, effects, the online denoiser, environments, scenes, datasets.
 
     example:  spikecam bench sensor
     """
 
-    what: tyro.conf.Positional[Literal["sensor", "effects", "online", "scenes", "renderers", "dataset"]]
+    what: tyro.conf.Positional[Literal["sensor", "effects", "online", "env", "scenes", "renderers", "dataset"]]
     """sensor: pixel-steps a second of numpy, reference and fast.  effects: what each costs, over the base model.
-    online: denoised frames a second.  scenes: frames of light a second, how far they are from the truth, renderers,
-    scene to spikes, and whether the flow is right (some minutes).  renderers: how fast and how exact each back-end of
-    this machine is.  dataset: frames a second into files."""
+    online: denoised frames a second.  env: steps a second of 1, 16 and 64 environments, one way and another.
+    scenes: frames of light a second, how far they are from the truth, renderers, scene to spikes, and whether the flow
+    is right (some minutes).  renderers: how fast and how exact each back-end of this machine is.  dataset: frames a
+    second into files."""
     out: Path | None = None
     """Where to write the figures as JSON."""
 
     def run(self) -> None:
         from spikecam_env.bench.dataset import bench_dataset
         from spikecam_env.bench.effects import bench_effects
+        from spikecam_env.bench.environments import bench_environments
         from spikecam_env.bench.machine import machine
         from spikecam_env.bench.online import bench_online
         from spikecam_env.bench.renderers import bench_renderers
@@ -44,6 +46,7 @@ class Bench:
             "sensor": bench_sensor,
             "effects": bench_effects,
             "online": bench_online,
+            "env": bench_environments,
             "scenes": bench_scenes,
             "renderers": bench_renderers,
             "dataset": bench_dataset,

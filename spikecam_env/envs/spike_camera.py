@@ -11,11 +11,14 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.protocol import Gaze, Scene
+from scenes.exposure import lit
+from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
-from spikecam_env.errors import InputError, NotReadyError, unknown_name
+from spikecam_env.checked import checked_number
+from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
+from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.sensor import SensorModel, SpikeSensor
-from spikecam_env.streams.packing import check_shape, pack_frames, packed_bytes
+from spikecam_env.streams.packing import check_shape
 
 MakeScene = Callable[[np.random.Generator, dict[str, Any]], Scene]
 """(generator, options of reset) -> the scene of one episode."""
@@ -27,18 +30,21 @@ RENDER_FRAMES = 40
 """Frames a rendered picture counts spikes over, at least."""
 
 
-class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
+class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     """Each step exposes `frames_per_step` spike frames while the camera turns at the rate the action gives.
 
-    Observation   the step's frames: (K, H, W) int8 of 0 and 1 (`MultiBinary`), or with `packed` the bits as
-                  (K, ceil(H W / 8)) uint8, as `streams.unpack_frames` reads them.  A fresh array each step.
+    Observation   what `obs` names; a fresh array each step.  By default the step's frames, (K, H, W) int8 of 0 and 1
+                  (`MultiBinary`).  With `obs_state` a Dict: picture, gaze, age (`observations.with_state_space`).
     Action        (2,) float32, gaze rate (pan, tilt) in [-1, 1] of `max_gaze_rate_px_s`; pan is to the right,
                   tilt is down.  Values beyond are cut, as a motor saturates.
     Reward, end   from `judge`.
     Reset         draws the scene and the camera's unit (fixed pattern, phases, noise) from `np_random`, then
                   exposes the first K frames with the camera at rest.  Same seed, same actions: same bits.
-    Info          time_s, frame (end of the block), gaze (2,) float64 [pixels] there; with `ground_truth` also
-                  radiance, flow, object_id at the centre of the block and poses, see `scenes.protocol.Truth`.
+                  Options for this episode: `model` (as below, of the same frame rate), `light`, a factor on the
+                  scene's light; the others are the scene's.
+    Info          time_s, frame (end of the block), gaze (2,) float64 [pixels] there, age [frames] of the picture
+                  (-1: none is valid yet); with `ground_truth` also radiance, flow, object_id at the centre of the
+                  block and poses, see `scenes.protocol.Truth`.
     Render        `rgb_array`: the share of frames with a spike, over the last blocks of RENDER_FRAMES or more;
                   white is a spike every frame, gamma 2.2.
 
@@ -48,9 +54,11 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
     model                a preset's name, a TOML path or a SensorModel
     frames_per_step      K: the control rate is frame rate / K
     max_gaze_rate_px_s   default 4 of the shorter side a second
-    engine               of the sensor: "auto", "fast" or "reference"
+    obs                  a name of `observations.OBSERVATIONS` or an `Observation`; packed=True is obs="packed"
+    engine, threads      of the sensor: "auto", "fast" or "reference"; as `SpikeSensor` has them
 
-    `sensor` and `scene` are open to look at: `env.unwrapped.sensor.clean_twin()`, `env.unwrapped.scene.truth(...)`.
+    `sensor`, `scene` and `blocks` are open to look at: `env.unwrapped.sensor.clean_twin()`,
+    `env.unwrapped.scene.truth(...)`, `env.unwrapped.blocks.spikes`.
 
     Errors: InputError for a value out of range or unknown, by name; NotReadyError before the first reset and
     after `close`.
@@ -67,9 +75,12 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         model: SensorModel | str | PathLike[str] = "scsim",
         frames_per_step: int = 40,
         packed: bool = False,
+        obs: str | Observation = "multibinary",
+        obs_state: bool = False,
         ground_truth: bool = False,
         max_gaze_rate_px_s: float | None = None,
         engine: str = "auto",
+        threads: int | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.shape = check_shape(shape)
@@ -80,39 +91,48 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         self.max_gaze_rate_px_s = 4.0 * min(self.shape) if max_gaze_rate_px_s is None else max_gaze_rate_px_s
         if not 0 < self.max_gaze_rate_px_s < np.inf:
             raise InputError(f"max_gaze_rate_px_s is {max_gaze_rate_px_s}; it must be positive and finite")
-        self.model = model if isinstance(model, SensorModel) else SensorModel.load(model)
-        self.frames_per_step, self.packed, self.ground_truth = int(frames_per_step), packed, ground_truth
+        self.model = _loaded(model)
+        self.frames_per_step, self.ground_truth = int(frames_per_step), ground_truth
+        self.observation, self.obs_state = _observation(obs, packed), obs_state
         self.render_mode = render_mode
         self._make_scene, self._judge = make_scene, judge
-        self._sensor: SpikeSensor | None = SpikeSensor(self.model, self.shape, seed=0, engine=engine)
+        self._engine, self._threads = engine, threads
+        self._sensor: SpikeSensor | None = self._unit_of(self.model, seed=0)
         self._scene: Scene | None = None
+        self._drawn: Any = None  # the scene as it was drawn: in its own light, and with all that its task knows of it
+        self._seen: Any = None
+        self._blocks: Blocks | None = None
         self._position = (0.0, 0.0)
         self._recent: list[NDArray[np.uint8]] = []
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self.observation_space = _observation_space(self.shape, self.frames_per_step, packed)
+        picture = self.observation.space(self.view)
+        self.observation_space: spaces.Space[Any] = with_state_space(picture) if obs_state else picture
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """A new episode; `options` go to `make_scene`."""
-        sensor = self.sensor
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """A new episode; `options` but for `model` and `light` go to `make_scene`."""
+        self._open()
+        given = dict(options or {})
+        model = self._checked_model(given.pop("model", self.model))
+        light = checked_number(given.pop("light", 1.0), "light", 0.0, MOST_LIGHT, above=True)
         super().reset(seed=seed)
         begin_to_use(self)
-        self._scene = self._checked(self._make_scene(self.np_random, dict(options or {})))
-        sensor.reset(seed=int(self.np_random.integers(2**31)))
+        self._drawn = self._checked(self._make_scene(self.np_random, given))
+        self._scene = lit(self._drawn, light)
+        self._load(model, int(self.np_random.integers(2**31)))
+        self._seen = self.observation.start(self.view, 1)
         self._position = (0.0, 0.0)
         self._recent = []
         observation, info, _ = self._expose((0.0, 0.0))
         return observation, info
 
-    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Turn the camera at the action's rate for K frames.  Never truncates: that is `TimeLimit`'s."""
         rate = np.asarray(action, np.float64)
         if rate.shape != (2,) or not np.isfinite(rate).all():
             raise InputError(f"action is {action!r}; it must be two finite numbers in [-1, 1], (pan, tilt)")
         pan, tilt = np.clip(rate, -1.0, 1.0) * (self.max_gaze_rate_px_s / self.model.frame_rate_hz)
         observation, info, gaze = self._expose((float(pan), float(tilt)))
-        reward, terminated = self._judge(self.scene, self.sensor.frame, gaze)
+        reward, terminated = self._judge(self._drawn, self.sensor.frame, gaze)
         return observation, float(reward), bool(terminated), False, info
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
@@ -131,16 +151,26 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
 
         May be called again; anything else after it raises NotReadyError.
         """
-        self._sensor = self._scene = None
+        self._sensor = self._scene = self._drawn = self._seen = self._blocks = None
         self._recent = []
         done_with(self)
 
     @property
+    def view(self) -> View:
+        """What observations know of the camera."""
+        return View(self.shape, self.frames_per_step, self.model.frame_rate_hz)
+
+    @property
     def sensor(self) -> SpikeSensor:
         """The camera; NotReadyError after `close`."""
-        if self._sensor is None:
+        return self._open()
+
+    @property
+    def blocks(self) -> Blocks:
+        """What the camera exposed last, a batch of one; NotReadyError before the first reset and after `close`."""
+        if self._blocks is None:
             raise self._not_ready()
-        return self._sensor
+        return self._blocks
 
     @property
     def scene(self) -> Scene:
@@ -149,24 +179,45 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
             raise self._not_ready()
         return self._scene
 
+    def _open(self) -> SpikeSensor:
+        if self._sensor is None:
+            raise self._not_ready()
+        return self._sensor
+
+    def _load(self, model: SensorModel, seed: int) -> None:
+        """Another unit, of this model, at frame 0."""
+        if model == self.sensor.model:
+            self.sensor.reset(seed=seed)
+        else:
+            self._sensor = self._unit_of(model, seed)
+
+    def _unit_of(self, model: SensorModel, seed: int) -> SpikeSensor:
+        return SpikeSensor(model, self.shape, seed, self._engine, threads=self._threads)
+
     def _not_ready(self) -> NotReadyError:
         if self._sensor is None:
             return NotReadyError("the environment is closed; make a new one")
         return NotReadyError("the environment has no scene yet; call reset first")
 
-    def _expose(self, rate: tuple[float, float]) -> tuple[NDArray[Any], dict[str, Any], Gaze]:
+    def _expose(self, rate: tuple[float, float]) -> tuple[Any, dict[str, Any], Gaze]:
         """The next K frames while the gaze moves at `rate` [pixels/frame]: (observation, info, the gaze's path)."""
         scene = self.scene
         first, stop = self.sensor.frame, self.sensor.frame + self.frames_per_step
         pan, tilt = self._position
         self._position = pan + rate[0] * self.frames_per_step, tilt + rate[1] * self.frames_per_step
         gaze = Gaze((pan, tilt), self._position, (first, stop))
-        spikes = self.sensor.step(scene.radiance(first, stop, gaze), frames=self.frames_per_step)
+        light = scene.radiance(first, stop, gaze)
+        spikes = self.sensor.step(light, frames=self.frames_per_step)
+        self._blocks = Blocks(spikes[None], (light,), self.model.frame_rate_hz)
         if self.render_mode is not None:
             blocks = -(-RENDER_FRAMES // self.frames_per_step)
             self._recent = [*self._recent, spikes.copy()][-blocks:]
-        observation = pack_frames(spikes) if self.packed else spikes.view(np.int8)
-        return observation, self._info(scene, gaze), gaze
+        picture, self._seen = self.observation.step(self._blocks, self._seen)
+        age = np.broadcast_to(self.observation.age(self._seen), (1,))
+        info = self._info(self._drawn, gaze) | {"age": float(age[0])}
+        if not self.obs_state:
+            return picture[0], info, gaze
+        return {name: array[0] for name, array in with_state(picture, gaze.stop, age).items()}, info, gaze
 
     def _info(self, scene: Scene, gaze: Gaze) -> dict[str, Any]:
         first, stop = gaze.frames
@@ -176,10 +227,20 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
             "gaze": np.array(gaze.stop),
         }
         if self.ground_truth:
-            truth = scene.truth((first + stop) / 2, gaze)
+            truth = self.scene.truth((first + stop) / 2, gaze)
             info |= {"radiance": truth.radiance, "flow": truth.flow, "object_id": truth.object_id}
             info["poses"] = {name: np.array(pose) for name, pose in truth.poses.items()}
         return info
+
+    def _checked_model(self, model: SensorModel | str | PathLike[str]) -> SensorModel:
+        """The model of an episode; raises InputError where scenes of this environment are not of its frame rate."""
+        loaded = _loaded(model)
+        if loaded.frame_rate_hz != self.model.frame_rate_hz:
+            raise InputError(
+                f"model {loaded.name!r} has {loaded.frame_rate_hz} frames a second, the environment "
+                f"{self.model.frame_rate_hz}; make the environment with a model of that rate"
+            )
+        return loaded
 
     def _checked(self, scene: Scene) -> Scene:
         rate = self.model.frame_rate_hz
@@ -190,7 +251,11 @@ class SpikeCameraEnv(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         return scene
 
 
-def _observation_space(shape: tuple[int, int], frames: int, packed: bool) -> spaces.MultiBinary | spaces.Box:
-    if packed:
-        return spaces.Box(0, 255, (frames, packed_bytes(shape)), np.uint8)
-    return spaces.MultiBinary((frames, *shape))
+def _observation(obs: str | Observation, packed: bool) -> Observation:
+    if packed and obs not in ("multibinary", "packed"):
+        raise InputError(f"packed is True and obs is {shown(obs)}; give one of the two")
+    return observation("packed" if packed else obs)
+
+
+def _loaded(model: SensorModel | str | PathLike[str]) -> SensorModel:
+    return model if isinstance(model, SensorModel) else SensorModel.load(model)

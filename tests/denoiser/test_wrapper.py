@@ -68,8 +68,8 @@ def test_reset_forgets_the_last_episode():
 
 def test_info_says_how_late_the_block_is():
     env = DenoiseObservation(Noise(), denoiser("spikes"))
-    assert env.reset(seed=0)[1] == {"time_s": 0.0, "denoiser_latency": 31}
-    assert env.step(0)[4] == {"denoiser_latency": 31}
+    assert env.reset(seed=0)[1] == {"time_s": 0.0, "denoiser_latency": 31, "denoised_frames": 0}
+    assert env.step(0)[4] == {"denoiser_latency": 31, "denoised_frames": 0}
 
 
 def test_packed_observations_are_refused():
@@ -141,3 +141,21 @@ def test_a_step_before_reset_or_after_close_is_refused():
     for use in (lambda: env.step(0), env.reset):
         with pytest.raises(NotReadyError, match="closed; make a new one"):
             use()
+
+
+@pytest.mark.parametrize("output", ["spikes", "rate"])
+def test_the_first_frames_are_marked_and_may_be_noisy_in_place_of_black(output):
+    black, noisy = (DenoiseObservation(Noise(), denoiser(output), output, warm_up=w) for w in ("black", "noisy"))
+    (first, info), (grey, _) = black.reset(seed=3), noisy.reset(seed=3)
+    marked = [info["denoised_frames"]]
+    raw = noisy.unwrapped.sent[0]
+    assert not first.any()
+    np.testing.assert_allclose(grey, raw if output == "spikes" else np.broadcast_to(raw.mean(axis=0), grey.shape))
+    for _ in range(8):
+        (block, *_, info), (other, *_) = black.step(0), noisy.step(0)
+        marked.append(info["denoised_frames"])
+        done = slice(K - info["denoised_frames"], None)
+        np.testing.assert_array_equal(block[done], other[done])
+    assert sum(marked) == 9 * K - info["denoiser_latency"] and marked[-1] == K
+    with pytest.raises(InputError, match="unknown warm_up 'grey'"):
+        DenoiseObservation(Noise(), denoiser(output), warm_up="grey")

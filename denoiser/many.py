@@ -1,0 +1,80 @@
+"""The denoiser of many streams at once: every pass of the network is one call for all streams that have one due.
+
+    windows of N streams -> one batch through the network -> rates of each
+
+Each stream has its own window, memory and length: one can begin anew while the others go on.  The rates are those of N
+`OnlineDnSS`, to the rounding of sums, which a batch may take in another order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denoiser import infer
+from denoiser.chain import Chain, Rates
+from denoiser.online import OnlineDnSS
+from denoiser.window import Window
+from spikecam_env.checked import checked_count, checked_shape
+from spikecam_env.errors import InputError
+
+
+class ManyDnSS:
+    """Denoisers like a given one, of as many streams of frames of one shape; output is the rate.
+
+    like: recipe, weights, stride, precision and unit; its own stream is not touched.
+    Raises InputError for a denoiser with `overlap`, and for spikes of another size.
+    """
+
+    def __init__(self, like: OnlineDnSS, streams: int, shape: tuple[int, int]) -> None:
+        if like.overlap:
+            raise InputError("overlap is True; many streams are denoised by one chain of passes each, leave it False")
+        self._like, self.shape = like, checked_shape(shape)
+        self._chains = [self._chain() for _ in range(checked_count(streams, "streams"))]
+
+    def __len__(self) -> int:
+        return len(self._chains)
+
+    @property
+    def latency(self) -> int:
+        """Frames between a frame's going in and its coming out, at most."""
+        return self._like.latency
+
+    def restart(self, which: NDArray[np.bool_]) -> None:
+        """Forget these streams (N,): others begin in their place."""
+        for stream in np.flatnonzero(which):
+            self._chains[stream] = self._chain()
+
+    def push(self, spikes: NDArray[np.uint8]) -> list[Rates]:
+        """(N, K, H, W) more frames of every stream -> N times the frames (F, H, W) they complete; F may be 0."""
+        if spikes.ndim != 4 or spikes.shape[0] != len(self) or spikes.shape[2:] != self.shape:
+            raise InputError(f"spikes are {spikes.shape}; they must be ({len(self)}, frames, *{self.shape})")
+        due = [chain.windows(chunk) for chain, chunk in zip(self._chains, spikes, strict=True)]
+        done: list[list[Rates]] = [[np.empty((0, *self.shape), np.float32)] for _ in self._chains]
+        for windows in _rounds(due):
+            for stream, rates in self._passed(windows):
+                done[stream].append(rates)
+        return [np.concatenate(rates) for rates in done]
+
+    def _passed(self, windows: dict[int, Window]) -> Iterator[tuple[int, Rates]]:
+        """The rates of one window of each of these streams."""
+        wanted = {n: window for n, window in windows.items() if self._chains[n].wants(window)}
+        carried = [self._chains[n].carried for n in wanted]
+        found = self._like.passes(list(wanted.values()), carried) if wanted else []
+        results: dict[int, tuple[Rates, infer.Carried]] = dict(zip(wanted, found, strict=True))
+        for stream, window in windows.items():
+            yield stream, self._chains[stream].passed(window, results.get(stream))[1]
+
+    def _chain(self) -> Chain:
+        return self._like.chain(self.shape)
+
+
+def _rounds(due: list[Iterator[Window]]) -> Iterator[dict[int, Window]]:
+    """The next window of every stream that has one, until none has."""
+    while True:
+        windows = {n: window for n, stream in enumerate(due) if (window := next(stream, None)) is not None}
+        if not windows:
+            return
+        yield windows

@@ -1,0 +1,90 @@
+"""The denoised picture as an observation: the newest rate plane that the denoiser has finished.
+
+    picture = 255 * rate          [spikes/frame], of a frame that is `age` frames old (`best`: 17 to 32)
+
+Before the first plane is finished agents see the noisy rate of all frames so far (TFP), and the age is -1.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from denoiser.many import ManyDnSS
+from denoiser.online import OnlineDnSS
+from denoiser.recipe import RECIPES
+from spikecam_env.envs.observations.protocol import Blocks, Observation, Streams, View, grey, picture_space
+
+
+@dataclass(frozen=True)
+class Rate(Observation):
+    """(1, H, W) uint8: 255 where the denoised rate is a spike a frame.
+
+    mode: "best", "paper", or the path of a checkpoint (.pt).
+    Raises InputError, when an episode begins, for another mode and for an unusable checkpoint.
+    """
+
+    mode: str | os.PathLike[str] = "best"
+
+    def space(self, view: View) -> spaces.Box:
+        return picture_space(view)
+
+    def start(self, view: View, streams: int) -> Denoising:
+        return Denoising(ManyDnSS(_denoiser(self.mode), streams, view.shape))
+
+    def step(self, blocks: Blocks, state: Denoising) -> tuple[NDArray[np.uint8], Denoising]:
+        return state.seen(blocks.spikes.view(np.uint8)), state
+
+    def age(self, state: Denoising) -> NDArray[np.float64]:
+        return np.where(state.finished > 0, state.pushed - state.finished, -1.0)
+
+
+class Denoising:
+    """Streams mid-way.  pushed, finished: (N,) frames that went in and that came out.
+
+    Memory of the denoiser is large, so it is changed in place: a step cannot be taken again from the state before.
+    """
+
+    def __init__(self, denoiser: ManyDnSS) -> None:
+        streams, shape = len(denoiser), denoiser.shape
+        self._denoiser = denoiser
+        self._fired = np.zeros((streams, *shape), np.int64)
+        self._picture = np.zeros((streams, 1, *shape), np.uint8)
+        self.pushed = np.zeros(streams, np.int64)
+        self.finished = np.zeros(streams, np.int64)
+
+    def restarted(self, which: Streams) -> Denoising:
+        """This, with these streams before their first frame."""
+        self._denoiser.restart(which)
+        for array in (self._fired, self._picture, self.pushed, self.finished):
+            array[which] = 0
+        return self
+
+    def seen(self, spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """(N, K, H, W) more frames -> (N, 1, H, W) what is seen after them."""
+        self.pushed += spikes.shape[1]
+        self._fired += spikes.sum(axis=1, dtype=np.int64)
+        for stream, rates in enumerate(self._denoiser.push(spikes)):
+            self.finished[stream] += len(rates)
+            if len(rates):
+                self._picture[stream, 0] = grey(rates[-1])
+        noisy = grey(self._fired / np.maximum(self.pushed, 1)[:, None, None])[:, None]
+        return np.where((self.finished > 0)[:, None, None, None], self._picture, noisy)
+
+
+def _denoiser(mode: Any) -> OnlineDnSS:
+    if isinstance(mode, str) and mode in RECIPES:
+        return _shipped(mode)
+    return OnlineDnSS.from_file(mode, output="rate")
+
+
+@lru_cache(maxsize=len(RECIPES))
+def _shipped(mode: str) -> OnlineDnSS:
+    """Read once a process: an episode begins in the time of a step."""
+    return OnlineDnSS.pretrained(mode, output="rate")

@@ -1,0 +1,63 @@
+"""Observations by name: what `obs=` of an environment may be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+
+from spikecam_env.envs.observations.blocks import Multibinary, Packed, Spikes
+from spikecam_env.envs.observations.frame_camera import FrameCamera
+from spikecam_env.envs.observations.intervals import ISI, TFI
+from spikecam_env.envs.observations.playback import TFP
+from spikecam_env.envs.observations.protocol import Blocks, Observation, View, restarted
+from spikecam_env.envs.observations.state import with_state, with_state_space
+from spikecam_env.errors import InputError, shown, unknown_name
+
+__all__ = [
+    "ISI",
+    "OBSERVATIONS",
+    "TFI",
+    "TFP",
+    "Blocks",
+    "FrameCamera",
+    "Multibinary",
+    "Observation",
+    "Packed",
+    "Spikes",
+    "View",
+    "observation",
+    "restarted",
+    "with_state",
+    "with_state_space",
+]
+
+
+def _denoised() -> Observation:
+    """Imported when first asked for: torch takes seconds, and the denoiser lies above the environments."""
+    law: Observation = import_module("denoiser.observation").Rate()
+    return law
+
+
+OBSERVATIONS: dict[str, Callable[[], Observation]] = {
+    "multibinary": Multibinary,
+    "spikes": Spikes,
+    "packed": Packed,
+    "tfp": TFP,
+    "tfi": TFI,
+    "isi": ISI,
+    "rate": _denoised,
+    "frame30": partial(FrameCamera, 30.0),
+    "frame1000": partial(FrameCamera, 1000.0),
+}
+
+
+def observation(obs: str | Observation) -> Observation:
+    """The observation of this name, or the one that was given; raises InputError for anything else."""
+    if isinstance(obs, Observation):
+        return obs
+    if not isinstance(obs, str):
+        raise InputError(f"obs = {shown(obs)}; give a name, {', '.join(OBSERVATIONS)}, or an Observation")
+    if obs not in OBSERVATIONS:
+        raise unknown_name("obs", obs, OBSERVATIONS)
+    return OBSERVATIONS[obs]()

@@ -1,0 +1,27 @@
+"""What agents may know besides the picture: where they look, and how old the picture is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from scenes.protocol import MOST_PLACE
+from spikecam_env.checked import LARGEST_COUNT
+
+
+def with_state_space(picture: spaces.Space[Any]) -> spaces.Dict:
+    """picture; gaze (2,) float32, (pan, tilt) [pixels] at the end of the step; age (1,) float32 [frames] since the
+    newest light in the picture was collected, -1 where there has been no valid picture."""
+    gaze = spaces.Box(-MOST_PLACE, MOST_PLACE, (2,), np.float32)
+    age = spaces.Box(-1.0, float(LARGEST_COUNT), (1,), np.float32)
+    return spaces.Dict({"picture": picture, "gaze": gaze, "age": age})
+
+
+def with_state(picture: NDArray[Any], gaze: ArrayLike, age: ArrayLike) -> dict[str, NDArray[Any]]:
+    """Of N streams: picture (N, ...), gaze (N, 2), age (N,) or a number."""
+    streams = len(picture)
+    ages = np.broadcast_to(np.asarray(age, np.float32), (streams,)).reshape(streams, 1)
+    return {"picture": picture, "gaze": np.asarray(gaze, np.float32).reshape(streams, 2), "age": ages.copy()}

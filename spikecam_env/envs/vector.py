@@ -1,0 +1,201 @@
+"""Many spike cameras stepped in one call.
+
+    env = gymnasium.make_vec("spikecam_env/RotatingDisk-v0", num_envs=64, vectorization_mode="vector_entry_point")
+
+The environments live in this process, each on one of a few threads for good (OpenGL's contexts belong to a thread);
+what agents see is computed for all streams at once.  The bits are those of as many single environments.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from copy import deepcopy
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+from gymnasium.envs.registration import load_env_creator
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from spikecam_env.checked import checked_count
+from spikecam_env.envs.observations import Blocks, Spikes, restarted, with_state
+from spikecam_env.envs.spike_camera import SpikeCameraEnv
+from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.threads import as_many
+
+T = TypeVar("T")
+Outcome = tuple[float, bool, bool, dict[str, Any]]
+"""(reward, terminated, truncated, info) of one environment."""
+
+
+class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
+    """N environments of one class; observation, action, info and options as of one, with a leading axis N.
+
+    Autoreset     NEXT_STEP: the step after the end of an episode begins the next one; its action is not used, its
+                  reward is 0.  As gymnasium's `SyncVectorEnv`, whose bits these are.
+    Seeds         `reset(seed=s)`: s, s + 1, ...; or a list of N.
+
+    single              makes one environment: a class or its entry point
+    num_envs            N
+    models              N models (presets, TOML paths, SensorModels), one an environment; default: all have `model`
+    max_episode_steps   after which an episode is truncated; None is never
+    workers             threads; default NUMBA_NUM_THREADS, N at most
+    options             all else, obs and obs_state too: as `single` has them
+
+    `envs` are the single environments, to look at; theirs is the block, what is made of it is made for all at once.
+    Errors: InputError as of `single`, for models that are not N, and actions of another shape; NotReadyError for a step
+    before the first reset, and for anything after `close`.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["rgb_array"],
+        "render_fps": 25,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        single: str | Callable[..., SpikeCameraEnv],
+        num_envs: int = 1,
+        *,
+        models: Sequence[Any] | None = None,
+        max_episode_steps: int | None = None,
+        workers: int | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        self.num_envs = checked_count(num_envs, "num_envs")
+        self.max_episode_steps = max_episode_steps
+        self.render_mode = render_mode
+        make: Any = load_env_creator(single) if isinstance(single, str) else single
+        options |= {"render_mode": render_mode, "threads": options.get("threads", 1)}
+        self.envs: list[SpikeCameraEnv] = [make(**{**options, **own}) for own in _own_models(models, self.num_envs)]
+        self._workers = [
+            ThreadPoolExecutor(1, thread_name_prefix=f"spikecam-envs-{n}")
+            for n in range(as_many(workers, self.num_envs))
+        ]
+        self._process = os.getpid()
+        one = self.envs[0]
+        self.observation, self.obs_state, self._view = one.observation, one.obs_state, one.view
+        self.single_observation_space, self.single_action_space = one.observation_space, one.action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        for env in self.envs:
+            env.observation, env.obs_state = Spikes(), False
+        self._seen: Any = None
+        self._spikes = np.empty((self.num_envs, self._view.frames_per_step, *self._view.shape), np.int8)
+        self._over = np.zeros(self.num_envs, bool)
+        self._steps = np.zeros(self.num_envs, int)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """New episodes everywhere; `options` are given to each."""
+        self._open()
+        seeds = _seeds(seed, self.num_envs)
+        begun = self._everywhere(lambda n: self._begin(n, seeds[n], options))
+        self._seen = self.observation.start(self._view, self.num_envs)
+        self._over[:] = False
+        seen, _, _, _, info = self._together(begun)
+        return seen, info
+
+    def step(
+        self, actions: ArrayLike
+    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Every environment a step further; where an episode was over, the first block of the next."""
+        self._open()
+        if self._seen is None:
+            raise NotReadyError("the environments have no scene yet; call reset first")
+        given = np.asarray(actions)
+        if given.shape[:1] != (self.num_envs,):
+            raise InputError(
+                f"actions have shape {given.shape}; they must be one an environment, ({self.num_envs}, ...)"
+            )
+        fresh = self._over.copy()
+        outcomes = self._everywhere(lambda n: self._begin(n) if fresh[n] else self._go_on(n, given[n]))
+        if fresh.any():
+            self._seen = restarted(self.observation, self._view, self._seen, fresh)
+        return self._together(outcomes)
+
+    def render(self) -> tuple[Any, ...] | None:
+        """N pictures (H, W, 3) uint8, or None without a render mode."""
+        return None if self.render_mode is None else tuple(env.render() for env in self.envs)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close every environment on its thread, and end the threads."""
+        if self._process != os.getpid():  # a fork has no threads, and what they hold is not its own
+            return
+        self._everywhere(lambda n: self.envs[n].close())
+        for worker in self._workers:
+            worker.shutdown()
+
+    def _begin(self, n: int, seed: int | None = None, options: dict[str, Any] | None = None) -> Outcome:
+        block, info = self.envs[n].reset(seed=seed, options=options)
+        self._spikes[n], self._steps[n] = block, 0
+        return 0.0, False, False, info
+
+    def _go_on(self, n: int, action: NDArray[Any]) -> Outcome:
+        block, reward, terminated, truncated, info = self.envs[n].step(action)
+        self._spikes[n] = block
+        self._steps[n] += 1
+        late = self.max_episode_steps is not None and self._steps[n] >= self.max_episode_steps
+        return reward, terminated, truncated or late, info
+
+    def _everywhere(self, work: Callable[[int], T]) -> list[T]:
+        """What `work` of every environment's number returns, done on its thread.  Raises what the first that fails
+        raises, when all are done.  Blocks go into memory of their own."""
+        count = len(self._workers)
+        self._spikes = np.empty_like(self._spikes)
+        shares: list[Future[list[T]]] = [
+            worker.submit(partial(_all, work, range(n, self.num_envs, count))) for n, worker in enumerate(self._workers)
+        ]
+        wait(shares)
+        done = [share.result() for share in shares]
+        return [done[n % count][n // count] for n in range(self.num_envs)]
+
+    def _together(
+        self, outcomes: list[Outcome]
+    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """The outcomes as gymnasium's vectors have them, and what is seen."""
+        rewards, terminated, truncated, infos = zip(*outcomes, strict=True)
+        light = [env.blocks.light[0] for env in self.envs]
+        blocks = Blocks(self._spikes, light, self._view.frame_rate_hz)
+        picture, self._seen = self.observation.step(blocks, self._seen)
+        age = np.broadcast_to(self.observation.age(self._seen), (self.num_envs,))
+        together: dict[str, Any] = {}
+        for n, info in enumerate(infos):
+            together = self._add_info(together, {**info, "age": float(age[n])}, n)
+        ends = np.array(terminated, bool), np.array(truncated, bool)
+        self._over = ends[0] | ends[1]
+        gaze = np.array([info["gaze"] for info in infos])
+        seen = with_state(picture, gaze, age) if self.obs_state else picture
+        return seen, np.array(rewards, np.float64), *ends, together
+
+    def _open(self) -> None:
+        if self.closed:
+            raise NotReadyError("the environments are closed; make new ones")
+
+
+def _all(work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
+    return [work(n) for n in numbers]
+
+
+def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+    if seed is None:
+        return [None] * count
+    seeds: list[int | None] = list(range(seed, seed + count)) if isinstance(seed, int) else list(seed)
+    if len(seeds) != count:
+        raise InputError(f"seed has {len(seeds)} numbers; it must be one an environment, {count}, or one for all")
+    return seeds
+
+
+def _own_models(models: Sequence[Any] | None, count: int) -> list[dict[str, Any]]:
+    if models is None:
+        return [{}] * count
+    if isinstance(models, str) or len(models) != count:
+        raise InputError(f"models are {len(models)}; they must be one an environment, {count}")
+    return [{"model": model} for model in deepcopy(list(models))]

@@ -1,0 +1,102 @@
+"""Spikes that an environment gives, shown to its agents as something else: any `Observation`, on any environment.
+
+    env = ObserveSpikes(gymnasium.make("spikecam_env/Fan-v0"), "tfp")
+    env = VectorObserveSpikes(gymnasium.make_vec("spikecam_env/Fan-v0", num_envs=8), TFP(window=80))
+
+The same law as the environments' own `obs=`, for observations that other wrappers have changed, such as denoised
+spikes, and for other people's environments.  The frame camera needs the light, which only a spike camera's environment
+knows; on vectors it is had by `obs=`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from spikecam_env.envs.observations import Blocks, Observation, View, observation, restarted
+from spikecam_env.envs.spike_camera import SpikeCameraEnv
+from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.sensor import Keyframes
+
+
+class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstructorArgs):
+    """Blocks of spikes (K, H, W) become what `obs` names.
+
+    Errors: InputError for an unknown observation and for an environment that gives no blocks of spikes; NotReadyError
+    for a step before the first reset.
+    """
+
+    def __init__(self, env: gymnasium.Env, obs: str | Observation) -> None:
+        gymnasium.utils.RecordConstructorArgs.__init__(self, obs=obs)
+        super().__init__(env)
+        self._law, self._view, self._state = observation(obs), viewed(env.observation_space, env), None
+        self.observation_space = self._law.space(self._view)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode, and with it another stream."""
+        self._state = self._law.start(self._view, 1)
+        return super().reset(seed=seed, options=options)
+
+    def observation(self, observation: NDArray[Any]) -> Any:
+        """What is seen of a block."""
+        if self._state is None:
+            raise NotReadyError("the environment has not begun; call reset first")
+        blocks = Blocks(observation[None], light_on(self.env), self._view.frame_rate_hz)
+        picture, self._state = self._law.step(blocks, self._state)
+        return picture[0]
+
+
+class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
+    """The same of a vector environment with NEXT_STEP autoreset, whose N streams are seen in one call."""
+
+    def __init__(self, env: gymnasium.vector.VectorEnv, obs: str | Observation) -> None:
+        super().__init__(env)
+        if env.metadata.get("autoreset_mode") is not AutoresetMode.NEXT_STEP:
+            raise InputError(f"autoreset_mode is {env.metadata.get('autoreset_mode')}; it must be NEXT_STEP")
+        self._law, self._view, self._state = observation(obs), viewed(env.single_observation_space, env), None
+        self._over = np.zeros(env.num_envs, bool)
+        self.single_observation_space = self._law.space(self._view)
+        self.observation_space = batch_space(self.single_observation_space, env.num_envs)
+
+    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode everywhere."""
+        self._state, self._over = self._law.start(self._view, self.num_envs), np.zeros(self.num_envs, bool)
+        return super().reset(seed=seed, options=options)
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Step everywhere; streams whose episodes were over begin anew."""
+        if self._state is not None and self._over.any():
+            self._state = restarted(self._law, self._view, self._state, self._over)
+        result = super().step(actions)
+        self._over = np.asarray(result[2]) | np.asarray(result[3])
+        return result
+
+    def observations(self, observations: NDArray[Any]) -> Any:
+        """What is seen of the blocks (N, K, H, W)."""
+        if self._state is None:
+            raise NotReadyError("the environments have not begun; call reset first")
+        blocks = Blocks(observations, frame_rate_hz=self._view.frame_rate_hz)
+        seen, self._state = self._law.step(blocks, self._state)
+        return seen
+
+
+def viewed(space: spaces.Space[Any], env: Any) -> View:
+    """The camera whose blocks fill a space; raises InputError where they are no blocks of spikes."""
+    if space.shape is None or len(space.shape) != 3 or space.dtype not in (np.int8, np.uint8, np.bool_):
+        raise InputError(f"observations are {space}; they must be unpacked spike blocks (frames, rows, columns)")
+    frames, rows, columns = space.shape
+    one = getattr(env.unwrapped, "envs", [env])[0].unwrapped if hasattr(env.unwrapped, "envs") else env.unwrapped
+    rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else View.frame_rate_hz
+    return View((rows, columns), frames, rate)
+
+
+def light_on(env: gymnasium.Env) -> tuple[Keyframes | ArrayLike, ...]:
+    """What fell on the sensor in the last step, or nothing where the environment is no spike camera."""
+    one = env.unwrapped
+    return tuple(one.blocks.light) if isinstance(one, SpikeCameraEnv) else ()

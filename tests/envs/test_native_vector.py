@@ -1,0 +1,154 @@
+"""The native vector environment against as many single ones, bit for bit."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.vector import AutoresetMode
+
+from spikecam_env.bench.environments import bench_environments
+from spikecam_env.envs.observations import OBSERVATIONS
+from spikecam_env.envs.registration import ENVIRONMENTS, register
+from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+from spikecam_env.envs.vector import SpikeCameraVectorEnv
+from spikecam_env.errors import InputError, NotReadyError
+
+register()
+DISK = "spikecam_env/RotatingDisk-v0"
+SMALL: dict[str, Any] = {"shape": (16, 24), "frames_per_step": 20}
+STEPS = 14
+FAST = 20_000.0
+"""Pixels a second at which the disk leaves the picture within a few steps, so that episodes end at various times."""
+
+
+def vector(mode: str, name: str = DISK, num_envs: int = 3, **options: Any) -> Any:
+    return gymnasium.make_vec(name, num_envs=num_envs, vectorization_mode=mode, **{**SMALL, **options})
+
+
+def rollout(env: Any, steps: int = STEPS) -> list[Any]:
+    """Everything that the vector returns; closes it."""
+    rng = np.random.default_rng(0)
+    found = [env.reset(seed=3)]
+    found += [env.step(rng.uniform(-1, 1, (env.num_envs, 2)).astype(np.float32)) for _ in range(steps)]
+    env.close()
+    return found
+
+
+def same(a: list[Any], b: list[Any]) -> None:
+    for number, (ours, theirs) in enumerate(zip(a, b, strict=True)):
+        assert data_equivalence(ours[0], theirs[0], exact=True), f"observation {number}"
+        for x, y in zip(ours[1:-1], theirs[1:-1], strict=True):
+            np.testing.assert_array_equal(x, y)
+        assert ours[-1].keys() == theirs[-1].keys()
+        for name, values in ours[-1].items():
+            np.testing.assert_array_equal(values, theirs[-1][name], err_msg=name)
+
+
+@pytest.mark.parametrize("obs", OBSERVATIONS)
+def test_bits_are_those_of_single_environments_also_over_the_ends_of_episodes(obs: str) -> None:
+    options = {"obs": obs, "obs_state": True, "max_gaze_rate_px_s": FAST, "max_episode_steps": 5}
+    ours = rollout(vector("vector_entry_point", **options))
+    ends = np.array([step[2] for step in ours[1:]]), np.array([step[3] for step in ours[1:]])
+    assert ends[0].any() and ends[1].any(), "no episode ended"
+    same(ours, rollout(vector("sync", **options)))
+
+
+def test_the_number_of_workers_changes_no_bit() -> None:
+    few, many = (rollout(vector("vector_entry_point", num_envs=5, obs="tfi", workers=n)) for n in (1, 4))
+    same(few, many)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
+def test_every_id_has_a_vector(name: str) -> None:
+    ours, theirs = (rollout(vector(mode, name, 2), 2) for mode in ("vector_entry_point", "sync"))
+    same(ours, theirs)
+
+
+def test_models_are_each_environment_s_own() -> None:
+    models = ["ideal", "scsim", "physical"]
+    ours = SpikeCameraVectorEnv(RotatingDiskEnv, 3, models=models, **SMALL)
+    seen, _ = ours.reset(seed=[7, 8, 7])
+    for n, model in enumerate(models):
+        np.testing.assert_array_equal(seen[n], RotatingDiskEnv(model=model, **SMALL).reset(seed=7 + n % 2)[0])
+    ours.close()
+
+
+def test_options_reach_every_environment_for_one_episode() -> None:
+    env = vector("vector_entry_point", obs="tfp")
+    usual, _ = env.reset(seed=0)
+    bright, _ = env.reset(seed=0, options={"light": 1.5})
+    assert (bright.mean(axis=(1, 2, 3)) > 1.2 * usual.mean(axis=(1, 2, 3))).all()
+    env.close()
+
+
+def test_spaces_mode_and_limit_are_declared() -> None:
+    env = vector("vector_entry_point", obs="tfp", obs_state=True)
+    single = gymnasium.make(DISK, **SMALL, obs="tfp", obs_state=True)
+    assert env.single_observation_space == single.observation_space
+    assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert env.unwrapped.max_episode_steps == gymnasium.spec(DISK).max_episode_steps
+    assert gymnasium.spec(DISK).to_json()
+    seen, _ = env.reset(seed=0)
+    assert seen in env.observation_space
+    assert env.step(env.action_space.sample())[0] in env.observation_space
+    env.close()
+
+
+def test_observations_are_fresh() -> None:
+    env = vector("vector_entry_point", obs="spikes")
+    seen, _ = env.reset(seed=0)
+    kept = seen.copy()
+    env.step(np.zeros((3, 2), np.float32))
+    np.testing.assert_array_equal(seen, kept)
+    env.close()
+
+
+def test_render_gives_a_picture_of_each() -> None:
+    env = vector("vector_entry_point", render_mode="rgb_array")
+    env.reset(seed=0)
+    assert [picture.shape for picture in env.render()] == [(16, 24, 3)] * 3
+    env.close()
+
+
+def test_bad_calls_are_named() -> None:
+    env = vector("vector_entry_point")
+    with pytest.raises(NotReadyError, match="call reset first"):
+        env.step(np.zeros((3, 2), np.float32))
+    with pytest.raises(InputError, match="seed has 2 numbers"):
+        env.reset(seed=[1, 2])
+    with pytest.raises(InputError, match="unknown option of reset 'center'"):
+        env.reset(options={"center": (1, 2)})
+    env.reset(seed=0)
+    with pytest.raises(InputError, match="actions have shape"):
+        env.step(np.zeros((2, 2), np.float32))
+    with pytest.raises(InputError, match="two finite numbers"):
+        env.step(np.full((3, 2), np.nan, np.float32))
+    with pytest.raises(InputError, match="models are 2"):
+        SpikeCameraVectorEnv(RotatingDiskEnv, 3, models=["ideal", "scsim"], **SMALL)
+    env.close()
+    env.close()
+    with pytest.raises(NotReadyError, match="closed"):
+        env.reset(seed=0)
+
+
+def test_the_page_about_observations_runs() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "observations.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    assert len(blocks) == 1
+    exec(compile(blocks[0], "docs/observations.md", "exec"), {})
+
+
+def test_the_bench_has_a_row_for_each_way() -> None:
+    rows = bench_environments(counts=(1, 2), observations=("tfp",), seconds=0.01)
+    assert [(row["how"], row["environments"]) for row in rows] == [
+        ("single", 1),
+        *((how, count) for count in (1, 2) for how in ("sync", "async", "native")),
+    ]
+    assert all(row["steps/s"] > 0 for row in rows) and rows[0]["x single"] == 1.0

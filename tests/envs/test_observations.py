@@ -1,0 +1,242 @@
+"""What agents are shown, against what it is by definition, and how its state begins anew."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from spikecam_env.envs.observations import (
+    ISI,
+    OBSERVATIONS,
+    TFI,
+    TFP,
+    Blocks,
+    FrameCamera,
+    Observation,
+    View,
+    observation,
+    restarted,
+)
+from spikecam_env.envs.observations.frame_camera import mean_light, shutter_open
+from spikecam_env.envs.registration import ENVIRONMENTS, register
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import Keyframes
+from spikecam_env.streams import isi_plane, unpack_frames
+
+register()
+DISK = "spikecam_env/RotatingDisk-v0"
+SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 8}
+VIEW = View((5, 7), 8)
+FRAMES = 48
+OF_IDS = dict(zip(sorted(ENVIRONMENTS), sorted(OBSERVATIONS) * len(ENVIRONMENTS), strict=False))
+"""Every id with one of the observations; the disk has them all."""
+
+
+def stream(seed: int = 0) -> np.ndarray:
+    """(1, FRAMES, 5, 7) spikes at rates from 0 to 1."""
+    rng = np.random.default_rng(seed)
+    return (rng.random((1, FRAMES, *VIEW.shape)) < rng.random(VIEW.shape)).astype(np.uint8)
+
+
+def shown(law: Observation, spikes: np.ndarray, cut: int) -> list[np.ndarray]:
+    """What is seen after every `cut` frames."""
+    state, seen = law.start(View(VIEW.shape, cut), len(spikes)), []
+    for first in range(0, spikes.shape[1], cut):
+        picture, state = law.step(Blocks(spikes[:, first : first + cut]), state)
+        seen.append(picture)
+    return seen
+
+
+def checked(name: str, **options: Any) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make(name, **{**SMALL, **options}).unwrapped
+        check_env(env, skip_render_check=True)
+        env.close()
+
+
+@pytest.mark.parametrize("obs_state", [False, True])
+@pytest.mark.parametrize("obs", OBSERVATIONS)
+def test_check_env_is_clean_for_every_observation(obs: str, obs_state: bool) -> None:
+    checked(DISK, obs=obs, obs_state=obs_state)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(OF_IDS))
+def test_check_env_is_clean_for_every_id(name: str) -> None:
+    checked(name, obs=OF_IDS[name])
+
+
+@pytest.mark.parametrize("obs", ["spikes", "tfp"])
+def test_stable_baselines_takes_the_observations(obs: str) -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(gymnasium.make(DISK, **{**SMALL, "shape": (36, 36)}, obs=obs))
+
+
+def test_names_give_the_same_stream() -> None:
+    def first(obs: str) -> Any:
+        return gymnasium.make(DISK, **SMALL, obs=obs).reset(seed=4)[0]
+
+    spikes = first("multibinary")
+    np.testing.assert_array_equal(first("spikes"), spikes)
+    np.testing.assert_array_equal(unpack_frames(first("packed"), (16, 16)), spikes)
+    np.testing.assert_array_equal(first("tfp")[0], np.floor(255 * spikes.mean(axis=0) + 0.5))
+
+
+@pytest.mark.parametrize("window", [3, 8, 20])
+def test_tfp_is_the_share_of_the_last_frames(window: int) -> None:
+    spikes = stream()
+    for number, picture in enumerate(shown(TFP(window), spikes, 8), start=1):
+        last = spikes[:, max(0, 8 * number - window) : 8 * number]
+        np.testing.assert_allclose(picture[:, 0], 255 * last.mean(axis=1), atol=0.51)
+
+
+def test_isi_is_the_last_whole_interval_or_the_wait() -> None:
+    """By `streams.isi_plane` of all frames so far, which sees nothing of what comes later."""
+    spikes = stream()
+    for number, picture in enumerate(shown(ISI(), spikes, 8), start=1):
+        known = spikes[0, : 8 * number]
+        wait = isi_plane(known, len(known) - 1)
+        for y, x in np.ndindex(VIEW.shape):
+            fired = np.flatnonzero(known[:, y, x])
+            whole = np.diff(np.concatenate([[-1], fired]))[-1:] if len(fired) else [0]
+            assert picture[0, 0, y, x] == max(wait[y, x], *whole), (number, y, x)
+
+
+@pytest.mark.parametrize("law", [TFP(20), TFI(), ISI()])
+def test_what_is_seen_does_not_depend_on_the_cut(law: Observation) -> None:
+    spikes = stream()
+    np.testing.assert_array_equal(shown(law, spikes, 24)[-1], shown(law, spikes, 4)[-1])
+
+
+def test_tfi_is_the_inverse_interval() -> None:
+    spikes = stream()
+    np.testing.assert_array_equal(
+        shown(TFI(), spikes, 8)[-1], np.floor(255 / shown(ISI(), spikes, 8)[-1] + np.float32(0.5))
+    )
+
+
+def rising(light_at_start: float, light_at_end: float, frames: int) -> Keyframes:
+    ends = np.array([light_at_start, light_at_end], np.float32)[:, None, None]
+    return Keyframes(np.array([0.0, frames]), np.broadcast_to(ends, (2, *VIEW.shape)))
+
+
+def through(law: FrameCamera, light: Keyframes, steps: int) -> list[tuple[int, float]]:
+    """(grey value, age) after each step."""
+    state, seen = law.start(VIEW, 1), []
+    for _ in range(steps):
+        blocks = Blocks(np.zeros((1, 8, *VIEW.shape), np.uint8), [light], VIEW.frame_rate_hz)
+        picture, state = law.step(blocks, state)
+        assert picture.min() == picture.max()
+        seen.append((int(picture.max()), float(law.age(state)[0])))
+    return seen
+
+
+def test_frame_camera_gives_the_mean_light_of_its_last_whole_exposure() -> None:
+    """2000 Hz is a period of 20 frames; light rises by 1/80 a frame: means at frames 10, 30, 50."""
+    seen = through(FrameCamera(2000.0), rising(0.0, 1.0, 80), 8)
+    means = [0, 0, *[255 * 10 / 80] * 2, *[255 * 30 / 80] * 3, 255 * 50 / 80]
+    np.testing.assert_allclose([grey for grey, _ in seen], means, atol=0.51)
+    assert [age for _, age in seen] == [-1, -1, 4, 12, 0, 8, 16, 4]
+
+
+def test_a_short_exposure_is_sharp_and_early() -> None:
+    """0.1 ms are 4 frames: the exposures' middles are at frames 2 and 22."""
+    seen = through(FrameCamera(2000.0, exposure_s=1e-4), rising(0.0, 1.0, 80), 3)
+    np.testing.assert_allclose([grey for grey, _ in seen], [255 * 2 / 80, 255 * 2 / 80, 255 * 22 / 80], atol=0.51)
+
+
+def test_exposures_are_complete_at_rates_that_divide_no_block() -> None:
+    """30 Hz over ten seconds: 300 whole exposures, whose parts fill all the time."""
+    period = 40_000 / 30
+    parts = [part for first in range(0, 400_000, 40) for part in shutter_open(first, first + 40, period, period)]
+    assert sum(whole for *_, whole in parts) == 300
+    assert sum(closed - opened for opened, closed, _ in parts) == pytest.approx(400_000, rel=1e-12)
+
+
+def test_the_frame_camera_sees_the_light_of_the_environment() -> None:
+    """A scene at rest: the mean over the exposure is the true light."""
+    env = gymnasium.make(
+        DISK, **SMALL, obs=FrameCamera(5000.0), rpm=0.0, drift_px_s=0.0, ground_truth=True, obs_state=True
+    )
+    seen, info = env.reset(seed=0)
+    assert seen["age"] == 0 and info["age"] == 0
+    np.testing.assert_allclose(seen["picture"][0], 255 * info["radiance"], atol=0.51)
+    light = env.unwrapped.blocks.light[0]  # type: ignore[attr-defined]
+    np.testing.assert_allclose(mean_light(light, 2.25, 6.5), info["radiance"], rtol=1e-6)
+
+
+def test_before_the_denoiser_has_a_picture_it_is_the_noisy_rate_and_marked() -> None:
+    env = gymnasium.make(DISK, **SMALL, obs="rate", obs_state=True)
+    seen, info = env.reset(seed=1)
+    noisy = gymnasium.make(DISK, **SMALL, obs="tfp").reset(seed=1)[0]
+    np.testing.assert_array_equal(seen["picture"], noisy)
+    assert info["age"] == -1
+    ages = [env.step(np.zeros(2, np.float32))[4]["age"] for _ in range(5)]
+    print(ages)
+    assert ages == [-1, -1, 16, 24, 16]
+
+
+@pytest.mark.parametrize("obs", ["tfp", "isi", "rate", "frame1000"])
+def test_one_stream_begins_anew_while_another_goes_on(obs: str) -> None:
+    law, view = observation(obs), View((8, 8), 20)
+    rng = np.random.default_rng(0)
+    light = Keyframes(np.zeros(1), np.full((1, 8, 8), 0.3, np.float32))
+    blocks = [Blocks((rng.random((2, 20, 8, 8)) < 0.3).astype(np.uint8), [light] * 2) for _ in range(6)]
+    state = law.start(view, 2)
+    for number, block in enumerate(blocks):
+        if number == 3:
+            state = restarted(law, view, state, np.array([False, True]))
+        picture, state = law.step(block, state)
+    for stream, its in ((0, blocks), (1, blocks[3:])):
+        alone = law.start(view, 1)
+        for block in its:
+            expected, alone = law.step(Blocks(block.spikes[stream : stream + 1], [light]), alone)
+        np.testing.assert_array_equal(picture[stream], expected[0])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"obs": "tpf"}, "unknown obs 'tpf'.*tfp?"),
+        ({"obs": 3}, "obs = 3; give a name"),
+        ({"obs": "tfp", "packed": True}, "packed is True and obs is 'tfp'"),
+    ],
+)
+def test_bad_observations_are_named(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        gymnasium.make(DISK, **SMALL, **options)
+
+
+def test_bad_parameters_are_named() -> None:
+    with pytest.raises(InputError, match="window = 0"):
+        TFP(0)
+    with pytest.raises(InputError, match=r"exposure_s = 0\.1"):
+        FrameCamera(30.0, exposure_s=0.1)
+    with pytest.raises(InputError, match="needs the light"):
+        FrameCamera(30.0).step(Blocks(stream()), FrameCamera(30.0).start(VIEW, 1))
+
+
+def test_model_and_light_of_one_episode() -> None:
+    env = gymnasium.make(DISK, **SMALL, obs="spikes", ground_truth=True)
+    usual, info = env.reset(seed=2)
+    ideal, _ = env.reset(seed=2, options={"model": "ideal"})
+    bright, lit = env.reset(seed=2, options={"light": 1.5})
+    again, _ = env.reset(seed=2)
+    np.testing.assert_array_equal(again, usual)
+    assert (ideal != usual).any()
+    np.testing.assert_allclose(lit["radiance"], 1.5 * info["radiance"], rtol=1e-5)
+    assert bright.mean() > 1.2 * usual.mean()
+    expected, _ = gymnasium.make(DISK, **SMALL, obs="spikes", model="ideal").reset(seed=2)
+    np.testing.assert_array_equal(ideal, expected)
+    with pytest.raises(InputError, match="light = 0"):
+        env.reset(options={"light": 0.0})
+    with pytest.raises(InputError, match="unknown preset"):
+        env.reset(options={"model": "perfect"})
