@@ -1,0 +1,205 @@
+"""c(v), the noise of a spike and the skew of the rows, from the steps that pixels near a whole interval make.
+
+A cell is a row by an offset d of the free interval.  Two things are fitted to what `phases` foretells, by least squares:
+
+    drift(d) = (up - down) of all rows      one pixel's is fixed to a step; says which values c takes, for how long
+    shifts(row, d) = up + down of a cell    says at which phases, where rows are read
+
+First by one edge a frame (amplitude, moment, tau), the noise s, the skew and a common error of all d, as the references have
+it, from a scan over all; then by a curve that is free
+beside the edge, with hats at NODES phases, all parameters together.  Counts scatter more than Poisson's where pixels gather, as
+each stays at a place of its own: errors are scaled, by offset, by the scatter that a first fit leaves.  A pixel counts in several
+cells of its row, so they are scaled again by the scatter of the rows' sums.  The edge itself is seen no finer than rows are apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from benchmarks.clock.phases import Walk, edge, sampled, walk
+
+Array = NDArray[np.float64]
+
+NODES = 16
+"""Phases at which the curve is free; a node every 3 us at 20 kHz, what a spike's noise leaves apart at T = 2."""
+
+FREE = 0.003
+"""Standard deviation that the curve is given beside the edge, before the data [thresholds]: a third of the real camera's edge."""
+
+_AMPLITUDES = (-0.016, -0.008, -0.004, 0.004, 0.008, 0.016)
+_TAUS = (0.08, 0.2, 0.45)
+_SPANS = np.concatenate([-np.arange(0.3, 1.26, 0.05), np.arange(0.3, 1.26, 0.05)])
+_MOMENTS = np.arange(0.0, 1.0, 1 / 64)
+_NOISE = 0.008
+"""Starts of the scan [thresholds, frames]; noise of a spike of the published camera, roughly."""
+
+_STARTS = 4
+"""Of the scan's pairs of amplitude and tau, so many are fitted."""
+
+_ROUNDS = 15
+"""Of a fit, at most."""
+
+_STEPS = np.array([2e-4, 2e-3, 5e-3, 2e-4, 5e-3, 1e-4])
+"""Of amplitude, moment, tau, noise, span and the error of d, for derivatives."""
+
+_LOWEST = np.array([-0.05, -1.0, 0.01, 0.002, -1.3, -0.005])
+_HIGHEST = np.array([0.05, 2.0, 3.0, 0.03, 1.3, 0.005])
+
+_UNEVEN = 2e-5
+"""Of a drift, from what c does to some references more than to others [frames]; added to its error."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What pixels of intervals interval + offsets (D,) did.
+
+    intervals, shifts: (rows, D) numbers of intervals, and of those a frame longer or shorter.
+    drift, drift_sd: (D,) mean of (longer - shorter) an interval, and its standard error over pixels; drift_at: the mean offset
+    of these pixels [frames].  spread: (D,) how much more than Poisson's shifts scatter.
+    """
+
+    interval: int
+    offsets: Array
+    intervals: Array
+    shifts: Array
+    drift: Array
+    drift_sd: Array
+    drift_at: Array
+    spread: Array
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One edge: amplitude [thresholds], moment v0, tau, span [frames], noise s; `errors` has their standard errors in the order
+    amplitude, moment, tau, noise, span, and that of the common error of d.
+
+    phases, curve, curve_errors: (NODES,) v, c(v) [thresholds], mean 0, and its standard errors.
+    left: mean square of what the edge leaves, in the errors of counts.
+    """
+
+    amplitude: float
+    moment: float
+    tau: float
+    noise: float
+    span: float
+    errors: Array
+    phases: Array
+    curve: Array
+    curve_errors: Array
+    left: float
+
+
+def measure(steps: Steps) -> Measured:
+    """Fit `steps`; see the module's text."""
+    starts = [_fitted(steps, start, "soft_l1") for start in _scanned(steps)]
+    law, left = min(starts, key=lambda fit: float(np.sqrt(1.0 + fit[1] ** 2).sum()))
+    shifts = left[: steps.shifts.size].reshape(steps.shifts.shape)
+    steps = replace(steps, spread=np.sqrt(np.maximum(np.mean(shifts**2, axis=0), 1.0)))
+    law, left = _fitted(steps, law, "linear")
+    slope = _slopes(lambda p: _residual(steps, _law(p), *p[3:]), law, left, _STEPS)
+    amplitude, moment, tau, noise, span, _ = law
+    curve, curve_errors = _curve(steps, law, left, slope)
+    errors = np.sqrt(np.diag(_scatter(steps, left) * np.linalg.pinv(slope.T @ slope)))
+    errors[1] = np.hypot(errors[1], abs(span) / (steps.shifts.shape[0] - 1) / np.sqrt(12.0))
+    return Measured(
+        amplitude, moment % 1.0, tau, noise, span, errors, _NODES, curve, curve_errors, float(np.mean(left**2))
+    )
+
+
+def row_phase(rows: int, span: float) -> Array:
+    """(rows,) phase b of the array's clock at which a row's frame begins; span as in `readout_skew`."""
+    share = np.arange(rows) / max(rows - 1, 1)
+    return -span * (1.0 - share) if span > 0.0 else span * share
+
+
+_NODES = (np.arange(NODES) + 0.5) / NODES
+
+
+def _law(parameters: Array) -> Array:
+    return sampled(edge, *parameters[:3])
+
+
+def _residual(steps: Steps, disturbance: Array, noise: float, span: float, off: float) -> Array:
+    return _left(steps, walk(disturbance, noise, float(steps.interval), steps.offsets + off), 0.0, span)
+
+
+def _left(steps: Steps, foretold: Walk, moment: float, span: float) -> Array:
+    """Measured less foretold by a walk whose edge is at 0 and should be at `moment`; in standard errors of counts."""
+    start = row_phase(steps.intervals.shape[0], span)[:, None] - moment
+    share = _over_cells(np.add(*foretold.at(np.arange(steps.offsets.size), start)))
+    drift = _over_cells((foretold.up - foretold.down).mean(axis=1))
+    off_centre = (steps.drift_at - steps.offsets) * np.gradient(drift, steps.offsets)
+    shifts = (steps.shifts - steps.intervals * share) / np.sqrt(steps.intervals * share + 4.0) / steps.spread
+    return np.concatenate([shifts.ravel(), (steps.drift - drift - off_centre) / np.hypot(steps.drift_sd, _UNEVEN)])
+
+
+def _over_cells(at_centres: Array) -> Array:
+    """Means over cells of d, along the last axis, from values at their centres: with the curvature's 24th."""
+    mean = at_centres.copy()
+    mean[..., 1:-1] += np.diff(at_centres, 2, axis=-1) / 24.0
+    return mean
+
+
+def _scanned(steps: Steps) -> list[Array]:
+    """The best places of edge and rows for the _STARTS best pairs of amplitude and tau."""
+    found = []
+    for amplitude, tau in product(_AMPLITUDES, _TAUS):
+        foretold = walk(sampled(edge, amplitude, 0.0, tau), _NOISE, float(steps.interval), steps.offsets)
+        sizes = {
+            (moment, span): float(np.sqrt(1.0 + _left(steps, foretold, moment, span) ** 2).sum())
+            for moment, span in product(_MOMENTS, _SPANS)
+        }
+        moment, span = min(sizes, key=lambda place: sizes[place])
+        found.append((sizes[moment, span], np.array([amplitude, moment, tau, _NOISE, span, 0.0])))
+    return [start for _, start in sorted(found, key=lambda pair: pair[0])[:_STARTS]]
+
+
+def _fitted(steps: Steps, start: Array, loss: str) -> tuple[Array, Array]:
+    """Parameters of the edge and what they leave; a coarse start wants a robust loss, as `least_squares` has them."""
+
+    def residual(p: Array) -> Array:
+        return _residual(steps, _law(p), *p[3:])
+
+    def slopes(p: Array) -> Array:
+        return _slopes(residual, p, residual(p), _STEPS)
+
+    bounds = (_LOWEST, _HIGHEST)
+    fit = least_squares(residual, start, slopes, bounds, x_scale=_STEPS, loss=loss, max_nfev=_ROUNDS, ftol=1e-4)
+    return fit.x, residual(fit.x)
+
+
+def _curve(steps: Steps, law: Array, left: Array, slope: Array) -> tuple[Array, Array]:
+    """c at the nodes and its standard errors: one Gauss-Newton step of the edge and of hats beside it, together."""
+    base = _law(law)
+    phases = np.arange(base.size) / base.size
+
+    def hats(heights: Array) -> Array:
+        return _residual(steps, base + np.interp(phases, _NODES, heights, period=1.0), *law[3:])
+
+    small = np.full(NODES, 2e-4)
+    both = np.concatenate([slope, _slopes(hats, np.zeros(NODES), left, small)], axis=1)
+    prior = np.concatenate([np.zeros((NODES, law.size)), np.eye(NODES) / FREE], axis=1)
+    full, rest = np.concatenate([both, prior]), np.concatenate([left, np.zeros(NODES)])
+    move = -np.linalg.lstsq(full, rest, rcond=None)[0]
+    at_nodes = _slopes(lambda p: edge(_NODES, *p[:3]), law, edge(_NODES, *law[:3]), _STEPS)
+    change = np.concatenate([at_nodes, np.eye(NODES)], axis=1)
+    change -= change.mean(axis=0)
+    values = edge(_NODES, *law[:3])
+    curve = values - values.mean() + change @ move
+    covariance = change @ np.linalg.pinv(full.T @ full) @ change.T
+    return curve, np.sqrt(_scatter(steps, left + both @ move) * np.diag(covariance))
+
+
+def _slopes(residual, at: Array, left: Array, step: Array) -> Array:  # type: ignore[no-untyped-def]
+    return np.stack([(residual(at + one) - left) / one.sum() for one in np.diag(step)], axis=1)
+
+
+def _scatter(steps: Steps, left: Array) -> float:
+    """By how much variances exceed those of independent cells: the mean square of the rows' sums, 1 or more."""
+    sums = left[: steps.shifts.size].reshape(steps.shifts.shape).sum(axis=1)
+    return max(float(np.mean(sums**2)) / steps.offsets.size, 1.0)
