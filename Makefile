@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV ?= .venv
 WORKERS ?= 2
+# A file at a time, so that what a module shares is made once; files in the order of tests/conftest.py, slow ones first.
+SHARED_OUT = --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 BIN := $(VENV)/bin
 
 .PHONY: install install-dev demo test test-oldest lint pages clean
@@ -23,7 +25,7 @@ demo: install
 	$(BIN)/spikecam demo
 
 test: install-dev
-	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist loadfile
+	$(BIN)/python -m pytest $(SHARED_OUT)
 
 # The oldest releases that pyproject.toml allows (constraints-oldest.txt), in an environment of their own; numba's
 # compiled code of one release is no use to another, so it goes to a folder of its own too.
@@ -37,7 +39,7 @@ $(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
 
 test-oldest: $(OLDEST)/.installed
 	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning \
-		--numprocesses $(WORKERS) --dist loadfile $(OLDEST_TESTS)
+		$(SHARED_OUT) $(OLDEST_TESTS)
 
 # The committed diagnoses of real recordings, where these are at hand, and every figure about them in docs.
 pages: install-dev

@@ -1,11 +1,21 @@
-"""What holds for all tests.  Torch's threads must not spin long while they wait: tests share their cores."""
+"""What holds for all tests.  Torch's threads must not spin long while they wait: tests share their cores.
+
+Files with slow tests come first: two processes that take file after file end together, not one with a long file last.
+"""
 
 from __future__ import annotations
 
 import os
 from collections import Counter
 
+import pytest
+
 os.environ.setdefault("GOMP_SPINCOUNT", "10000")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

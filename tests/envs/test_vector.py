@@ -45,15 +45,18 @@ def alone(what: str) -> str:
     return printed
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 def test_every_id_forks_with_and_without_the_denoiser_and_gives_the_bits_of_a_synchronous_run() -> None:
     assert "ids" in alone("every_id")
 
 
+@pytest.mark.slow
 def test_spawned_environments_give_the_bits_of_a_synchronous_run() -> None:
     assert "spawn" in alone("contexts")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="no /proc on this system")
 def test_fifty_environments_leave_no_memory_files_or_threads() -> None:
     assert "after 50" in alone("many")

@@ -102,6 +102,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_command_stops_at_any_moment_within_two_seconds_and_leaves_nothing(tmp_path: Path, recording: Path) -> None:
     size = ["--size", "64", "96"]
     commands = {

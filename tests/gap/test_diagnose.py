@@ -25,7 +25,7 @@ from spikecam_env.sensor import SensorModel
 pytestmark = pytest.mark.slow
 
 LAG = effect("photodiode_lag", fraction=0.08, tau_us=1000.0)
-ONLY = ("photodiode_lag", "crosstalk")
+ONLY = ("photodiode_lag", "incomplete_reset")
 MOVED = ("photodiode_lag", "readout_skew", "optical_blur", "blooming")
 BOUNDED = ("dead_time", "vignetting", "readout_skew", "spurious_spikes")
 """Candidates where nothing is found, and each is simulated for its bound; the alarm asks for none."""

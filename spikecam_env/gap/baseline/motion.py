@@ -9,8 +9,9 @@ dark-current drift in all by their dark level, so neither is motion.  A single p
 most, so telegraph noise and hot pixels are none either.  Rows are no regions: windows are as high as wide, and even, in
 which what alternates from row to row cancels.
 
-Blind to: what changes in all pixels of a level by the same share, regions below LEAST_PIXELS of a side, and contrast
-below LEAST_CONTRAST, which local effects of a camera reach.
+Blind to: what changes in all pixels of a level by the same share, regions smaller than the least of SIDES, and contrast
+below LEAST_CONTRAST, which local effects of a camera reach; slow noise of single pixels (1/f) is below it in the mean
+of a window.
 """
 
 from __future__ import annotations
@@ -48,13 +49,12 @@ LEAST_SPIKES = 20.0
 """Spikes expected in a window from which it is looked at: below, counts are no normal deviates."""
 
 MOST_OF_A_PIXEL = 3.0
-"""Standard deviations that a single pixel counts at most."""
+"""Standard deviations that a single pixel counts at most in a deviate; a contrast is of all that it changes."""
 
 OWN_NOISE = 0.1
-"""Variance of a count beside f (1 - f): jitter of single spikes rounds the corners of f (1 - f), where it is 0."""
+"""Variance of a count beside f (1 - f), which is 0 where whole numbers are expected: its ends are jittered.
 
-SLOW_NOISE = 0.01
-"""Standard deviation of a pixel's rate in a block, relative: slow noise of single pixels (1/f, telegraph)."""
+Jitter of s of an interval gives 1.13 s; a tenth is above the presets' (0.06 at most, in blocks of 100 spikes)."""
 
 _ROUNDS = 20
 """Times at most that a recording is looked at again without what moved."""
@@ -130,7 +130,7 @@ def whole_blocks(seen: Observation) -> tuple[Array, int]:
 def expected_variance(expected: Array) -> Array:
     """Variance of a static pixel's count, of which `expected` are expected."""
     part = np.mod(expected, 1.0)
-    return part * (1.0 - part) + OWN_NOISE * np.minimum(expected, 1.0) + (SLOW_NOISE * expected) ** 2 + 1e-6
+    return part * (1.0 - part) + OWN_NOISE * np.minimum(expected, 1.0) + 1e-6
 
 
 def common_mode(counts: Array, mean: Array, use: Mask) -> Array:
@@ -182,17 +182,19 @@ def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask) -> Iterat
             part = slice(first, first + span)
             hoped = expected[part].sum(axis=0)
             sd = np.sqrt(expected_variance(hoped))
-            off = np.clip(counts[part].sum(axis=0) - hoped, -MOST_OF_A_PIXEL * sd, MOST_OF_A_PIXEL * sd)
-            planes = [np.where(kept, a.reshape(shape), 0.0) for a in (off, sd**2, hoped)]
+            off = counts[part].sum(axis=0) - hoped
+            capped = np.clip(off, -MOST_OF_A_PIXEL * sd, MOST_OF_A_PIXEL * sd)
+            planes = [np.where(kept, a.reshape(shape), 0.0) for a in (off, capped, sd**2, hoped)]
             for size in sizes:
                 yield from _beyond(planes, size, (first, first + span), limit)
 
 
 def _beyond(planes: list[Array], size: tuple[int, int], blocks: tuple[int, int], limit: float) -> Iterator[_Window]:
-    """Windows of one size in one part of the time.  planes: (H, W) off, variance, expected."""
+    """Windows of one size in one part of the time.  planes: (H, W) off, off as far as a pixel counts, variance,
+    expected."""
     rows, columns = (_starts(n, s) for n, s in zip(planes[0].shape, size, strict=True))
-    off, variance, expected = (_window_sums(plane, rows, columns, size) for plane in planes)
-    z = off / np.sqrt(np.maximum(variance, 1e-9))
+    off, capped, variance, expected = (_window_sums(plane, rows, columns, size) for plane in planes)
+    z = capped / np.sqrt(np.maximum(variance, 1e-9))
     contrast = off / np.maximum(expected, 1e-9)
     enough = np.maximum(expected, expected + off) >= LEAST_SPIKES
     for i, j in np.argwhere(enough & (np.abs(z) > limit) & (np.abs(contrast) > LEAST_CONTRAST)):

@@ -218,14 +218,14 @@ def _block(
         _pixels(light),
         _pixels(dark),
         few.pixels,
-        np.ascontiguousarray(few.charge),
+        _plain(few.charge),
         _rows(light.factor, now),
         _rows(dark.factor, now),
-        np.ascontiguousarray(law.factor),
-        np.ascontiguousarray(law.common),
+        _plain(law.factor),
+        _plain(law.common),
         law.field,
         law.grains_per_mV,
-        *(np.ascontiguousarray(nodes) for nodes in (sway.at, sway.factor, sway.common)),
+        *(_plain(nodes) for nodes in (sway.at, sway.factor, sway.common)),
         tuple(float(number) for number in feedback),
         state.law.per_electron,
         state.law.kappa_squared,
@@ -272,7 +272,12 @@ def _pixels(charge: Charge) -> Array:
 
 
 def _rows(factor: Array | float, now: Exposure) -> Array:
-    return np.ascontiguousarray(np.broadcast_to(factor, (now.frames, now.shape[0], 1))[:, :, 0])
+    return _plain(np.broadcast_to(factor, (now.frames, now.shape[0], 1))[:, :, 0])
+
+
+def _plain(values: Array) -> Array:
+    """In C order and writeable, though nobody writes: numba compiles `advance` anew for an array that is read-only."""
+    return np.require(values, requirements="CW")
 
 
 def _sum(feedbacks: Sequence[Feedback]) -> Feedback:

@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded, unit
 
-from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.fit.candidate import Fit, fit
-from spikecam_env.gap.fit.gauss_newton import derivatives, moved
 from spikecam_env.gap.fit.joint import agree, refined_together
-from spikecam_env.gap.fit.predict import predict_by_twins
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.twins.budget import Budget
 
@@ -44,28 +41,6 @@ def test_strengths_refined_alone_are_known_no_better_than_with_their_shapes(monk
     monkeypatch.setattr(Problem, "is_explained", lambda *_: False)
     best, errors, _ = refined_together(Problem(case, MODEL, null(), seen, values), replace(first, sd=open_), [name])
     assert errors[name] == best.sd == open_ and case.budget.left_out == ["finer shapes of what was found"]
-
-
-def test_derivatives_are_of_a_unit_that_has_settled():
-    """Crosstalk half a logarithm stronger makes the refit brighter, which bars that saturate tell."""
-    case = recorded(effect("crosstalk", kick=0.0025), seed=4)
-    without = model_null(case, MODEL, 12)
-    measured = values_of(case.bank, without.keys)
-    found = fit(Problem(case, MODEL, without, measured, measured), "crosstalk", {"kick": 0.0025})
-
-    def probe(model, base):
-        return predict_by_twins(case, model, base, without, 3)
-
-    at = probe(found.model, found.base)
-    free = [("crosstalk", "kick")]
-    columns, _ = derivatives(
-        Problem(case, MODEL, without, measured, measured), probe, found.model, found.base, at, free
-    )
-    unsettled = (probe(*moved(found.model, found.base, free, np.array([0.5]))).mean - at.mean) / 0.5
-    bars = np.array([k.recording == "bars" for k in without.keys])
-    most, most_unsettled = (np.abs(c[bars] / without.noise[bars]).max() for c in (columns[:, 0], unsettled))
-    print(f"bars change by {most:.1f} noises a logarithm at most, unsettled by {most_unsettled:.1f}")
-    assert most < 20.0 < most_unsettled
 
 
 @pytest.mark.parametrize("then, same", [(0.0076, True), (0.0019 / 4, True), (0.02, False), (-0.0019, False)])

@@ -1,0 +1,130 @@
+"""What the numbers of the search for motion are for: each, halved or doubled, finds what is none or misses what is.
+
+Counts are made up, 16 blocks of 48 x 48 pixels without noise, of levels that differ from pixel to pixel; a square of
+them is off in the first blocks.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from spikecam_env.gap.baseline import motion, static_part
+from spikecam_env.gap.baseline.motion import expected_variance, find_motion
+from spikecam_env.gap.baseline.static_part import Observed, without_motion
+from spikecam_env.gap.observe.conditions import Condition
+
+SHAPE = (48, 48)
+BLOCKS = 16
+SCENE = Condition("scene", "unknown", np.nan, None, 100 * BLOCKS, "fit")
+
+
+def counts(levels: list[float], side: int, share: float, blocks: int = 1) -> NDArray[np.float64]:
+    """(BLOCKS, H, W) of levels [spikes a block]; a square in the middle has a share more in the first blocks."""
+    level = np.random.default_rng(0).choice(levels, SHAPE)
+    made = np.repeat(level[None], BLOCKS, axis=0)
+    made[:blocks, 16 : 16 + side, 16 : 16 + side] *= 1.0 + share
+    return made
+
+
+def moves(made: NDArray[np.float64]) -> bool:
+    flat = made.reshape(BLOCKS, -1)
+    times = SimpleNamespace(count=flat.sum(axis=0))
+    seen = SimpleNamespace(blocks=flat, frames=SCENE.frames, shape=SHAPE, times=times)
+    return find_motion(SCENE, seen) is not None
+
+
+MANY = [15.5, 18.5, 20.5, 22.5, 25.5]
+SOME = [4.5, 5.5, 6.5]
+FEW = [0.625, 0.875, 1.125]
+
+SQUARES = {4: (MANY, 0.1), 8: (SOME, 0.12), 16: (SOME, 0.07)}
+"""Levels and contrast of a square that windows of its side alone find: others hold too little of it, or dilute it."""
+
+
+@pytest.mark.parametrize("side", motion.SIDES)
+def test_a_square_is_found_by_the_windows_of_its_side(side: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    levels, share = SQUARES[side]
+    assert moves(counts(levels, side, share))
+    monkeypatch.setattr(motion, "SIDES", tuple(s for s in motion.SIDES if s != side))
+    assert not moves(counts(levels, side, share))
+
+
+def test_windows_half_as_large_find_four_pixels_and_twice_as_large_miss_sixteen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sides = motion.SIDES
+    assert not moves(counts(MANY, 2, 0.15)) and moves(counts(MANY, 4, 0.1))
+    monkeypatch.setattr(motion, "SIDES", tuple(s // 2 for s in sides))
+    assert moves(counts(MANY, 2, 0.15))
+    monkeypatch.setattr(motion, "SIDES", tuple(2 * s for s in sides))
+    assert not moves(counts(MANY, 4, 0.1))
+
+
+LASTING = {1: (MANY, 0.08), 4: (FEW, 0.17), 8: (FEW, 0.13)}
+"""Levels and contrast of a square of 8 that windows as long as it lasts alone find."""
+
+
+@pytest.mark.parametrize("span", motion.SPANS)
+def test_a_change_is_found_by_the_windows_as_long_as_it(span: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    levels, share = LASTING[span]
+    assert moves(counts(levels, 8, share, span))
+    monkeypatch.setattr(motion, "SPANS", tuple(s for s in motion.SPANS if s != span))
+    assert not moves(counts(levels, 8, share, span))
+
+
+def test_windows_half_as_long_miss_what_is_slow_and_twice_as_long_what_is_fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    spans = motion.SPANS
+    monkeypatch.setattr(motion, "SPANS", tuple(max(s // 2, 1) for s in spans))
+    assert not moves(counts(LASTING[8][0], 8, LASTING[8][1], 8))
+    monkeypatch.setattr(motion, "SPANS", tuple(2 * s for s in spans))
+    assert not moves(counts(MANY, 8, 0.08))
+
+
+WHOLE = [2.0, 3.0, 4.0]
+"""Levels of which f (1 - f) is 0: all that a count varies by is its own noise."""
+
+
+@pytest.mark.parametrize(
+    ("factor", "chance", "motion_too"), [(0.5, True, True), (1.0, False, True), (2.0, False, False)]
+)
+def test_own_noise_tells_chance_from_motion(
+    factor: float, chance: bool, motion_too: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Windows of 64 pixels that are off by 4.6 and by 6.5 deviates of a count with a variance of a tenth."""
+    monkeypatch.setattr(motion, "OWN_NOISE", factor * motion.OWN_NOISE)
+    found = []
+    for z in (4.6, 6.5):
+        off = z * np.sqrt(0.1) / 8 * BLOCKS / (BLOCKS - 1)  # its own mean has a sixteenth of it
+        made = counts(WHOLE, 8, 0.0)
+        made[0, 16:24, 16:24] += off
+        found.append(moves(made))
+    assert found == [chance, motion_too]
+
+
+def test_own_noise_is_that_of_ends_jittered_by_a_tenth_of_an_interval() -> None:
+    """Whole numbers of spikes: sqrt(2) E|n| = 1.13 of the jitter's standard deviation."""
+    rng = np.random.default_rng(0)
+    phase, (first, last) = rng.random(100_000), 0.1 * rng.standard_normal((2, 100_000))
+    count = np.floor(phase + 5.0 + last) - np.floor(phase + first)
+    print(measured := float(np.var(count)))
+    assert 0.7 * measured < float(expected_variance(np.array(5.0))) < 1.4 * measured
+
+
+@pytest.mark.parametrize("levels", [MANY, [100.0 * level for level in MANY]], ids=["short", "long"])
+def test_a_contrast_is_found_however_long_the_recording(levels: list[float]) -> None:
+    """Of a hundred times as many spikes the deviates that a pixel counts at most are a fifth of a percent."""
+    assert moves(counts(levels, 8, 0.3))
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.2, False), (0.3, True)])
+def test_a_quarter_of_the_pixels_has_to_be_static(share: float, kept: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    moving = np.arange(SHAPE[0] * SHAPE[1]).reshape(SHAPE) >= share * SHAPE[0] * SHAPE[1]
+    monkeypatch.setattr(static_part, "find_motion", lambda *_: SimpleNamespace(recording="scene", moving=moving))
+    monkeypatch.setattr(static_part, "observe", lambda *_, static: static)
+    recording = SimpleNamespace(packed=lambda: None)
+    seen, _ = without_motion(Observed((recording,), (SCENE,), (SimpleNamespace(shape=SHAPE),)), static_only=True)
+    assert [mask.mean() == pytest.approx(share, abs=1e-3) for mask in seen.seen] == [True] * kept
