@@ -1,10 +1,11 @@
-"""Would flats near whole intervals measure the disturbance c(v) of the threshold by the array's clock?  Tried on hidden units.
+"""Would flats near whole intervals measure the disturbance c(v) by the array's clock?  Tried on hidden units.
 
     python -m benchmarks.clock_campaign --png c.png
 
-A unit is the published camera (`scsim` at 20 kHz) with an edge a frame and rows read one after another, all parameters drawn at
-random.  The campaign (`benchmarks/clock/campaign.py`) is recorded by the project's sensor; what is estimated
-(`benchmarks/clock/measure.py`) comes from spikes and lights alone, by a law of phases (`benchmarks/clock/phases.py`).
+A unit is the published camera (`scsim` at 20 kHz) with an edge a frame and rows read one after another, all
+parameters drawn at random.  The campaign (`benchmarks/clock/campaign.py`) is recorded by the project's sensor; what
+is estimated (`benchmarks/clock/measure.py`) comes from spikes and lights alone, by a law of phases
+(`benchmarks/clock/phases.py`).
 """
 
 from __future__ import annotations
@@ -105,8 +106,13 @@ def main(units: int = 6, seed: int = 0, rows: int = 64, columns: int = 64, png: 
         outcomes.append(Outcome(hidden, measure(steps), swing))
         print(_lines(unit, outcomes[-1]), flush=True)
     worst = np.max([np.abs(o.off) for o in outcomes], axis=0)
-    print(f"\nlargest error of {units} units: " + ", ".join(f"{n.split(' ')[0]} {w:.1%}" for n, w in zip(NAMES, worst, strict=True)))
-    print(f"units with all four within {AIM:.0%}: {sum(bool(np.all(np.abs(o.off) < AIM)) for o in outcomes)} of {units}")
+    print(
+        f"\nlargest error of {units} units: "
+        + ", ".join(f"{n.split(' ')[0]} {w:.1%}" for n, w in zip(NAMES, worst, strict=True))
+    )
+    print(
+        f"units with all four within {AIM:.0%}: {sum(bool(np.all(np.abs(o.off) < AIM)) for o in outcomes)} of {units}"
+    )
     if png is not None:
         with whole_file(png) as place:
             _drawn(outcomes).savefig(place, dpi=110, format="png")
@@ -115,7 +121,7 @@ def main(units: int = 6, seed: int = 0, rows: int = 64, columns: int = 64, png: 
 
 def _lines(unit: int, outcome: Outcome) -> str:
     """The table of a unit: its parameters, and its curve."""
-    lines = [f"\nunit {unit}: noise of a spike {outcome.found.noise:.5f} thresholds; mean square left {outcome.found.left:.2f}"]
+    lines = [f"\nunit {unit}: noise {outcome.found.noise:.5f} thresholds, mean square left {outcome.found.left:.2f}"]
     lines.append("".ljust(16) + "true".rjust(10) + "estimated".rjust(20) + "error".rjust(9))
     for name, true, value, sd, off in zip(
         NAMES, outcome.true, outcome.estimated, outcome.errors, outcome.off, strict=True
@@ -143,7 +149,9 @@ def _drawn(outcomes: list[Outcome]) -> Figure:
         hidden, found = outcome.hidden, outcome.found
         place.plot(phases, edge(phases, hidden.amplitude_mV, hidden.phase, hidden.tau), color="0.6", label="true")
         scale = outcome.swing_mV
-        place.errorbar(found.phases, scale * found.curve, 2 * scale * found.curve_errors, fmt=".", label="estimated, ±2 se")
+        place.errorbar(
+            found.phases, scale * found.curve, 2 * scale * found.curve_errors, fmt=".", label="estimated, ±2 se"
+        )
         place.set_title(f"span {hidden.span:+.2f} frames, estimated {found.span:+.3f}", fontsize=9)
         place.set_xlabel("phase v of the array's clock [frames]")
         place.set_ylabel("c(v) [mV]")

@@ -2,8 +2,8 @@
 
     python -m benchmarks.clock_elsewhere ../shared/data/real
 
-Both are set beside pixels simulated spike by spike (`benchmarks/clock/pixels.py`) at the recordings' own rates, without and with
-the edge and the skew that the wall has (docs/clock_feedthrough.md).
+Both are set beside pixels simulated spike by spike (`benchmarks/clock/pixels.py`) at the recordings' own rates,
+without and with the edge and the skew that the wall has (docs/clock_feedthrough.md).
 """
 
 from __future__ import annotations
@@ -55,15 +55,16 @@ def simulated_maps(maps: FlatMaps, table: Array, seed: int = 0) -> FlatMaps:
     shape, rng = maps.lit.shape, np.random.default_rng(seed)
     start = np.repeat(wall_start(shape[0]), shape[1])
     dim = np.where(maps.counted, maps.dim, np.median(maps.dim[maps.counted]))
-    levels = []
-    for i, level in enumerate((maps.lit, dim, maps.dark)):
+
+    def again(level: Array) -> Array:
         rate = np.maximum(level + (rng.random(shape) - 0.5) / FRAMES, 0.1 / FRAMES).ravel()
-        levels.append(counts(1.0 / rate, start, table, WHITE, FRAMES, seed + i).reshape(shape) / FRAMES)
-    return FlatMaps(*levels, maps.counted)
+        return counts(1.0 / rate, start, table, WHITE, FRAMES, rng).reshape(shape) / FRAMES
+
+    return FlatMaps(again(maps.lit), again(dim), again(maps.dark), maps.counted)
 
 
 def smooth_maps(maps: FlatMaps, table: Array, seed: int = 0) -> FlatMaps:
-    """The same of pixels that differ by gain alone, independent of their neighbours, beside the maps' smooth shading."""
+    """The same of pixels that differ by gain alone, independent of their neighbours, and the maps' shading."""
     gain = 1.0 + two_levels(maps).gain * np.random.default_rng(seed).standard_normal(maps.lit.shape)
     dim = np.where(maps.counted, maps.dim, np.median(maps.dim[maps.counted]))
     lit, dim = (split_shading(level - maps.dark)[0] * gain + maps.dark for level in (maps.lit, dim))
@@ -90,24 +91,43 @@ def next_to_each_other(level: Array) -> Array:
 
 def print_maps(folder: Path) -> None:
     maps = read_flat_maps(folder / MAPS)
-    print(f"flat maps, {FRAMES} frames: pixels at a whole interval over what counts beside it lead to expect; 1 is none")
+    print(
+        f"flat maps, {FRAMES} frames: pixels at a whole interval over what counts beside it lead to expect; 1 is none"
+    )
     print("".ljust(16) + "335 lux: 6 frames".rjust(20) + "153 lux: 11".rjust(14) + "12 frames".rjust(12))
     worlds = {"real": maps, **{name: simulated_maps(maps, tabled(table)) for name, table in LAWS.items()}}
     for name, seen in worlds.items():
-        print(name.ljust(16) + f"{gathered(seen.lit, 6):20.2f}{gathered(seen.dim, 11):14.2f}{gathered(seen.dim, 12):12.2f}")
-    print("\nneighbours' correlation, along rows / down columns; spreads; offset [counts].  Simulated: independent pixels")
+        print(
+            name.ljust(16)
+            + f"{gathered(seen.lit, 6):20.2f}{gathered(seen.dim, 11):14.2f}{gathered(seen.dim, 12):12.2f}"
+        )
+    print(
+        "\nneighbours' correlation, along rows / down columns; spreads; offset [counts].  Simulated: independent pixels"
+    )
     worlds = {"real": maps, **{name: smooth_maps(maps, tabled(table)) for name, table in LAWS.items()}}
     for name, seen in worlds.items():
         levels, lit, dim = two_levels(seen), next_to_each_other(seen.lit), next_to_each_other(seen.dim)
         print(
-            f"{name:16s}335 lux {lit[0]:+.3f} /{lit[1]:+.3f}, spread {levels.lit:.2%}; 153 lux {dim[0]:+.3f} /{dim[1]:+.3f},"
-            f" spread {levels.dim:.2%}; offset {levels.offset:.1f}"
+            f"{name:16s}335 lux {lit[0]:+.3f} /{lit[1]:+.3f}, spread {levels.lit:.2%};"
+            f" 153 lux {dim[0]:+.3f} /{dim[1]:+.3f}, spread {levels.dim:.2%}; offset {levels.offset:.1f}"
         )
-    for name, level in (("335 lux", maps.lit), ("153 lux", maps.dim)):
-        edges = {"row 0": level[0], "row 1": level[1], "column 0": level[:, 0], "column 1": level[:, 1],
-                 "last row": level[-1], "last column": level[:, -1]}
-        beside = {"row 0": level[2:6], "row 1": level[2:6], "column 0": level[:, 2:6], "column 1": level[:, 2:6],
-                  "last row": level[-5:-1], "last column": level[:, -5:-1]}
+    for name, level in (("335 lux", maps.lit), ("153 lux", maps.dim), ("dark", maps.dark)):
+        edges = {
+            "row 0": level[0],
+            "row 1": level[1],
+            "column 0": level[:, 0],
+            "column 1": level[:, 1],
+            "last row": level[-1],
+            "last column": level[:, -1],
+        }
+        beside = {
+            "row 0": level[2:6],
+            "row 1": level[2:6],
+            "column 0": level[:, 2:6],
+            "column 1": level[:, 2:6],
+            "last row": level[-5:-1],
+            "last column": level[:, -5:-1],
+        }
         ratios = [f"{k} {np.nanmedian(v) / np.nanmedian(beside[k]) - 1:+.1%}" for k, v in edges.items()]
         print(f"{name}, median over that of the next four rows or columns: {', '.join(ratios)}")
 
@@ -142,11 +162,12 @@ def print_low_light(folder: Path) -> None:
     slow = (times.count >= 5) & (times.count <= 10)
     tables = {"real": second_difference(spikes, slow)}
     for name, table in LAWS.items():
-        rate = plausible_rates(times, WHITE, np.random.default_rng(0))
-        made = recorded(1.0 / rate, np.repeat(wall_start(rows), columns), tabled(table), WHITE, frames, 1)
+        rng = np.random.default_rng(0)
+        start = np.repeat(wall_start(rows), columns)
+        made = recorded(1.0 / plausible_rates(times, WHITE, rng), start, tabled(table), WHITE, frames, rng)
         tables[name] = second_difference(made.reshape(spikes.shape), slow)
-    print(f"\nlow light: of the {slow.sum()} pixels of 5 to 10 spikes in {frames} frames those whose N(t) leaves its line by less")
-    print(f"than {MOST_SPREAD} spikes, number and A_1 [frames^2] by rows")
+    print(f"\nlow light: of the {slow.sum()} pixels of 5 to 10 spikes in {frames} frames those whose N(t) leaves")
+    print(f"its line by less than {MOST_SPREAD} spikes, number and A_1 [frames^2] by rows")
     print("rows".ljust(10) + "".join(name.rjust(24) for name in tables))
     for b, first in enumerate(range(0, rows, BAND)):
         cells = [f"{t[b][0]:6d}{t[b][1]:9.3f} ± {t[b][2]:.3f}".rjust(24) for t in tables.values()]

@@ -1,1 +1,1 @@
-"""The array's clock and its disturbance c(v) of the threshold: a law of phases, own pixels, and a campaign that measures it."""
+"""The array's clock and its disturbance c(v) of the threshold: a law of phases, own pixels, a campaign."""

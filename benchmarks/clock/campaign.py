@@ -1,8 +1,9 @@
 """The campaign: flats whose mean interval is a whole number n of frames and a hundredth less and more, and references.
 
-An interval free of c(v), 1 / (gain * light + dark), is known of each pixel from the references, flats whose intervals are no
-simple fractions: c pulls a rate there by less than a thousandth, and one way as often as the other.  Pixels differ by more than
-a hundredth, so each flat holds pixels at all distances from n; the hundredths give each pixel three.
+An interval free of c(v), 1 / (gain * light + dark), is known of each pixel from the references, flats whose intervals
+are no simple fractions: c pulls a rate there by less than a thousandth, and one way as often as the other.  Pixels
+differ by more than a hundredth, so each flat holds pixels at all distances from n; the hundredths give each pixel
+three.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def record(model: SensorModel, shape: tuple[int, int], design: Flats, seed: int)
     for near in NEAR:
         interval = design.interval + near
         free = 1.0 / (line[0] / (interval * light) + line[1])
-        each.append(_steps(flat(interval, design.near_frames).reshape(design.near_frames, -1), design.interval))
+        each.append(spike_steps(flat(interval, design.near_frames).reshape(design.near_frames, -1), design.interval))
         offsets.append(free - design.interval)
     rows = np.tile(np.arange(shape[0]).repeat(shape[1]), len(NEAR))
     return counted(np.concatenate(each), np.concatenate(offsets), rows, design.interval)
@@ -98,7 +99,7 @@ def _lines(times: list[SpikeTimes], light: Array) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def _steps(spikes, interval):  # type: ignore[no-untyped-def]
+def spike_steps(spikes, interval):  # type: ignore[no-untyped-def]
     """(P, 3) intervals of (T, P) spikes, and those of one frame more and one less than `interval`."""
     frames, pixels = spikes.shape
     out = np.zeros((pixels, 3))

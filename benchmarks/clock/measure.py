@@ -1,15 +1,16 @@
 """c(v), the noise of a spike and the skew of the rows, from the steps that pixels near a whole interval make.
 
-A cell is a row by an offset d of the free interval.  Two things are fitted to what `phases` foretells, by least squares:
+A cell is a row by an offset d of the free interval.  Two things are fitted to what `phases` foretells, by least
+squares:
 
     drift(d) = (up - down) of all rows      one pixel's is fixed to a step; says which values c takes, for how long
     shifts(row, d) = up + down of a cell    says at which phases, where rows are read
 
-First by one edge a frame (amplitude, moment, tau), the noise s, the skew and a common error of all d, as the references have
-it, from a scan over all; then by a curve that is free
-beside the edge, with hats at NODES phases, all parameters together.  Counts scatter more than Poisson's where pixels gather, as
-each stays at a place of its own: errors are scaled, by offset, by the scatter that a first fit leaves.  A pixel counts in several
-cells of its row, so they are scaled again by the scatter of the rows' sums.  The edge itself is seen no finer than rows are apart.
+First by one edge a frame (amplitude, moment, tau), the noise s, the skew and a common error of all d, as the
+references have it, from a scan over all; then by a curve that is free beside the edge, with hats at NODES phases, all
+parameters together.  Counts scatter more than Poisson's where pixels gather, as each stays at a place of its own:
+errors are scaled, by offset, by the scatter that a first fit leaves.  A pixel counts in several cells of its row, so
+they are scaled again by the scatter of the rows' sums.  The edge itself is seen no finer than rows are apart.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ NODES = 16
 """Phases at which the curve is free; a node every 3 us at 20 kHz, what a spike's noise leaves apart at T = 2."""
 
 FREE = 0.003
-"""Standard deviation that the curve is given beside the edge, before the data [thresholds]: a third of the real camera's edge."""
+"""Standard deviation of the curve beside the edge, before the data [thresholds]: a third of the wall's edge."""
 
 _AMPLITUDES = (-0.016, -0.008, -0.004, 0.004, 0.008, 0.016)
 _TAUS = (0.08, 0.2, 0.45)
@@ -37,6 +38,9 @@ _SPANS = np.concatenate([-np.arange(0.3, 1.26, 0.05), np.arange(0.3, 1.26, 0.05)
 _MOMENTS = np.arange(0.0, 1.0, 1 / 64)
 _NOISE = 0.008
 """Starts of the scan [thresholds, frames]; noise of a spike of the published camera, roughly."""
+
+_SCALES = np.linspace(0.7, 1.4, 29)
+"""Of span and tau, tried about the best place."""
 
 _STARTS = 4
 """Of the scan's pairs of amplitude and tau, so many are fitted."""
@@ -58,9 +62,9 @@ _UNEVEN = 2e-5
 class Steps:
     """What pixels of intervals interval + offsets (D,) did.
 
-    intervals, shifts: (rows, D) numbers of intervals, and of those a frame longer or shorter.
-    drift, drift_sd: (D,) mean of (longer - shorter) an interval, and its standard error over pixels; drift_at: the mean offset
-    of these pixels [frames].  spread: (D,) how much more than Poisson's shifts scatter.
+    intervals, shifts: (rows, D) numbers of intervals, and of those a frame longer or shorter. drift, drift_sd: (D,)
+    mean of (longer - shorter) an interval, and its standard error over pixels; drift_at: the mean offset of these
+    pixels [frames].  spread: (D,) how much more than Poisson's shifts scatter.
     """
 
     interval: int
@@ -75,8 +79,9 @@ class Steps:
 
 @dataclass(frozen=True)
 class Measured:
-    """One edge: amplitude [thresholds], moment v0, tau, span [frames], noise s; `errors` has their standard errors in the order
-    amplitude, moment, tau, noise, span, and that of the common error of d.
+    """One edge: amplitude [thresholds], moment v0, tau, span [frames], noise s.
+
+    errors: (6,) standard errors of amplitude, moment, tau, noise, span, and the common error of d.
 
     phases, curve, curve_errors: (NODES,) v, c(v) [thresholds], mean 0, and its standard errors.
     left: mean square of what the edge leaves, in the errors of counts.
@@ -96,8 +101,8 @@ class Measured:
 
 def measure(steps: Steps) -> Measured:
     """Fit `steps`; see the module's text."""
-    starts = [_fitted(steps, start, "soft_l1") for start in _scanned(steps)]
-    law, left = min(starts, key=lambda fit: float(np.sqrt(1.0 + fit[1] ** 2).sum()))
+    law, _ = _best(steps, _scanned(steps))
+    law, left = _best(steps, _along(steps, law))
     shifts = left[: steps.shifts.size].reshape(steps.shifts.shape)
     steps = replace(steps, spread=np.sqrt(np.maximum(np.mean(shifts**2, axis=0), 1.0)))
     law, left = _fitted(steps, law, "linear")
@@ -151,12 +156,41 @@ def _scanned(steps: Steps) -> list[Array]:
     for amplitude, tau in product(_AMPLITUDES, _TAUS):
         foretold = walk(sampled(edge, amplitude, 0.0, tau), _NOISE, float(steps.interval), steps.offsets)
         sizes = {
-            (moment, span): float(np.sqrt(1.0 + _left(steps, foretold, moment, span) ** 2).sum())
-            for moment, span in product(_MOMENTS, _SPANS)
+            (moment, span): _size(_left(steps, foretold, moment, span)) for moment, span in product(_MOMENTS, _SPANS)
         }
         moment, span = min(sizes, key=lambda place: sizes[place])
         found.append((sizes[moment, span], np.array([amplitude, moment, tau, _NOISE, span, 0.0])))
     return [start for _, start in sorted(found, key=lambda pair: pair[0])[:_STARTS]]
+
+
+def _along(steps: Steps, law: Array) -> list[Array]:
+    """The law, and the _STARTS best of laws of other spans whose edge is at the same rows and decays in as many rows.
+
+    These are nearly alike to the rows; the drift tells them apart.  As an edge lies between two rows, each is a
+    minimum.
+    """
+    found = []
+    turn = law[1] % 1.0 - 1.0
+    for scale in _SCALES:
+        trial = law * (1.0, 0.0, scale, 1.0, scale, 1.0)
+        foretold = walk(_law(trial), law[3], float(steps.interval), steps.offsets + law[5])
+        for moment in scale * turn + np.linspace(-2.0, 2.0, 17) * abs(trial[4]) / (steps.shifts.shape[0] - 1):
+            size = _size(_left(steps, foretold, moment, trial[4]))
+            found.append((size, trial + moment % 1.0 * np.eye(6)[1]))
+    found.sort(key=lambda pair: pair[0])
+    spans: dict[float, Array] = {}
+    for _, start in found:
+        spans.setdefault(float(start[4]), start)
+    inside = [start for start in spans.values() if abs(start[4]) < _HIGHEST[4]]
+    return [law, *inside[:_STARTS]]
+
+
+def _best(steps: Steps, starts: list[Array]) -> tuple[Array, Array]:
+    return min((_fitted(steps, start, "soft_l1") for start in starts), key=lambda fit: _size(fit[1]))
+
+
+def _size(left: Array) -> float:
+    return float(np.sqrt(1.0 + left**2).sum())
 
 
 def _fitted(steps: Steps, start: Array, loss: str) -> tuple[Array, Array]:

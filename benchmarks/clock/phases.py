@@ -1,25 +1,26 @@
-"""How the phases of a pixel's spikes walk through the clock's frame, where the threshold has a periodic disturbance c(v).
+"""How the phases of a pixel's spikes walk through the clock's frame under a periodic disturbance c(v).
 
     charge since the reset:  (t' - t) / T >= 1 + xi + c(t')          xi: noise of one spike, standard deviation s
     so                       t' = Theta(t + T + T xi),  Theta inverse to  Psi(t) = max over t'' <= t of (t'' - T c(t''))
 
-t, t' are times of successive crossings [frames], by the array's clock; c is in thresholds and has period 1, so both maps
-do.  Psi rises by -T a where the threshold falls by -a: everything within the fall crosses at once.  Its level stretches
-are moments at which nothing crosses, while a raised threshold is caught up with.
+t, t' are times of successive crossings [frames], by the array's clock; c is in thresholds and has period 1, so both
+maps do.  Psi rises by -T a where the threshold falls by -a: everything within the fall crosses at once.  Its level
+stretches are moments at which nothing crosses, while a raised threshold is caught up with.
 
 With T = n + d the phase moves on by d + T c(v) a spike.  Where this has a zero the phase stays (the pixel is gathered);
 elsewhere it dwells as 1 / (d + T c).  y = Psi(t') has a density even where t' has none:
 
     p(y') = integral of p(y) N(y'; Theta(y) + T, (sT)^2) dy       on the circle
 
-A row whose bits are counted from phase b of the clock on, frame floor(t - b), sees an interval of n + 1 with probability
-up, one of n - 1 with probability down.  With B = Psi(b), over B <= y < B + 1:
+A row whose bits are counted from phase b of the clock on, frame floor(t - b), sees an interval of n + 1 with
+probability up, one of n - 1 with probability down.  With B = Psi(b), over B <= y < B + 1:
 
     up   = integral of p(y) P(Theta(y) + d + T xi >= B + 1) dy
     down = integral of p(y) P(Theta(y) + d + T xi <  B) dy
 
-up - down is the mean drift, the same for all b: the pixel's rate says it.  up + down is large where the phase dwells at b.
-So a row measures how long its pixels stay at its own b, and the rows together measure it at all phases that they cover.
+up - down is the mean drift, the same for all b: the pixel's rate says it.  up + down is large where the phase dwells
+at b. So a row measures how long its pixels stay at its own b, and the rows together measure it at all phases that
+they cover.
 """
 
 from __future__ import annotations

@@ -43,14 +43,18 @@ def tabled(law: Array | None) -> Array:
     return np.zeros(POINTS) if law is None else law
 
 
-def recorded(interval: Array, start: Array, table: Array, white: float, frames: int, seed: int) -> NDArray[np.uint8]:
+def recorded(
+    interval: Array, start: Array, table: Array, white: float, frames: int, rng: np.random.Generator
+) -> NDArray[np.uint8]:
     """(frames, P) spikes of pixels of free intervals (P,) [frames], in rows that begin at phases `start` (P,)."""
-    return _recorded(interval, start, table, np.sqrt(white), frames, seed)  # type: ignore[no-any-return]
+    return _recorded(interval, start, table, np.sqrt(white), frames, rng)  # type: ignore[no-any-return]
 
 
-def counts(interval: Array, start: Array, table: Array, white: float, frames: int, seed: int) -> NDArray[np.int64]:
+def counts(
+    interval: Array, start: Array, table: Array, white: float, frames: int, rng: np.random.Generator
+) -> NDArray[np.int64]:
     """(P,) numbers of spikes of the same pixels in `frames` frames."""
-    return _counts(interval, start, table, np.sqrt(white), frames, seed)  # type: ignore[no-any-return]
+    return _counts(interval, start, table, np.sqrt(white), frames, rng)  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
@@ -86,15 +90,14 @@ def _theta(psi, y):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _recorded(interval, start, table, noise, frames, seed):  # type: ignore[no-untyped-def]
-    np.random.seed(seed)
+def _recorded(interval, start, table, noise, frames, rng):  # type: ignore[no-untyped-def]
     out = np.zeros((frames, interval.size), np.uint8)
     psi = np.empty(table.size + 1)
     for p in range(interval.size):
         _psi(table, interval[p], psi)
-        t = (np.random.random() - 1.0 - _SETTLE) * interval[p]
+        t = (rng.random() - 1.0 - _SETTLE) * interval[p]
         while True:
-            t = _theta(psi, t + interval[p] * (1.0 + noise * np.random.standard_normal()))
+            t = _theta(psi, t + interval[p] * (1.0 + noise * rng.standard_normal()))
             frame = np.floor(t - start[p])
             if frame >= frames:
                 break
@@ -104,15 +107,14 @@ def _recorded(interval, start, table, noise, frames, seed):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _counts(interval, start, table, noise, frames, seed):  # type: ignore[no-untyped-def]
-    np.random.seed(seed)
+def _counts(interval, start, table, noise, frames, rng):  # type: ignore[no-untyped-def]
     out = np.zeros(interval.size, np.int64)
     psi = np.empty(table.size + 1)
     for p in range(interval.size):
         _psi(table, interval[p], psi)
-        t = (np.random.random() - 1.0 - _SETTLE) * interval[p]
+        t = (rng.random() - 1.0 - _SETTLE) * interval[p]
         while True:
-            t = _theta(psi, t + interval[p] * (1.0 + noise * np.random.standard_normal()))
+            t = _theta(psi, t + interval[p] * (1.0 + noise * rng.standard_normal()))
             frame = np.floor(t - start[p])
             if frame >= frames:
                 break
