@@ -27,8 +27,8 @@ demo: install
 test: install-dev
 	$(BIN)/python -m pytest $(SHARED_OUT)
 
-# The oldest releases that pyproject.toml allows (constraints-oldest.txt), in an environment of their own; numba's
-# compiled code of one release is no use to another, so it goes to a folder of its own too.
+# The oldest releases that pyproject.toml allows (constraints-oldest.txt), in an environment of their own, without the
+# slow tests; numba's compiled code of one release is no use to another, so it goes to a folder of its own too.
 OLDEST := $(VENV)-oldest
 OLDEST_TESTS := tests/test_requirements.py tests/test_untrusted.py tests/streams tests/scenes tests/cli tests/envs
 
@@ -39,7 +39,7 @@ $(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
 
 test-oldest: $(OLDEST)/.installed
 	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning \
-		$(SHARED_OUT) $(OLDEST_TESTS)
+		$(SHARED_OUT) -m 'not slow' $(OLDEST_TESTS)
 
 # The committed diagnoses of real recordings, where these are at hand, and every figure about them in docs.
 pages: install-dev

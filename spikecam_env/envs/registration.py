@@ -59,8 +59,8 @@ SMALL_TASKS = tuple(name for name in TASK_ENVIRONMENTS if "-Full" not in name)
 
 def register() -> None:
     """Register every id that is not registered yet, each with the native vector environment of its class."""
-    limited = {name: {"max_episode_steps": MAX_EPISODE_STEPS} for name in ENVIRONMENTS}
     for name, (entry_point, options) in (ENVIRONMENTS | TASK_ENVIRONMENTS).items():
         if name not in gymnasium.registry:
             vector = f"spikecam_env.envs.vector_of:{entry_point.replace(':', '.')}"
-            gymnasium.register(name, entry_point, kwargs=options, vector_entry_point=vector, **limited.get(name, {}))
+            steps = MAX_EPISODE_STEPS if name in ENVIRONMENTS else None
+            gymnasium.register(name, entry_point, max_episode_steps=steps, kwargs=options, vector_entry_point=vector)

@@ -59,7 +59,7 @@ def wander(
     free = np.asarray(start) - middle + step * np.cumsum(np.stack([np.cos(turns), np.sin(turns)], axis=1), axis=0)
     free = np.vstack([np.asarray(start) - middle, free])
     folded = half - np.abs((free + half) % (4 * half) - 2 * half)
-    return Path(np.arange(count + 1) * view.frames(PIECE_S), middle + folded)
+    return Path(np.arange(count + 1, dtype=np.float64) * view.frames(PIECE_S), np.asarray(middle + folded, np.float64))
 
 
 PIECE_S = 0.001
