@@ -138,11 +138,12 @@ def test_bad_calls_are_named() -> None:
         env.reset(seed=0)
 
 
-def test_the_page_about_observations_runs() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "observations.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["observations.md", "environments.md"])
+def test_the_pages_about_environments_run(name: str) -> None:
+    page = (Path(__file__).parents[2] / "docs" / name).read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     assert len(blocks) == 1
-    exec(compile(blocks[0], "docs/observations.md", "exec"), {})
+    exec(compile(blocks[0], name, "exec"), {"__name__": "__main__"})
 
 
 def test_the_bench_has_a_row_for_each_way() -> None:

@@ -1,4 +1,4 @@
-"""Exposure: Track under a light that changes a hundredfold, with an iris before the camera.
+"""Exposure: Track under a light that changes a thousandfold, with an iris before the camera.
 
     log10(ambient(t)) = swing sin(2 pi t / period + phase),   light on the sensor = scene * ambient * iris
     log10(iris) changes by the action's third number * iris_decades_s                               [1/s]
