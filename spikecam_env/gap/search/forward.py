@@ -126,7 +126,8 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
     starts = starts_to_fit(screened, robust_squares(distance, null.weight), groups_that_stand_out(null, distance))
     confirm = partial(confirmed, here)
     fits, tries = fits_of(here, turn.misfit, starts)
-    if len(problem.model.effects) + MOST_EFFECTS - len(here.model.effects) > 1:
+    places = MOST_EFFECTS - (len(here.model.effects) - len(problem.model.effects))
+    if places > 1:
         fits = with_pairs(fits, fit_pairs(here, left))
     visible = [f for f in fits if is_visible(null, f)]
     done, rest = confirmed_in_order(visible, confirm, enough=turn.misfit - turn.to_join)
