@@ -276,7 +276,7 @@ def _rows(factor: Array | float, now: Exposure) -> Array:
 
 def _plain(values: Array) -> Array:
     """In C order and writeable, though nobody writes: numba compiles `advance` anew for an array that is read-only."""
-    return np.require(values, requirements="CW")
+    return np.require(values, requirements=["C", "W"])
 
 
 def _sum(feedbacks: Sequence[Feedback]) -> Feedback:
