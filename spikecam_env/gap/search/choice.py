@@ -54,9 +54,8 @@ def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) ->
     ]
     behind = {f.name: lead(null, values, first, f.prediction) for f in close}
     had = {e.name for e in here.model.effects}
-    parameters = {
-        f.name: sum(len(candidate(e.name).fitted) for e in f.model.effects if e.name not in had) for f in close
-    }
+    added = {f.name: {f.name, *(e.name for e in f.model.effects)} - had for f in close}
+    parameters = {name: sum(len(candidate(n).fitted) for n in names) for name, names in added.items()}
     close.sort(key=lambda f: behind[f.name] + TO_PREFER * parameters[f.name])
     best = close[0]
     left = residual(null, values, best.prediction)
