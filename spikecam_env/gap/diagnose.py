@@ -277,10 +277,10 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
 
 
 def templates_for(comparison: Comparison, progress: bool) -> Templates:
-    """Those of the standard design, or of scenes that nobody measured their own."""
+    """Those of the standard design, or of scenes that nobody measured their own; the budget is for neither."""
     case = comparison.case
     if case.scenes_only:
-        return own_templates(case, comparison.model, comparison.null, comparison.names)
+        return own_templates(replace(case, budget=Budget()), comparison.model, comparison.null, comparison.names)
     return templates_of(comparison.names, jobs=case.jobs, progress=progress)
 
 

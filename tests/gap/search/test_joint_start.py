@@ -11,6 +11,7 @@ from small import MODEL, effect
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import values_of
+from spikecam_env.gap.diagnose import templates_for
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.observe.conditions import Condition
@@ -96,3 +97,11 @@ def test_a_spent_budget_starts_none(problem: Problem):
     poor = replace(problem, case=replace(problem.case, budget=replace(problem.case.budget, limit=0.0)))
     assert fit_pairs(poor, PAIR.names) == []
     assert poor.case.budget.left_out == ["clock_feedthrough with readout_skew"]
+
+
+def test_templates_of_a_scene_do_not_count_towards_the_effort(problem: Problem):
+    case = problem.case
+    before = case.budget.simulated
+    comparison = SimpleNamespace(case=case, model=problem.model, null=problem.null, names=["missed_spikes"])
+    made = templates_for(comparison, progress=False)  # type: ignore[arg-type]
+    assert made.entries and case.budget.simulated == before
