@@ -21,6 +21,7 @@ from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
 from spikecam_env.gap.search.neighbours import is_missed, try_without_earlier
 from spikecam_env.gap.search.round import is_improvement
 from spikecam_env.gap.statistics import Key
+from spikecam_env.sensor import CATALOGUE
 
 COUNT, TWINS = 20, 6
 NAME = "incomplete_reset"
@@ -77,7 +78,8 @@ def found_at(fraction: float, misfit: float) -> Fit:
 
 
 def some_fit(name: str, misfit: float) -> Fit:
-    return replace(found_at(0.02, misfit), name=name)
+    model = MODEL.with_effect(effect(name)) if name in CATALOGUE else MODEL
+    return replace(found_at(0.02, misfit), name=name, model=model)
 
 
 @pytest.mark.parametrize("promised, steps", [(0.7, 0), (1.5, 1)])
@@ -164,7 +166,10 @@ class Led:
         monkeypatch.setattr(choice, "is_rival", lambda *_: rival)
 
     def chosen(self, first: str, other: str):
-        self.first, self.other = replace(self.first, name=first), replace(self.other, name=other)
+        self.first, self.other = (
+            replace(fit, name=name, model=MODEL.with_effect(effect(name)))
+            for fit, name in ((self.first, first), (self.other, other))
+        )
         fits, names = chosen_of(self.here, self.here.null.draws, [self.first, self.other])
         return fits[0].name, names
 
