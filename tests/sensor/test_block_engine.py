@@ -23,6 +23,8 @@ from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.random_fields import octave_field, white_field, words
 
+pytestmark = pytest.mark.slow
+
 SHAPE = (30, 400)
 FRAME_EFFECTS = sorted(name for name, effect in CATALOGUE.items() if not effect.is_fixed())
 

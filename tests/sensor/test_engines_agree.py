@@ -16,6 +16,8 @@ from scipy import stats
 from benchmarks.agreement import compare, independent, neighbours, observe, same_law
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 
+pytestmark = pytest.mark.slow
+
 PIXELS = 12_000
 SHAPE = (PIXELS // 400, 400)
 

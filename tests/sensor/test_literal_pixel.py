@@ -13,6 +13,8 @@ from benchmarks.literal_pixel import BEGIN, END, chosen_cases, compare, main
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects import CATALOGUE
 
+pytestmark = pytest.mark.slow
+
 
 def test_every_effect_has_a_setting() -> None:
     """shot_noise is in all of them, and `light` is shot noise alone."""

@@ -8,6 +8,8 @@ from laws import check_mean, jittered, spike_frames
 
 from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
 
+pytestmark = pytest.mark.slow
+
 ENGINES = ("reference", "fast")
 QUANTA, KAPPA = 500.0, 0.02
 
