@@ -59,6 +59,11 @@ class Fit:
     misfit: float
     model: SensorModel
 
+    def added_to(self, model: SensorModel) -> list[str]:
+        """Effects that it adds to a model, by name: its own, then those that are fitted with it."""
+        has = {self.name, *(e.name for e in model.effects)}
+        return [self.name, *(e.name for e in self.model.effects if e.name not in has)]
+
 
 def fit(
     problem: Problem, name: str, start: Mapping[str, float], expected: Array | None = None, white: float = 1.0

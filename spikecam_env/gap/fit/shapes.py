@@ -17,7 +17,7 @@ from spikecam_env.gap.compare.prediction import Prediction
 from spikecam_env.gap.compare.thresholds import TO_STEP_SHAPE
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import error_of
-from spikecam_env.gap.fit.gauss_newton import descend
+from spikecam_env.gap.fit.gauss_newton import Descent, Free, descend
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
@@ -49,18 +49,21 @@ def with_fitted_shapes(problem: Problem, found: Fit) -> Fit:
     def probe(there: SensorModel, base: BaseFit) -> Prediction:
         return problem.predict(there, constrained_refit(there, base), twins_of(found.name), only)
 
-    names = candidate(found.name).fitted
-    free = [(found.name, key) for key in names]
+    free = [(found.name, key) for key in candidate(found.name).fitted]
     end = descend(problem, probe, found.model, found.base, free, TO_STEP_SHAPE)
+    shaped = where_ended(problem, found, end, free)
+    return found if shaped.misfit > found.misfit else shaped
+
+
+def where_ended(problem: Problem, found: Fit, end: Descent, free: Free) -> Fit:
+    """The fit where a descent over the parameters `free`, of other effects too, ended; its own errors."""
     rho, left = problem.residual_and_misfit(end.prediction)
-    if left > found.misfit:
-        return found
     values = next(e for e in end.model.effects if e.name == found.name).parameters()
-    errors = np.sqrt(np.diag(end.covariance))
+    errors = zip(free, np.sqrt(np.diag(end.covariance)), strict=True)
     return replace(
         found,
         parameters={k: values[k] for k in found.parameters},
-        sd={k: error_of(found.name, k, values[k], float(e)) for k, e in zip(names, errors, strict=True)},
+        sd={k: error_of(name, k, values[k], float(e)) for (name, k), e in errors if name == found.name},
         prediction=end.prediction,
         base=end.base,
         rho=rho,

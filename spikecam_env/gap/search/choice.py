@@ -53,9 +53,7 @@ def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) ->
         or is_rival(null, draws, seen, first, f.prediction)
     ]
     behind = {f.name: lead(null, values, first, f.prediction) for f in close}
-    had = {e.name for e in here.model.effects}
-    added = {f.name: {f.name, *(e.name for e in f.model.effects)} - had for f in close}
-    parameters = {name: sum(len(candidate(n).fitted) for n in names) for name, names in added.items()}
+    parameters = {f.name: sum(len(candidate(n).fitted) for n in f.added_to(here.model)) for f in close}
     close.sort(key=lambda f: behind[f.name] + TO_PREFER * parameters[f.name])
     best = close[0]
     left = residual(null, values, best.prediction)

@@ -2,7 +2,7 @@
 
 An edge of the array's clock gathers pixels in every row, and is seen as late and early spikes where rows are read at
 its moment: in a static scene a read-out that rolls through the rows shows by the edge alone, and the edge, without it,
-fits no row but few.  An effect says which other it starts with, and from which strengths (`start_with`).
+fits few rows.  An effect says which other it starts with, and from which values of their parameters (`start_with`).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
 from spikecam_env.gap.compare.thresholds import TO_PREFER, TO_STEP_SHAPE
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.fit.coordinates import error_of
 from spikecam_env.gap.fit.gauss_newton import descend
 from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.shapes import where_ended
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -70,35 +70,32 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
         f"{pair.first} with {pair.second}", len(only) * (len(grid) + DESCENTS * (1 + len(free))), needed=True
     ):
         return None
-    key = candidate(pair.first).strength
+    fitted = candidate(pair.first).fitted
+    strength = fitted[0]
 
-    def start(parameters: dict[str, float]) -> tuple[float, SensorModel]:
+    def start(parameters: dict[str, float]) -> Fit:
         second, first = (CATALOGUE[name]().parameters() | bounded(name, parameters) for name in reversed(pair.names))
         model = with_effect(here.model, pair.second, second)
         tried = with_effect(model, pair.first, first)
         predicted = here.predict(tried, constrained_refit(tried, here.case.base), 1, only)
         scale, _ = scale_to(here.null, here.seen, predicted)
         scale = float(np.sign(scale) * np.clip(abs(scale), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
-        scaled = bounded(pair.first, {**first, key: first[key] * scale})
-        return here.misfit(with_change_scaled(here.null, predicted, scale)), with_effect(model, pair.first, scaled)
+        scaled = bounded(pair.first, {**first, strength: first[strength] * scale})
+        predicted, there = with_change_scaled(here.null, predicted, scale), with_effect(model, pair.first, scaled)
+        rho, left = here.residual_and_misfit(predicted)
+        own = {k: scaled[k] for k in fitted}
+        return Fit(pair.first, own, {}, predicted, constrained_refit(there, here.case.base), rho, left, there)
 
     def probe(there: SensorModel, base: BaseFit) -> Prediction:
         return here.predict(there, constrained_refit(there, base), 1, only)
 
-    def fitted(model: SensorModel) -> Fit:
-        end = descend(here, probe, model, constrained_refit(model, here.case.base), free, TO_STEP_SHAPE)
-        rho, left = here.residual_and_misfit(end.prediction)
-        values = {e.name: e.parameters() for e in end.model.effects}
-        errors = np.sqrt(np.diag(end.covariance))
-        sd = {
-            k: error_of(n, k, values[n][k], float(e)) for (n, k), e in zip(free, errors, strict=True) if n == pair.first
-        }
-        parameters = {k: values[pair.first][k] for k in candidate(pair.first).fitted}
-        return Fit(pair.first, parameters, sd, end.prediction, end.base, rho, left, end.model)
+    def descended(found: Fit) -> Fit:
+        end = descend(here, probe, found.model, found.base, free, TO_STEP_SHAPE)
+        return where_ended(here, found, end, free)
 
     with ThreadPoolExecutor(here.case.jobs) as pool:
-        best = sorted(pool.map(start, grid), key=lambda s: s[0])[:DESCENTS]
-        fits = list(pool.map(fitted, [model for _, model in best]))
+        best = sorted(pool.map(start, grid), key=lambda f: f.misfit)[:DESCENTS]
+        fits = list(pool.map(descended, best))
     return min(fits, key=lambda f: f.misfit)
 
 
@@ -110,18 +107,11 @@ def with_pairs(fits: Sequence[Fit], of_pairs: Sequence[Fit]) -> list[Fit]:
     return [*better.values(), *(f for f in fits if f.name not in better)]
 
 
-def brought_along(turn: Round) -> list[str]:
-    """Effects that the best of a round has in its model besides itself and what the round stands on."""
-    best = turn.fits[0]
-    has = {e.name for e in turn.model.effects}
-    return [e.name for e in best.model.effects if e.name not in has and e.name != best.name]
-
-
 def one_by_one(turn: Round) -> list[Round]:
-    """The round; where its best has brought another effect along, as two, the second of that one."""
+    """The round; where another effect is fitted with its best, as two, the second of that one."""
     best = turn.fits[0]
     rounds = [turn]
-    for name in brought_along(turn):
+    for name in best.added_to(turn.model)[1:]:
         effect = next(e for e in best.model.effects if e.name == name)
         parameters = {k: effect.parameters()[k] for k in candidate(name).fitted}
         own = replace(best, name=name, parameters=parameters, sd={})
