@@ -11,6 +11,7 @@ from scenes.disk import RotatingDisk
 from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
 from spikecam_env.envs.episode import Episode
 from spikecam_env.envs.registration import MAX_EPISODE_STEPS
+from spikecam_env.envs.task import DRIFT, drawn_within
 from spikecam_env.errors import InputError, unknown_name
 
 
@@ -45,7 +46,7 @@ class RotatingDiskEnv(AimingEnv):
     ) -> None:
         super().__init__(self._draw, shape=shape, **camera)
         self.start_offset_px = _limit("start_offset_px", start_offset_px, 0.25 * min(self.shape))
-        self.drift_px_s = _limit("drift_px_s", drift_px_s, 0.8 * min(self.shape))
+        self.drift_px_s = _limit("drift_px_s", drift_px_s, DRIFT * min(self.shape))
         self._disk = RotatingDisk(
             self.shape, rpm, radius, light, texture, background, texture_seed, self.model.frame_rate_hz
         )
@@ -53,10 +54,10 @@ class RotatingDiskEnv(AimingEnv):
     def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Episode:
         """The disk of one episode: always the same number of draws, so that an option changes nothing else."""
         middle_x, middle_y = self._disk.centre
-        x, y = _within(rng, self.start_offset_px)
+        x, y = drawn_within(rng, self.start_offset_px)
         drawn = {
             "centre": (middle_x + x, middle_y + y),
-            "drift_px_s": _within(rng, self.drift_px_s),
+            "drift_px_s": drawn_within(rng, self.drift_px_s),
             "angle": float(rng.uniform(0, 2 * np.pi)),
         }
         for name in options:
@@ -64,12 +65,6 @@ class RotatingDiskEnv(AimingEnv):
                 raise unknown_name("option of reset", name, drawn)
         disk = self._disk.placed(**{**drawn, **options})
         return Episode(disk, "disk", SUCCESS_SHARE * min(self.shape), MAX_EPISODE_STEPS)
-
-
-def _within(rng: np.random.Generator, most: float) -> tuple[float, float]:
-    """A point drawn evenly from the disc of this radius."""
-    distance, direction = most * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi)
-    return float(distance * np.cos(direction)), float(distance * np.sin(direction))
 
 
 def _limit(name: str, value: float | None, default: float) -> float:

@@ -17,7 +17,7 @@ from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
 from spikecam_env.envs.episode import Episode
 from spikecam_env.envs.passes import Passes, passes
 from spikecam_env.envs.registration import MAX_EPISODE_STEPS
-from spikecam_env.envs.task import is_inside
+from spikecam_env.envs.task import DRIFT, drawn_within, is_inside, polar
 from spikecam_env.errors import InputError, unknown_name
 
 LATEST_START = 40_000
@@ -35,10 +35,6 @@ GAZE_OVER_TARGET = 2.0
 RANDOM_TOP = 100.0
 """[shorter sides/s] Top speed of the targets of random worlds, taken for all alike so that an action means the same in
 each: `envs.passes` gives 22 as the median of 60 worlds, 97 as the 99 % quantile, 130 as the highest."""
-
-MOUNT_DRIFT = 0.8
-"""[shorter sides/s] Most that the camera's mount drifts, as the disk of `RotatingDisk-v0`: nothing stays in view by
-itself, also where the target turns on the spot."""
 
 _STARTS = 64
 """Moments drawn for an episode to start at; the first is taken that has the target in view, and time left."""
@@ -109,8 +105,8 @@ class SceneEnv(AimingEnv):
     def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Episode:
         """One episode: always the same number of draws, so that an option changes nothing else."""
         seed, starts = int(rng.integers(2**31)), rng.integers(LATEST_START, size=_STARTS)
-        past = _polar(self.start_offset_px * rng.uniform(0.5, 1.0), rng.uniform(0, 2 * np.pi))
-        drift = _polar(MOUNT_DRIFT * min(self.shape) * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi))
+        past = polar(self.start_offset_px * rng.uniform(0.5, 1.0), rng.uniform(0, 2 * np.pi))
+        drift = drawn_within(rng, DRIFT * min(self.shape))
         known = ("start_frame", "offset", "drift_px_s", *(("seed",) if self._unexposed is None else ()))
         for name in options:
             if name not in known:
@@ -165,7 +161,3 @@ def _passes(
     """Kept, since environments of a kind are made in numbers, and a scene of many bodies takes a second."""
     scene = _followed(name, target, shape, seed, frame_rate_hz)
     return passes(scene, target or next(iter(scene.places(0.0))), last)
-
-
-def _polar(distance: float, direction: float) -> tuple[float, float]:
-    return float(distance * np.cos(direction)), float(distance * np.sin(direction))

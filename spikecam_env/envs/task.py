@@ -17,6 +17,21 @@ PROGRESS = 20.0
 """Reward for the whole way from a corner to the middle: of the order of ten, so that usual learning rates fit."""
 
 
+DRIFT = 0.8
+"""[shorter sides/s] Most that a disk, or the mount of a camera, drifts: nothing stays in view by itself, also where the
+target turns on the spot."""
+
+
+def drawn_within(rng: np.random.Generator, most: float) -> tuple[float, float]:
+    """A point drawn evenly from the disc of this radius."""
+    return polar(most * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi))
+
+
+def polar(distance: float, direction: float) -> tuple[float, float]:
+    """(x, y) at a distance, in a direction [radians]."""
+    return float(distance * np.cos(direction)), float(distance * np.sin(direction))
+
+
 def distance_from_middle(place: tuple[float, float], shape: tuple[int, int]) -> float:
     """Of a place (x, y) in the picture [pixels]."""
     rows, columns = shape

@@ -91,7 +91,7 @@ def viewed(space: spaces.Space[Any], env: Any) -> View:
     if space.shape is None or len(space.shape) != 3 or space.dtype not in (np.int8, np.uint8, np.bool_):
         raise InputError(f"observations are {space}; they must be unpacked spike blocks (frames, rows, columns)")
     frames, rows, columns = space.shape
-    one = getattr(env.unwrapped, "envs", [env])[0].unwrapped if hasattr(env.unwrapped, "envs") else env.unwrapped
+    one = getattr(env.unwrapped, "envs", [env])[0].unwrapped
     rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else View.frame_rate_hz
     return View((rows, columns), frames, rate)
 

@@ -1,9 +1,9 @@
 """Reward for coming nearer: the change of a reward in place of the reward.
 
-    progress_t = SCALE (r_t - r_(t-1));  0 in the first step of an episode
+    progress_t = PROGRESS (r_t - r_(t-1));  0 in the first step of an episode
 
 Where a reward says how near the goal is, standing still near it pays as much as reaching it from afar, and little is
-learned; progress pays for what an action did.  Its sum over an episode is SCALE times the reward won.
+learned; progress pays for what an action did.  Its sum over an episode is PROGRESS times the reward won.
 """
 
 from __future__ import annotations
@@ -15,16 +15,13 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.envs.task import PROGRESS
 from spikecam_env.errors import InputError
-
-SCALE = 20.0
-"""Of the change.  Source: a trial with reward 1 - distance / half diagonal, in which PPO solved the rotating disk with
-it; a step of 1 ms at full gaze speed then pays 0.1."""
 
 
 def progress(reward: ArrayLike, before: ArrayLike) -> NDArray[np.float64]:
-    """SCALE times the change; 0 where `before` is NaN, which stands for no step before."""
-    change = SCALE * (np.asarray(reward, np.float64) - np.asarray(before, np.float64))
+    """PROGRESS times the change; 0 where `before` is NaN, which stands for no step before."""
+    change = PROGRESS * (np.asarray(reward, np.float64) - np.asarray(before, np.float64))
     return np.where(np.isnan(before), 0.0, change)
 
 
