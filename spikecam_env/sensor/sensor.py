@@ -92,6 +92,7 @@ class SpikeSensor:
         self.engine = _chosen_engine(engine, self.model, unit)
         self._imaging = Imaging(self.model.effects, self.shape)
         self._frame_effects = tuple(e for e in self.model.effects if not e.is_fixed())
+        self._wants_courses = wants_pieces(self._frame_effects)
         self._start(_checked(seed), phase=None)
 
     def reset(self, seed: int | None = None) -> None:
@@ -117,8 +118,7 @@ class SpikeSensor:
         if light is not self._film:
             warn_beside(light, self.frame, frames)
         self._film = light if isinstance(light, Keyframes) else None
-        courses = wants_pieces(self._frame_effects)
-        seen = map(self._imaging.seen, segments(light, self.frame, frames, courses))
+        seen = map(self._imaging.seen, segments(light, self.frame, frames, self._wants_courses))
         if self.engine == "fast" and self._frame_effects:
             block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
         else:
@@ -177,8 +177,8 @@ class SpikeSensor:
         noise_seed = seed if self.take == 0 else int(generator(seed, f"take {self.take}").integers(1 << 62))
         self.phase = _read_only(generator(noise_seed, "phase").random(self.shape) if phase is None else phase)
         flat = self.phase.reshape(-1)
-        of_bends = self.bent_light == "refuse" and bent.concerned(self._frame_effects, self._first_exposure())
-        self._looks_for_bends = of_bends
+        refuses = self.bent_light == "refuse"
+        self._looks_for_bends = refuses and bent.concerned(self._frame_effects, self._first_exposure())
         if self.engine == "fast" and not self._frame_effects:
             self._pixels = ahead.start(self.unit, flat, noise_seed)
         elif self.engine == "fast":
