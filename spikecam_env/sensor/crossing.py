@@ -22,6 +22,11 @@ Numbers = Sequence[float] | NDArray[np.float64]
 NEVER = 2.0
 """The moment of a crossing that is not in the frame."""
 
+MOST_AGAIN = 8
+"""Times at most that what a reset left takes a pixel to its threshold once more in a frame.  A reset leaves half a
+threshold at most, so that six use up the three thresholds a frame can hold; a reference far below the nominal would go
+on for ever, and what is above it is there in the next frame."""
+
 
 def first_crossing(begin: float, gained: float, since: float, at: Numbers, limits: Numbers) -> tuple[float, float]:
     """When a pixel is first at its limit from `since` on, NEVER if not, and the charge that the reset takes [grains].

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
-from spikecam_env.sensor.crossing import NEVER, first_crossing
+from spikecam_env.sensor.crossing import MOST_AGAIN, NEVER, first_crossing
 from spikecam_env.sensor.effects.base import Effect, Exposure, having
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Piece, Segment, on_grid, ramp
 from spikecam_env.sensor.model import generator
@@ -99,7 +99,10 @@ def step(
         spiked(effect, now, state, gained, fired)
         if effect.feedback(now).left and law.sway is None:
             again = fired
-            while (again := crossed_again(now, effects, state, mean, again, law)).any():
+            for _ in range(MOST_AGAIN):
+                again = crossed_again(now, effects, state, mean, again, law)
+                if not again.any():
+                    break
                 spiked(effect, now, state, gained, again)
     return drive.read_out(now, effects, state.memory, fired[None]).reshape(-1)
 

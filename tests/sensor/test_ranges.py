@@ -259,6 +259,9 @@ for model in (
     ideal.with_effect(E["threshold_flicker_noise"](sigma_mV=50.0, octaves=24)),
     wide.with_effect(E["common_threshold_noise"](sigma_mV=100.0)),
     wide.with_effect(E["frame_threshold_noise"](sigma_mV=100.0)),
+    wide.with_effect(E["common_threshold_noise"](sigma_mV=100.0)).with_effect(
+        E["incomplete_reset"](fraction=0.5, tau_us=0.1)
+    ),
     replace(ideal.with_effect(E["random_telegraph_noise"](amplitude_pA=1e4, fraction=1.0)), frame_rate_hz=1.0),
 ):
     streams = [SpikeSensor(model, (20, 25), 1, e).step(np.full((20, 25), 0.3), 100) for e in ("fast", "reference")]
@@ -268,7 +271,8 @@ for model in (
 
 
 def test_no_reference_that_falls_below_the_reset_makes_a_loop_without_end() -> None:
-    """Noise of comparators larger than a pixel's swing, and a dark current of two million thresholds a frame."""
+    """Noise of comparators larger than a pixel's swing, also where a reset leaves more than such a reference takes, and
+    a dark current of two million thresholds a frame."""
     done = subprocess.run([sys.executable, "-c", LOOPED_FOR_EVER], timeout=300, capture_output=True, text=True)
     print(done.stdout)
     assert done.returncode == 0, done.stderr

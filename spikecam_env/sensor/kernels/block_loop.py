@@ -25,7 +25,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.crossing import NEVER, crossing_between
+from spikecam_env.sensor.crossing import MOST_AGAIN, NEVER, crossing_between
 from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
@@ -41,7 +41,7 @@ WORTH, SPARSE = 4, 0.5
 """Frames of a block from which on, and spikes a pixel and frame up to which, going from spike to spike is faster than
 going from frame to frame."""
 
-DRAWS, DECAY, CROSSING = 0x3BD9BCE3, 0xFDEE1FA, 0x5E51F3E0
+DRAWS, DECAY, CROSSING = 0x3BD9BCE3, 0xFDEE1FA, 0xADDA886E
 """Checksums of the draws, the decay and the crossings within a frame compiled in: numba's cache sees a change of this
 file, not of those it imports from."""
 
@@ -665,11 +665,13 @@ def stay(x, words, hit, live, groups, end, left, left_tau, reset, polynomial):  
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def cross_again(x, words, j, end, left, left_tau, reset, polynomial):  # type: ignore[no-untyped-def]
-    """Resets of a pixel that what stayed takes to its threshold once more, in the frame whose bit is set already; the
-    law is that of `fire` and `stay`."""
+    """Resets of a pixel that what stayed takes to its threshold once more, MOST_AGAIN at most, in the frame whose bit
+    is set already; the law is that of `fire` and `stay`."""
     per_root_rate, per_rate, kept = reset
     rate = x[_ARRIVES + j] / _G
-    while x[_HELD + j] >= x[_LIMIT + j]:
+    for _ in range(MOST_AGAIN):
+        if x[_HELD + j] < x[_LIMIT + j]:
+            break
         over, electrons = on_grid(x[_HELD + j] - x[_LIMIT + j]), x[_STANDS + j] * (1.0 / _G)
         if not (per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0):
             over, electrons = after_reset(over, rate, x[_STANDS + j], per_root_rate, per_rate, kept)
