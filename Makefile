@@ -6,7 +6,7 @@ WORKERS ?= 2
 SHARED_OUT = --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 BIN := $(VENV)/bin
 
-.PHONY: install install-dev demo test test-oldest lint pages clean
+.PHONY: install install-dev install-oldest demo test test-oldest lint pages clean
 
 install: $(VENV)/.installed
 install-dev: $(VENV)/.installed-dev
@@ -37,7 +37,9 @@ $(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
 	$(OLDEST)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --editable . pytest pytest-xdist hypothesis
 	touch $@
 
-test-oldest: $(OLDEST)/.installed
+install-oldest: $(OLDEST)/.installed
+
+test-oldest: install-oldest
 	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning \
 		$(SHARED_OUT) -m 'not slow' $(OLDEST_TESTS)
 

@@ -85,6 +85,7 @@ def test_pixels_without_a_disturbance_keep_their_rate() -> None:
     assert abs(n.mean() - 4000 / 6.3) < 0.1
 
 
+@pytest.mark.slow
 def test_amplitude_moment_tau_and_span_are_recovered_to_ten_per_cent() -> None:
     found = measure(_steps(-0.9))
     print(f"amplitude {found.amplitude:.5f}, moment {found.moment:.3f}, tau {found.tau:.3f}, span {found.span:.3f}")
