@@ -41,6 +41,8 @@ class BlindTrial:
     """Threads of each diagnosis."""
     only: list[str] = field(default_factory=list)
     """Groups: none, strong, weak, base, outside, left_out, pair, tricky, severe; default all."""
+    hiding: list[str] = field(default_factory=list)
+    """Mechanisms: cases that hide one of them, alone or beside another; default all."""
     limit: Count | None = None
     """At most so many cases of each group."""
     record: Path | None = None
@@ -64,7 +66,7 @@ class BlindTrial:
         trial = hidden_world(self.world)
         record = importlib.import_module("tests.hidden_world.record")
         try:
-            picked = trial.chosen(self.set, self.part, self.only, self.limit)
+            picked = trial.chosen(self.set, self.part, self.only, self.limit, self.hiding)
             if self.record:
                 record.unpack(self.record, self.out, {case.id for case in trial.cases(self.set, self.part)})
             steps = trial.run_trial(

@@ -95,6 +95,16 @@ def test_only_and_limit_pick_evenly():
 # ---- seals
 
 
+def test_cases_that_hide_a_mechanism_are_picked_alone_and_beside_another():
+    picked = chosen("full", "verify", ["strong", "pair"], hiding=["clock_feedthrough"])
+    assert {case.what for case in picked if case.group == "strong"} == {"clock_feedthrough"}
+    pairs = [case for case in picked if case.group == "pair"]
+    assert len(pairs) >= 6
+    assert all("clock_feedthrough" in case.truth for case in pairs)
+    with pytest.raises(ValueError, match="no case hides 'clock'"):
+        chosen("full", "verify", hiding=["clock"])
+
+
 def test_a_key_that_was_changed_is_not_opened(tmp_path):
     manifest = seal(FULL["tune"][:3], tmp_path, TITLE)
     case = FULL["tune"][0]

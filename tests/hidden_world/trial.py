@@ -34,12 +34,21 @@ Diagnose = Callable[[Path, str, Path, int, "tuple[str, ...]", int], "dict[str, A
 """(campaign folder, model, folder for its results, seed, names withheld, threads) -> diagnosis.json as a dictionary."""
 
 
-def chosen(which: str, part: str, only: Sequence[str] = (), limit: int | None = None) -> list[Case]:
-    """The cases of a set and part; of these groups; of each group at most `limit`, evenly spread."""
+def chosen(
+    which: str, part: str, only: Sequence[str] = (), limit: int | None = None, hiding: Sequence[str] = ()
+) -> list[Case]:
+    """The cases of a set and part; of these groups; that hide one of these mechanisms, or are named after it; of each
+    group at most `limit`, evenly spread."""
     for group in only:
         if group not in GROUPS:
             raise ValueError(f"there is no group {group!r}; choose of {', '.join(GROUPS)}")
     all_cases = cases(which, part)
+    names = {name for case in all_cases for name in (case.what, *case.truth)}
+    for name in hiding:
+        if name not in names:
+            raise ValueError(f"no case hides {name!r}; choose of {', '.join(sorted(names))}")
+    if hiding:
+        all_cases = [case for case in all_cases if {case.what, *case.truth} & set(hiding)]
     picked: list[Case] = []
     for group in only or GROUPS:
         some = [case for case in all_cases if case.group == group]
