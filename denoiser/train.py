@@ -25,13 +25,13 @@ from torch import Tensor, nn
 
 from denoiser.captured import captured
 from denoiser.interval_training import IntervalWindows
-from denoiser.recipe import Recipe, recipe_of
+from denoiser.recipe import RECIPES, Recipe, recipe_of
 from denoiser.rollout import Rollouts
 from denoiser.run import Run
 from denoiser.simulated import Bank, SimulatedStreams
 from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
-from denoiser.weights import save_weights
+from denoiser.weights import load_weights, pretrained_path, save_weights
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
 
@@ -62,6 +62,7 @@ class TrainConfig:
     batch: streams a step.  patch: their side [pixels], a multiple of 16.  lr: highest rate of learning.
     validate_every: steps between validations.  threads: of the processor.  device: where streams and network are; a
     GPU wants larger batches.  refine: `paper` with its refine module or, for the ablation, without.
+    start: weights of the same mode to begin from, a file of this training or a mode's name for those that ship.
     resume: go on from out/last.pt.
     """
 
@@ -79,6 +80,7 @@ class TrainConfig:
     save_every_s: float = 60.0
     validate_every: int = 1000
     device: str = "cpu"
+    start: str | None = None
 
     def __post_init__(self) -> None:
         recipe_of(self.mode)
@@ -101,19 +103,23 @@ class TrainConfig:
             raise InputError(f"out is {self.out!r}; it must be the path of a folder")
         object.__setattr__(self, "out", Path(self.out))
         checked_device(self.device, "train with --device cpu")
+        if self.start is not None and not isinstance(self.start, str):
+            raise InputError(f"start is {self.start!r}; it must be the path of weights, or a mode's name")
 
 
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
     """Train, or go on training; returns the path of the weights.
 
-    Raises InputError where `out` holds the run of another mode, or a damaged one.
+    Raises InputError where `out` holds the run of another mode, or a damaged one, and where `start` is of another
+    network.
     """
     torch.set_num_threads(config.threads)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)
     recipe = replace(recipe_of(config.mode), refine=config.refine)
     device = torch.device(config.device)
-    run = Run.begin(recipe.network().to(device, memory_format=torch.channels_last))  # type: ignore[call-overload]
+    network = recipe.network() if config.start is None else _started(recipe, config.start)
+    run = Run.begin(network.to(device, memory_format=torch.channels_last))  # type: ignore[call-overload]
     if config.resume and (config.out / RUN_FILE).exists():
         run.load(config.out / RUN_FILE)
     torch.backends.cudnn.benchmark = True
@@ -192,6 +198,15 @@ class Judge:
         errors = streams.errors(network, VALIDATION_PASSES)
         network.train()
         return {f"{name}_db": round(-10 * math.log10(max(error, 1e-12)), 3) for name, error in errors.items()}
+
+
+def _started(recipe: Recipe, start: str) -> nn.Module:
+    """The network of a file, or of the weights that ship under this name, ready to learn further."""
+    path = pretrained_path(start) if start in RECIPES else Path(start)
+    found, network, _ = load_weights(path)
+    if replace(found, decoder=recipe.decoder) != recipe:  # how rates become spikes is not learnt
+        raise InputError(f"start is {start!r}, weights of another network; give a file of this mode")
+    return network.train()
 
 
 def _save(config: TrainConfig, recipe: Recipe, run: Run) -> Path:

@@ -11,7 +11,7 @@ from spikecam_env.cli.options import Checked, Count, Positive, Seed, Workers
 from spikecam_env.errors import InputError
 
 RECONSTRUCTORS = ("spk2img-clean", "spk2img-noisy", "ssml")
-ONLY_OF = {"refine": ("paper",), "width": RECONSTRUCTORS, "frames_a_step": RECONSTRUCTORS}
+ONLY_OF = {"refine": ("paper",), "start": ("best", "paper"), "width": RECONSTRUCTORS, "frames_a_step": RECONSTRUCTORS}
 """Options that not every mode has, with the modes that have them."""
 
 
@@ -46,6 +46,8 @@ class Train:
     """Where streams and network are: cpu, cuda, cuda:1."""
     refine: bool = True
     """`paper` with its refine module, or for the ablation without."""
+    start: str | None = None
+    """Weights to begin from: a file of this command, or `best` or `paper` for those that ship.  Default: none."""
     width: Count | None = None
     """Channels of a reconstructor, a multiple of 12 up to 252.  Default: 48."""
     frames_a_step: Count | None = None

@@ -93,6 +93,23 @@ def test_the_ablation_has_no_refine_module(small, tmp_path):
     assert record["command"].endswith("--no-refine")
 
 
+def test_a_run_begins_from_the_weights_that_are_given(small, tmp_path):
+    """Its first step hardly moves them; without them it begins elsewhere."""
+    given = weights_after(tmp_path / "given", 2)
+    options = {"seed": 7, "lr": 1e-9}
+    started = weights_after(tmp_path / "started", 1, start=str(tmp_path / "given" / "best.pt"), **options)
+    elsewhere = weights_after(tmp_path / "elsewhere", 1, **options)
+    shipped = weights_after(tmp_path / "shipped", 1, start="best", **options)
+    near = {name: torch.allclose(started[name], given[name], atol=1e-6) for name in given}
+    assert all(near.values())
+    assert not any(torch.allclose(other["stem.0.weight"], given["stem.0.weight"]) for other in (elsewhere, shipped))
+
+
+def test_weights_of_another_network_are_no_start(tmp_path):
+    with pytest.raises(InputError, match="weights of another network"):
+        train(TrainConfig(mode="best", out=tmp_path, start="paper"), progress=False)
+
+
 def test_minutes_end_a_run(small, tmp_path):
     """A second, of a thousand million steps."""
     weights_after(tmp_path, 10**9, minutes=1 / 60)
