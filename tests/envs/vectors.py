@@ -84,8 +84,8 @@ def use_every_pool() -> None:
 
 
 def every_id() -> None:
-    """Forked from a fresh process, two ids at once where their actions are alike; then the same here; then forked again,
-    from a process that has used every pool, with and without the denoiser."""
+    """Forked from a fresh process, two ids at once where their actions are alike; then the same here; then forked from
+    a process that has used every pool, with and without the denoiser."""
     names = list(ENVIRONMENTS)
     vector = gymnasium.make_vec("spikecam_env/Fan-v0", num_envs=2, vectorization_mode="async", **SMALL)
     vector.reset(seed=0)
