@@ -5,6 +5,8 @@ WORKERS ?= 2
 # A file at a time, so that what a module shares is made once; files in the order of tests/conftest.py, slow ones first.
 SHARED_OUT = --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 BIN := $(VENV)/bin
+# Of some 16 000 modules few are imported, and compiled then.
+PIP := -m pip install --quiet --no-compile
 
 .PHONY: install install-dev install-oldest demo test test-oldest lint pages clean
 
@@ -13,12 +15,12 @@ install-dev: $(VENV)/.installed-dev
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
+	$(BIN)/python $(PIP) --constraint constraints.txt --editable .
 	touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps mmagic  # only its NIQE files are used
+	$(BIN)/python $(PIP) --constraint constraints.txt --editable ".[dev]"
+	$(BIN)/python $(PIP) --constraint constraints.txt --no-deps mmagic  # only its NIQE files are used
 	touch $@
 
 demo: install
@@ -34,13 +36,13 @@ OLDEST_TESTS := tests/test_requirements.py tests/test_untrusted.py tests/streams
 
 $(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv $(OLDEST)
-	$(OLDEST)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --editable . pytest pytest-xdist hypothesis
+	$(OLDEST)/bin/python $(PIP) --constraint constraints-oldest.txt --editable . pytest pytest-xdist hypothesis
 	touch $@
 
 install-oldest: $(OLDEST)/.installed
 
 test-oldest: install-oldest
-	NUMBA_CACHE_DIR=$(OLDEST)/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning \
+	NUMBA_CACHE_DIR=$(abspath $(OLDEST))/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning \
 		$(SHARED_OUT) -m 'not slow' $(OLDEST_TESTS)
 
 # The committed diagnoses of real recordings, where these are at hand, and every figure about them in docs.

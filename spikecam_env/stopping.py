@@ -70,16 +70,16 @@ def watch() -> None:
     if hasattr(os, "set_blocking"):  # Windows needs none
         os.set_blocking(writing, False)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
-    for name in NAMES:
-        number = getattr(signal, name, None)
-        if number is not None and not (name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN):
-            signal.signal(number, _on_signal)
     threading.Thread(target=_wait_for_signals, args=(reading,), name="stopping", daemon=True).start()
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_forget)
     _hush("excepthook", sys)
     _hush("unraisablehook", sys)
     _hush("excepthook", threading)
+    for name in NAMES:  # last: a signal may come at once
+        number = getattr(signal, name, None)
+        if number is not None and not (name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN):
+            signal.signal(number, _on_signal)
 
 
 @contextmanager

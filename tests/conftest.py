@@ -1,4 +1,7 @@
-"""What holds for all tests.  Torch's threads must not spin long while they wait: tests share their cores.
+"""What holds for all tests.
+
+Two processes that test have a core each, so BLAS and torch take one thread in each, and in what these start: a second
+one that waits spins, on the other's core.  A solve of 128 equations then takes 30 times the processor time.
 
 Files with slow tests come first: two processes that take file after file end together, not one with a long file last.
 """
@@ -10,7 +13,7 @@ from collections import Counter
 
 import pytest
 
-os.environ.setdefault("GOMP_SPINCOUNT", "10000")
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # read by OpenBLAS, MKL and torch as they are imported
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -28,12 +28,20 @@ LONGEST_S = 600.0
 
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 8}
 
+POOLS = {"OMP_NUM_THREADS": "2", "GOMP_SPINCOUNT": "10000"}
+"""Torch has threads that a fork does not copy, as it has for users; where they wait, they spin briefly."""
+
 
 def alone(what: str) -> str:
     """What `tests.envs.vectors` prints about it, in a process group of its own that is killed where it hangs."""
     command = [sys.executable, "-m", "tests.envs.vectors", what]
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, **POOLS},
     )
     try:
         printed, _ = process.communicate(timeout=LONGEST_S)

@@ -22,30 +22,43 @@ SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20}
 STEPS = 2
 """The denoiser's frames come 31 late: they are seen from the first step on."""
 
-Makers = list[Callable[[], gymnasium.Env]]
+Maker = Callable[[], gymnasium.Env]
 
 
-def of(name: str) -> Makers:
-    """One plain environment and one with the denoiser."""
+class Beside(gymnasium.Wrapper):
+    """Info `spikes` is what the environment within shows, whatever wrappers make of it."""
 
-    def plain() -> gymnasium.Env:
-        return gymnasium.make(name, **SMALL)
+    def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
+        observation, info = self.env.reset(**options)
+        return observation, {**info, "spikes": observation.copy()}
 
-    return [plain, lambda: DenoiseObservation(plain())]
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        observation, *ends, info = self.env.step(action)
+        return observation, *ends, {**info, "spikes": observation.copy()}
+
+
+def plain(name: str) -> Maker:
+    return lambda: Beside(gymnasium.make(name, **SMALL))
+
+
+def denoised(name: str) -> Maker:
+    """Its observations are denoised, and its spikes beside them."""
+    return lambda: DenoiseObservation(plain(name)())
 
 
 def seen(vector: Any) -> dict[str, np.ndarray]:
-    """Observations, rewards and places of an episode's first steps; closes the environments."""
+    """Observations, spikes, rewards and places of an episode's first steps; closes the environments."""
     observation, info = vector.reset(seed=3)
-    found = {"observation": [observation.copy()], "reward": [], "gaze": []}
-    actions = (STEPS, 2, *vector.single_action_space.shape)
+    found = {"observation": [observation.copy()], "spikes": [info["spikes"].copy()], "reward": [], "gaze": []}
+    actions = (STEPS, vector.num_envs, *vector.single_action_space.shape)
     for action in np.random.default_rng(0).uniform(-0.2, 0.2, actions).astype(np.float32):
         observation, reward, _, _, info = vector.step(action)
-        found["observation"].append(observation.copy())
-        found["reward"].append(reward.copy())
-        found["gaze"].append(info["gaze"].copy())
+        for name, values in {"observation": observation, "reward": reward, **info}.items():
+            if name in found:
+                found[name].append(values.copy())
     vector.close()
-    assert np.any(found["observation"], axis=(0, 2, 3, 4)).all(), f"{vector} sees nothing"
+    for name in ("observation", "spikes"):
+        assert np.any(found[name], axis=(0, 2, 3, 4)).all(), f"{vector}: no {name}"
     return {name: np.stack(arrays) for name, arrays in found.items()}
 
 
@@ -71,25 +84,29 @@ def use_every_pool() -> None:
 
 
 def every_id() -> None:
-    """Forked from a fresh process; then the same here; then forked again, from a process that has used every pool."""
-    names = [*ENVIRONMENTS, *SMALL_TASKS]
+    """Forked from a fresh process, two ids at once where their actions are alike; then the same here; then forked from
+    a process that has used every pool, with and without the denoiser."""
+    names = list(ENVIRONMENTS)
     vector = gymnasium.make_vec("spikecam_env/Fan-v0", num_envs=2, vectorization_mode="async", **SMALL)
     vector.reset(seed=0)
     vector.close()
-    fresh = {name: seen(AsyncVectorEnv(of(name))) for name in names}
-    for name in names:
-        same(fresh[name], seen(SyncVectorEnv(of(name))), f"{name}, synchronous")
+    groups = [names[i : i + 2] for i in range(0, len(names), 2)] + [[name] for name in SMALL_TASKS]
+    fresh = [seen(AsyncVectorEnv([denoised(name) for name in group])) for group in groups]
+    for group, forked in zip(groups, fresh, strict=True):
+        same(forked, seen(SyncVectorEnv([denoised(name) for name in group])), f"{group}, synchronous")
     keeps_opengl = gymnasium.make("spikecam_env/Fan-v0", **SMALL)
     keeps_opengl.reset(seed=0)
-    use_every_pool()
     for name in ("spikecam_env/RotatingDisk-v0", "spikecam_env/Fan-v0"):
-        same(fresh[name], seen(AsyncVectorEnv(of(name))), f"{name}, forked late")
-    print(f"{len(names)} ids")
+        makers = [plain(name), denoised(name)]
+        here = seen(SyncVectorEnv(makers))
+        use_every_pool()
+        same(here, seen(AsyncVectorEnv(makers)), f"{name}, forked late")
+    print(f"{sum(map(len, groups))} ids")
 
 
 def contexts() -> None:
     """Spawned and from a server, against a synchronous run: a rendered scene, and the disk with the denoiser."""
-    makers = [of("spikecam_env/Fan-v0")[0], of("spikecam_env/RotatingDisk-v0")[1]]
+    makers = [plain("spikecam_env/Fan-v0"), denoised("spikecam_env/RotatingDisk-v0")]
     expected = seen(SyncVectorEnv(makers))
     for context in ("spawn", "forkserver"):
         same(expected, seen(AsyncVectorEnv(makers, context=context)), context)
@@ -107,7 +124,7 @@ def many() -> None:
     """Fifty environments, one after another: a rendered scene, and another with the denoiser."""
     figures = []
     for number in range(50):
-        env = of("spikecam_env/Poker-v0")[0]() if number % 2 else of("spikecam_env/Disk-v0")[1]()
+        env = plain("spikecam_env/Poker-v0")() if number % 2 else denoised("spikecam_env/Disk-v0")()
         env.reset(seed=number)
         env.step(np.zeros(2, np.float32))
         env.close()

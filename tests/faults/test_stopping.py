@@ -24,15 +24,17 @@ SOON_S = 2.0
 HARD_S = 10.0
 START_S = 60.0
 LIFE_S = 2.0
-"""Moments are drawn from so long after the start, half of them; the other half from when files are in the making."""
+"""Moments are drawn from so long after the handlers are there, half of them; the other half from when files are in the
+making.  Before, Python itself is starting, which takes a loaded machine as long as it likes."""
 AT_WORK_S = 0.5
-UNSTARTED_S = 0.1
-"""Before, Python itself is starting, and no handler of ours can be there."""
+SIGNALS_CAUGHT = "SigCgt:"
+"""In /proc/PID/status: a mask in hexadecimal."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """A signal at a moment, and how the command took it.  at_s: after the start, or after the first file was begun."""
+    """A signal at a moment, and how the command took it.  at_s: after the handlers were there, or after the first file
+    was begun."""
 
     what: str
     signum: int
@@ -59,7 +61,7 @@ class Stop:
         return [what for what, is_wrong in wrong.items() if is_wrong]
 
     def __str__(self) -> str:
-        when = "writing" if self.writing else "start"
+        when = "writing" if self.writing else "handlers"
         how = f"{self.what:8} {signal.Signals(self.signum).name:8} {when:8} + {self.at_s:4.2f} s"
         return f"{how}   code {self.code}   {self.took_s:5.2f} s   {', '.join(self.faults)}"
 
@@ -72,7 +74,7 @@ def stopped(what: str, args: list[str], folder: Path, signum: int, writing: bool
         command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     until = time.monotonic() + START_S
-    while writing and not any(PARTIAL.fullmatch(Path(name).name) for name in tree(folder)):
+    while not (is_writing(folder) if writing else catches(process.pid, signal.SIGTERM)):
         assert process.poll() is None and time.monotonic() < until, process.communicate()
         time.sleep(0.01)
     time.sleep(at_s)
@@ -88,10 +90,30 @@ def stopped(what: str, args: list[str], folder: Path, signum: int, writing: bool
     return Stop(what, signum, writing, at_s, process.returncode, took_s, error, tree(folder), members(process.pid))
 
 
+def is_writing(folder: Path) -> bool:
+    return any(PARTIAL.fullmatch(Path(name).name) for name in tree(folder))
+
+
+def catches(process: int, signum: int) -> bool:
+    """Whether a process has a handler for a signal."""
+    for line in Path(f"/proc/{process}/status").read_text().splitlines():
+        if line.startswith(SIGNALS_CAUGHT):
+            return bool(int(line.split()[1], 16) >> (signum - 1) & 1)
+    return False
+
+
 def members(group: int) -> list[str]:
-    """Processes of a group that live."""
-    listed = subprocess.run(["ps", "-e", "-o", "pgid=,stat=,args="], capture_output=True, text=True).stdout
-    rows = [line.split(None, 2) for line in listed.splitlines()]
+    """Processes of a group that live on.  One that was killed takes as long to end as its memory to be given back."""
+    until = time.monotonic() + SOON_S
+    while (living := listed(group)) and time.monotonic() < until:
+        time.sleep(0.05)
+    return living
+
+
+def listed(group: int) -> list[str]:
+    """Processes of a group that have not ended."""
+    printed = subprocess.run(["ps", "-e", "-o", "pgid=,stat=,args="], capture_output=True, text=True).stdout
+    rows = [line.split(None, 2) for line in printed.splitlines()]
     return [row[2] for row in rows if row[0] == str(group) and row[1][0] not in "ZX"]
 
 
@@ -103,6 +125,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="no /proc on this system")
 def test_a_command_stops_at_any_moment_within_two_seconds_and_leaves_nothing(tmp_path: Path, recording: Path) -> None:
     size = ["--size", "64", "96"]
     commands = {
@@ -116,7 +139,7 @@ def test_a_command_stops_at_any_moment_within_two_seconds_and_leaves_nothing(tmp
     for what, (count, args) in commands.items():
         for i in range(count):
             writing = i % 2 == 1 and what != "denoise"  # which writes at its end
-            at_s = float(rng.uniform(0, AT_WORK_S) if writing else rng.uniform(UNSTARTED_S, LIFE_S))
+            at_s = float(rng.uniform(0, AT_WORK_S if writing else LIFE_S))
             signum = (signal.SIGINT, signal.SIGTERM)[i // 2 % 2]
             planned.append((what, args, tmp_path / f"{what}{i}", signum, writing, at_s))
     with ThreadPoolExecutor(2) as pool:
@@ -129,6 +152,41 @@ def test_a_command_stops_at_any_moment_within_two_seconds_and_leaves_nothing(tmp
     made = {name for stop in stops for name in stop.left}
     assert not [name for name in made if not name.startswith("x") or name.endswith(".mp4")]
     assert "x.h5" not in made
+
+
+def test_handlers_are_there_before_anything_is_imported_that_takes_long() -> None:
+    code = (
+        "import os, signal, sys\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name in ('numpy', 'numba', 'torch', 'gymnasium'):\n"
+        "            print(name, signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL, flush=True)\n"
+        "            os._exit(0)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "sys.argv = sys.orig_argv = ['spikecam']\n"
+        "import spikecam_env.cli.main\n"
+    )
+    first = subprocess.run(python(code), capture_output=True, text=True, check=True).stdout.split()
+    print(first)
+    assert first[1:] == ["True"]
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if hasattr(signal, name)])
+def test_a_signal_that_comes_as_soon_as_there_is_a_handler_stops_the_command(name: str) -> None:
+    code = (
+        "import os, signal, sys\n"
+        "from spikecam_env.stopping import watched\n"
+        "set_handler = signal.signal\n"
+        "def set_and_send(number, handler):\n"
+        "    set_handler(number, handler)\n"
+        "    if number == signal.Signals[sys.argv[1]]:\n"
+        "        os.kill(os.getpid(), number)\n"
+        "signal.signal = set_and_send\n"
+        "with watched():\n"
+        "    print('begun')\n"
+    )
+    done = subprocess.run([*python(code), name], capture_output=True, text=True, timeout=START_S)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + signal.Signals[name], "", "spikecam: stopped\n")
 
 
 SWALLOWED = {

@@ -11,7 +11,7 @@ import pytest
 from spikecam_env.cli.blind_trial import BlindTrial, hidden_world
 from tests.hidden_world.trial import chosen
 
-SHAPE, FRAMES = (16, 16), 2000
+SHAPE, FRAMES = (16, 16), 1000
 
 
 @pytest.mark.slow

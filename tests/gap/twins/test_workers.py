@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator
 
 import pytest
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from spikecam_env.gap.diagnose import diagnose
 from spikecam_env.gap.ladder import ladder
@@ -16,10 +17,17 @@ def threads_of_linear_algebra() -> set[int]:
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
 
+@pytest.fixture(autouse=True)
+def two_threads_of_linear_algebra() -> Iterator[None]:
+    """Tests have one (`tests/conftest.py`), users as many as processors."""
+    with threadpool_limits(2, user_api="blas"):
+        assert threads_of_linear_algebra() == {2}
+        yield
+
+
 def test_linear_algebra_takes_one_thread_during_a_diagnosis_and_what_it_took_after_it() -> None:
-    before = threads_of_linear_algebra()
     assert sums_in_one_order(threads_of_linear_algebra)() == {1}
-    assert threads_of_linear_algebra() == before
+    assert threads_of_linear_algebra() == {2}
 
 
 @pytest.mark.parametrize("command", [diagnose, ladder], ids=["diagnose", "ladder"])
