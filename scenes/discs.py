@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.keys import interval_for, key_frames
 from scenes.painted_disk import Texels
-from scenes.planes import Laid, Plane, PlanarScene, painted_planes
+from scenes.planes import Laid, PlanarScene, Plane, painted_planes
 from scenes.protocol import Gaze, Truth
+from spikecam_env.compiled import njit
 
 MOTION_PER_KEY = 0.6
 """Most that anything moves between two keys [pixels], as of `scenes.disk`: 1.2 % rms of a frame's light."""
@@ -39,7 +39,7 @@ class Path:
     @classmethod
     def still(cls, x: float, y: float) -> Path:
         """Always there."""
-        return cls(np.zeros(1), np.array([[x, y]]))
+        return cls(np.zeros(1), np.array([[x, y]], np.float64))
 
     @classmethod
     def straight(cls, start: tuple[float, float], velocity: tuple[float, float], frames: float) -> Path:
@@ -47,9 +47,15 @@ class Path:
         ends = np.array([start, np.asarray(start) + frames * np.asarray(velocity)], np.float64)
         return cls(np.array([0.0, frames]), ends)
 
-    def at(self, frame: Any) -> tuple[Any, Any]:
-        """(x, y) at a frame, or at each of several [pixels]."""
-        return np.interp(frame, self.frame, self.place[:, 0]), np.interp(frame, self.frame, self.place[:, 1])
+    def at(self, frame: float) -> tuple[float, float]:
+        """(x, y) at a frame [pixels]."""
+        x, y = self.along(np.array([frame], np.float64))[:, 0].tolist()
+        return x, y
+
+    def along(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+        """x, y (2, K) at frames (K,) [pixels]."""
+        places: NDArray[np.float64] = _along(frames, self.frame, self.place)
+        return places
 
     def velocity(self, frame: float) -> tuple[float, float]:
         """(x, y) [pixels/frame] of the piece that a frame lies in."""
@@ -103,7 +109,7 @@ class Discs(PlanarScene):
     def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
         """See `PlanarScene`."""
         interval = interval_for(self._own_speed + (float(np.hypot(*gaze.rate)) if gaze else 0.0), MOTION_PER_KEY)
-        return self._at(key_frames(self.shape, start, stop, interval, gaze).astype(np.float64), gaze or _AT_REST)
+        return self._at(key_frames(self.shape, start, stop, interval, gaze), gaze or _AT_REST)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame; see `scenes.protocol.Truth`."""
@@ -139,14 +145,30 @@ class Discs(PlanarScene):
 
     def _centre(self, disc: Disc, frame: float, gaze: Gaze) -> tuple[float, float]:
         (x, y), (pan, tilt) = disc.path.at(frame), gaze.at(frame)
-        return float(x - pan), float(y - tilt)
+        return x - pan, y - tilt
 
     def _at(self, frame: NDArray[np.float64], gaze: Gaze) -> Plane:
         """What is seen at these frames (K,)."""
         pan, tilt = gaze.at(frame)
         laid = []
         for disc in self.discs.values():
-            x, y = disc.path.at(frame)
+            x, y = disc.path.along(frame)
             angle = disc.angle + disc.turn(self.frame_rate_hz) * frame
             laid.append(Laid(disc.texels, disc.radius, x - pan, y - tilt, angle))
         return Plane(self.shape, frame, self.tile, pan, tilt, laid)
+
+
+@njit(cache=True, nogil=True)
+def _along(frames, knots, places):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """As `np.interp` of both columns of places (n, 2) given at knots (n,)."""
+    found = np.empty((2, len(frames)))
+    for k in range(len(frames)):
+        after = np.searchsorted(knots, frames[k], side="right")
+        for axis in range(2):
+            if after == 0 or after == len(knots):
+                found[axis, k] = places[max(after - 1, 0), axis]
+            else:
+                rise = places[after, axis] - places[after - 1, axis]
+                slope = rise / (knots[after] - knots[after - 1])
+                found[axis, k] = slope * (frames[k] - knots[after - 1]) + places[after - 1, axis]
+    return found

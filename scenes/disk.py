@@ -24,7 +24,7 @@ from scipy.ndimage import gaussian_filter
 
 from scenes.keys import interval_for, key_frames
 from scenes.painted_disk import Texels, paint_tile, prefiltered
-from scenes.planes import Laid, Plane, PlanarScene, painted_planes
+from scenes.planes import Laid, PlanarScene, Plane, painted_planes
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
 from spikecam_env.checked import (
@@ -114,7 +114,7 @@ class RotatingDisk(PlanarScene):
     def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
         """See `PlanarScene`."""
         interval = interval_for(self._speed(gaze), self.motion_per_key)
-        return self._at(key_frames(self.shape, start, stop, interval, gaze).astype(np.float64), gaze or _AT_REST)
+        return self._at(key_frames(self.shape, start, stop, interval, gaze), gaze or _AT_REST)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame; see `scenes.protocol.Truth`."""

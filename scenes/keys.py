@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ def interval_for(speed: float, motion_per_key: float) -> int:
 
     speed: of the fastest point [pixels/frame].
     """
-    return int(np.clip(motion_per_key / max(speed, 1e-9) + 1e-9, 1, LONGEST_INTERVAL))
+    return int(min(max(motion_per_key / max(speed, 1e-9) + 1e-9, 1), LONGEST_INTERVAL))
 
 
 def painted(
@@ -40,7 +41,7 @@ def painted(
     return paint_keys(shape, key_frames(shape, start, stop, interval, gaze), paint)
 
 
-def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaze: Gaze | None) -> NDArray[np.int64]:
+def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaze: Gaze | None) -> NDArray[np.float64]:
     """Frames (K,) of the keys that cover [start, stop].
 
     Without gaze they are multiples of the interval; with gaze there are keys at `start` and `stop` too, where the
@@ -53,13 +54,13 @@ def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaz
     keys = (stop - start) // interval + 2
     checked_memory(4 * keys * shape[0] * shape[1], f"light of frames {start} to {stop}, {keys} keys,")
     if gaze is None:
-        return np.arange(start // interval, -(-stop // interval) + 1) * interval
-    inner = np.arange(start // interval + 1, -(-stop // interval)) * interval
-    return np.concatenate([[start], inner, [stop]])
+        return (np.arange(start // interval, -(-stop // interval) + 1) * interval).astype(np.float64)
+    inner = range((start // interval + 1) * interval, stop, interval)
+    return np.array([start, *inner, stop], np.float64)
 
 
 def paint_keys(
-    shape: tuple[int, int], frame: NDArray[np.int64], paint: Callable[[float, NDArray[np.float32]], None]
+    shape: tuple[int, int], frame: NDArray[Any], paint: Callable[[float, NDArray[np.float32]], None]
 ) -> Keyframes:
     """Keys at these frames (K,), rising, painted side by side by paint(frame, picture (H, W))."""
     light = np.empty((len(frame), *shape), np.float32)

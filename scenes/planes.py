@@ -1,4 +1,4 @@
-"""Scenes on a plane, as tables: a tile and discs before it, key by key.  One compiled call paints those of many cameras.
+"""Scenes on a plane, as tables: a tile and discs before it, key by key.  One call paints those of many cameras.
 
 A scene says what lies where (`Plane`, a few numbers a key); the pictures of all keys of all scenes are then painted by
 threads that take a key at a time.  A picture does not depend on what else is painted in the call.
@@ -12,15 +12,13 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numba import carray
 from numpy.typing import NDArray
 
 from scenes.keys import threads_for
-from scenes.painted_disk import Texels, paint_disk_into, paint_tile, places_of
+from scenes.painted_disk import Texels, paint_scenes, places_of
 from scenes.protocol import Gaze
-from spikecam_env.compiled import njit
 from spikecam_env.sensor import Keyframes
-from spikecam_env.sensor.kernels.intrinsics import address_of, pointer_to, take_ticket
+from spikecam_env.sensor.kernels.intrinsics import address_of
 from spikecam_env.threads import together
 
 
@@ -82,90 +80,38 @@ def paint_planes(planes: Sequence[Plane], light: Sequence[NDArray[np.float32]], 
     """The same into light, (K, H, W) of each."""
     if not planes:
         return
-    scenes, pictures, seen_from, discs, numbers, places = [], [], [], [], [], []
-    row = 0
-    for number, (plane, keys) in enumerate(zip(planes, light, strict=True)):
+    discs = [disc for plane in planes for disc in plane.discs]
+    done = keys = rows = 0
+    scenes, textures, numbers = [], [], []
+    for plane, pictures in zip(planes, light, strict=True):
         unmoved = 0 if plane.unmoved is None else address_of(plane.unmoved)
-        scenes.append(
-            (
-                address_of(plane.tile),
-                *plane.tile.shape,
-                *plane.shape,
-                unmoved,
-                len(discs),
-                len(discs) + len(plane.discs),
-            )
-        )
-        begin, size = address_of(keys), keys.strides[0]
-        pictures += [(number, key, begin + key * size) for key in range(len(keys))]
-        seen_from += [plane.pan, plane.tilt]
+        into = address_of(pictures), pictures.strides[0], keys
+        of_scene = done, done + len(plane.discs)
+        scenes.append((address_of(plane.tile), *plane.tile.shape, *plane.shape, unmoved, *into, *of_scene))
         for disc in plane.discs:
-            discs.append((address_of(disc.texels.pairs), disc.texels.side, row))
-            numbers.append((disc.radius, float(disc.texels.low), float(disc.texels.step)))
-            places.append(places_of(disc.texels, disc.radius, disc.x, disc.y, disc.angle))
-            row += len(keys)
-    tickets = np.zeros((1, 8), np.int64)
+            texels = disc.texels
+            textures.append((address_of(texels.pairs), texels.side, rows))
+            numbers.append((disc.radius, float(texels.low), float(texels.step)))
+            rows += len(pictures)
+        keys, done = keys + len(pictures), of_scene[1]
     work = (
-        tickets,
+        np.zeros((1, 8), np.int64),
+        keys,
         np.array(scenes, np.int64),
-        np.array(pictures, np.int64),
-        np.concatenate(seen_from[::2]),
-        np.concatenate(seen_from[1::2]),
-        np.array(discs, np.int64).reshape(-1, 3),
+        np.concatenate([plane.pan for plane in planes]),
+        np.concatenate([plane.tilt for plane in planes]),
+        np.array(textures, np.int64).reshape(-1, 3),
         np.array(numbers, np.float64).reshape(-1, 3),
-        np.concatenate(places) if places else np.empty((0, 6)),
+        _places(discs),
     )
-    together([partial(_paint, *work)] * threads_for(len(pictures), threads), shared=True)
+    together([partial(paint_scenes, *work)] * threads_for(keys, threads), shared=True)
 
 
-_TILE, _TILE_ROWS, _TILE_COLUMNS, _ROWS, _COLUMNS, _UNMOVED, _FIRST_DISC, _STOP_DISC = range(8)
-"""Columns of the table of scenes."""
-
-
-@njit(cache=True, nogil=True)
-def _paint(tickets, scenes, pictures, pan, tilt, discs, numbers, places):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """The pictures that this thread gets hold of.
-
-    tickets    (1, 8) int64, shared: [0, 0] is the next picture
-    scenes     (N, 8) int64: address, rows and columns of the tile; rows and columns of the picture; address of the
-               unmoved background or 0; the scene's discs, from and to
-    pictures   (M, 3) int64: the scene, which of its keys, the address
-    pan, tilt  (M,) where the background is seen from
-    discs      (D, 3) int64: address of the texels, their side, row of `places` of the first key
-    numbers    (D, 3): radius, low, step (`Texels`)
-    places     (R, 6): of `places_of`
-    """
-    while True:
-        m = take_ticket(tickets, 0)
-        if m >= len(pictures):
-            return
-        scene, key = scenes[pictures[m, 0]], pictures[m, 1]
-        rows, columns = scene[_ROWS], scene[_COLUMNS]
-        picture = carray(pointer_to(pictures[m, 2], np.float32), (rows, columns))
-        first, stop = scene[_FIRST_DISC], scene[_STOP_DISC]
-        left = 0
-        for d in range(first, stop):
-            left += _in_view(places[discs[d, 2] + key], numbers[d, 0], rows, columns)
-        spare = np.empty((rows, columns) if left else (0, 0), np.float32)
-        behind = spare if left % 2 else picture
-        if scene[_UNMOVED] and left and pan[m] == 0.0 and tilt[m] == 0.0:
-            behind = carray(pointer_to(scene[_UNMOVED], np.float32), (rows, columns))
-        else:
-            tile = carray(pointer_to(scene[_TILE], np.float32), (scene[_TILE_ROWS], scene[_TILE_COLUMNS]))
-            paint_tile(tile, pan[m], tilt[m], behind)
-        for d in range(first, stop):
-            place = places[discs[d, 2] + key]
-            if not _in_view(place, numbers[d, 0], rows, columns):
-                continue
-            left -= 1
-            front = spare if left % 2 else picture
-            side = discs[d, 1]
-            pairs = carray(pointer_to(discs[d, 0], np.uint32), (side * side,))
-            paint_disk_into(behind, pairs, side, numbers[d], place, front)
-            behind = front
-
-
-@njit(inline="always")
-def _in_view(place, radius, rows, columns):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    reach = radius + 1
-    return -reach < place[0] < columns - 1 + reach and -reach < place[1] < rows - 1 + reach
+def _places(discs: Sequence[Laid]) -> NDArray[np.float64]:
+    """Where each lies at each of its keys, one disc after another, as `paint_scenes` has it."""
+    if not discs:
+        return np.empty((0, 6))
+    keys = [len(disc.x) for disc in discs]
+    x, y, angle = (np.concatenate(parts) for parts in zip(*((d.x, d.y, d.angle) for d in discs), strict=True))
+    side = np.repeat([float(disc.texels.side) for disc in discs], keys)
+    return places_of(side, np.repeat([disc.radius for disc in discs], keys), x, y, angle)

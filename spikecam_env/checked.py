@@ -52,6 +52,8 @@ def checked_seed(seed: Any, name: str = "seed", most: int = LARGEST_SEED) -> int
 
 def checked_whole(value: Any, name: str, least: int = -LARGEST_COUNT, most: int = LARGEST_COUNT) -> int:
     """A whole number from `least` to `most`; true and false are none."""
+    if type(value) is int and least <= value <= most:  # what nearly all are
+        return value
     try:
         number = _whole(value)
     except TypeError:

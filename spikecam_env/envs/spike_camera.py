@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import isfinite
 from os import PathLike
 from typing import Any, TypeVar
 
@@ -16,6 +17,7 @@ from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
 from spikecam_env.checked import checked_number
+from spikecam_env.envs.motor import cut
 from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
@@ -147,7 +149,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._load(model, int(self.np_random.integers(2**31)))
         self._seen = self.observation.start(self.view, 1)
         self._recent = []
-        self._gaze = Gaze((0.0, 0.0), (0.0, 0.0), (0, self.frames_per_step))
+        self._gaze = Gaze((0.0, 0.0), (0.0, 0.0), (0.0, float(self.frames_per_step)))
 
     def begun(self) -> tuple[Any, dict[str, Any]]:
         """What `reset` returns, once the first block is exposed."""
@@ -155,13 +157,14 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def turn(self, action: ArrayLike) -> None:
         """What `step` does before the block is exposed: the camera's path is set."""
-        rate = np.asarray(action, np.float64)
-        if rate.shape != (2,) or not np.isfinite(rate).all():
+        given = np.asarray(action, np.float64)
+        rates = [cut(rate, 1.0) for rate in given.reshape(-1).tolist()]
+        if given.shape != (2,) or not all(map(isfinite, rates)):
             raise InputError(f"action is {action!r}; it must be two finite numbers in [-1, 1], (pan, tilt)")
-        rate = np.minimum(np.maximum(rate, -1.0), 1.0) * (self.max_gaze_rate_px_s / self.model.frame_rate_hz)
-        (pan, tilt), first, frames = self._position, self.sensor.frame, self.frames_per_step
-        stop = pan + float(rate[0]) * frames, tilt + float(rate[1]) * frames
-        self._gaze = Gaze((pan, tilt), stop, (first, first + frames))
+        top, frames = self.max_gaze_rate_px_s / self.model.frame_rate_hz, self.frames_per_step
+        pan, tilt = (place + rate * top * frames for place, rate in zip(self._position, rates, strict=True))
+        first = float(self.sensor.frame)
+        self._gaze = Gaze(self._position, (pan, tilt), (first, first + frames))
 
     def outcome(self) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """What `step` returns, once the block is exposed."""

@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from copy import deepcopy
+from itertools import chain
 from typing import Any, TypeVar
 
 import numpy as np
@@ -138,15 +139,15 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     def _exposed(
         self, fresh: NDArray[np.bool_]
     ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """The next block of all, in memory of its own, and what follows from it; fresh (N,): the first of an episode."""
+        """The next block of all, in memory of its own, and what follows; fresh (N,): which episodes begin with it."""
         spikes = np.empty((self.num_envs, self._view.frames_per_step, *self._view.shape), np.uint8)
         expose(self.envs, outs=list(spikes), threads=len(self._workers), each=self._each)
         light = [env.blocks.light[0] for env in self.envs]
         picture, self._seen = self.observation.step(Blocks(spikes, light, self._view.frame_rate_hz), self._seen)
         age = np.broadcast_to(self.observation.age(self._seen), (self.num_envs,)).astype(np.float64)
         numbers = range(self.num_envs)
-        in_turn_or_not = self._each if any(env.renders for env in self.envs) else in_turn
-        outcomes = in_turn_or_not(lambda n: self._outcome(n, bool(fresh[n])), numbers)
+        each = self._each if any(env.renders for env in self.envs) else in_turn
+        outcomes = each(lambda n: self._outcome(n, bool(fresh[n])), numbers)
         rewards, terminated, truncated, infos = zip(*outcomes, strict=True)
         late = False if self.max_episode_steps is None else self._steps >= self.max_episode_steps
         ends = np.array(terminated, bool), np.array(truncated, bool) | (late & ~fresh)
@@ -183,28 +184,28 @@ def batched(infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
     Numbers and arrays are 0 where there is none; dictionaries are dictionaries of such; anything else is an object.
     """
     together: dict[str, Any] = {}
-    for name in dict.fromkeys(name for info in infos for name in info):
-        has = np.array([name in info for info in infos])
-        values = [info[name] for info in infos if name in info]
+    alike = all(info.keys() == infos[0].keys() for info in infos)
+    for name in infos[0] if alike else dict.fromkeys(chain.from_iterable(infos)):
+        values = [info.get(name, MISSING) for info in infos]
+        has = np.ones(len(infos), bool) if alike else np.array([value is not MISSING for value in values])
         together[name], together[f"_{name}"] = _batched_values(values, has), has
     return together
 
 
+MISSING = object()
+
+
 def _batched_values(values: list[Any], has: NDArray[np.bool_]) -> Any:
-    first = values[0]
+    """values: N, MISSING where not has."""
+    first = values[int(has.argmax())]
     if isinstance(first, dict):
-        given = iter(values)
-        return batched([next(given) if one else {} for one in has])
-    if type(first) in (int, float, bool) or isinstance(first, (np.number, np.ndarray)):
-        kind = first.dtype if isinstance(first, (np.number, np.ndarray)) else type(first)
-        if has.all():
-            return np.array(values, dtype=kind)
-        array = np.zeros((len(has), *np.shape(first)), kind)
-    else:
-        array = np.full(len(has), None, dtype=object)
-    for n, value in zip(np.flatnonzero(has), values, strict=True):
-        array[n] = value
-    return array
+        return batched([{} if value is MISSING else value for value in values])
+    if type(first) not in (int, float, bool) and not isinstance(first, (np.number, np.ndarray)):
+        array = np.full(len(values), None, dtype=object)
+        array[has] = [value for value in values if value is not MISSING]
+        return array
+    nothing = np.zeros_like(first)
+    return np.array([nothing if value is MISSING else value for value in values], dtype=nothing.dtype)
 
 
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:

@@ -10,8 +10,8 @@ The number of threads (`threads`) changes no bit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, fields
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -76,12 +76,32 @@ class FastState:
 
     remaining: int32 grains to the next spike.  fired: uint32 spikes so far.
     seeds: the two words that, with a pixel's number and its spike's, fix every draw.
+    What is written is written into these arrays: others do not take their place.
     """
 
     law: PixelLaw
     remaining: NDArray[np.int32]
     fired: NDArray[np.uint32]
     seeds: tuple[np.uint32, np.uint32]
+
+    @cached_property
+    def where(self) -> Where:
+        """Where the arrays are in memory; a copy's are elsewhere."""
+        polynomial = np.array(self.law.polynomial, np.float32)
+        arrays = self.law.gain, self.law.dark, self.law.spread, polynomial, self.remaining, self.fired
+        return Where(tuple(map(address_of, arrays)), (int(self.seeds[0]), int(self.seeds[1])), polynomial)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+class Where(NamedTuple):
+    """addresses: of a camera's arrays, in the order of `loop.advance`; then its seed's words.  polynomial: one of the
+    arrays, which nobody else holds."""
+
+    addresses: tuple[int, ...]
+    words: tuple[int, int]
+    polynomial: NDArray[np.float32]
 
 
 def start(unit: Unit, phase: NDArray[np.float64], seed: int) -> FastState:
@@ -166,11 +186,11 @@ def _advance(
     stretches: Sequence[Stretch], outs: Sequence[NDArray[np.uint8]], packed: bool, threads: int | None
 ) -> None:
     """outs: where the spikes of each go, as bits or as bytes (`loop.advance`)."""
-    polynomials = np.array([one.state.law.polynomial for one in stretches], np.float32)
     cameras, bands, done = [], [], 0
-    for number, (one, polynomial, out) in enumerate(zip(stretches, polynomials, outs, strict=True)):
+    for number, (one, out) in enumerate(zip(stretches, outs, strict=True)):
         pieces = done, done + len(one.pieces)
-        cameras.append((*_addresses(one.state, polynomial), address_of(out), *_words(one), len(out), *pieces))
+        where = one.state.where
+        cameras.append((*where.addresses, address_of(out), *where.words, one.pixels, len(out), *pieces))
         bands += [(number, band) for band in range(-(-one.state.remaining.size // loop.WIDTH))]
         done = pieces[1]
     steps = sum(one.pixels * len(one.out) for one in stretches)
@@ -186,15 +206,6 @@ def _advance(
         packed,
     )
     together([partial(loop.advance, worker, *work) for worker in range(count)], shared=True)
-
-
-def _addresses(state: FastState, polynomial: NDArray[np.float32]) -> tuple[int, ...]:
-    law = state.law
-    return tuple(map(address_of, (law.gain, law.dark, law.spread, polynomial, state.remaining, state.fired)))
-
-
-def _words(one: Stretch) -> tuple[int, int, int]:
-    return int(one.state.seeds[0]), int(one.state.seeds[1]), one.pixels
 
 
 def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
@@ -221,7 +232,9 @@ def _rounded(value: float) -> float:
 
 
 def _padded(values: NDArray[Any], fill: int = 0) -> NDArray[Any]:
-    return np.pad(values, (0, -values.size % loop.TILE), constant_values=fill)
+    padded = np.full(values.size + -values.size % loop.TILE, fill, values.dtype)
+    padded[: values.size] = values
+    return padded
 
 
 def compilable(radiance: NDArray[np.float32]) -> NDArray[np.float32]:

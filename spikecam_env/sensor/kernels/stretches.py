@@ -7,13 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.imaging import Imaging
+from spikecam_env.sensor.kernels import loop
 from spikecam_env.sensor.kernels.fast import FastState, Stretch
 from spikecam_env.sensor.kernels.intrinsics import address_of
 from spikecam_env.sensor.light import COUNT, FIRST, KEY0, KEY1, LENGTH, MAX_SEGMENT, Keyframes, Segment, cuts, segments
-
-_OF_PIECE = (KEY0, KEY1, LENGTH, FIRST, COUNT)
-"""Columns of `cuts` in the order of those of a table of pieces."""
 
 
 def stretches(
@@ -22,25 +21,41 @@ def stretches(
     """The frames from `start` on, as many as there are in spikes (frames, P), through the optics."""
     if isinstance(light, Keyframes) and not imaging:
         rows = cuts(light.frame, start, start + len(spikes))
-        if rows[:, : KEY1 + 1].min() >= 0:
-            return _of_keys(state, light.radiance, rows, spikes)
+        pieces = _at_keys(rows, address_of(light.radiance), light.radiance.strides[0])
+        if len(pieces):
+            return _of_keys(state, light.radiance, pieces, spikes)
     return _of_segments(state, map(imaging.seen, segments(light, start, len(spikes))), spikes)
 
 
 def _of_keys(
-    state: FastState, radiance: NDArray[np.float32], rows: NDArray[np.int64], spikes: NDArray[np.uint8]
+    state: FastState, radiance: NDArray[np.float32], pieces: NDArray[np.int64], spikes: NDArray[np.uint8]
 ) -> Iterator[Stretch]:
     """Between keys at whole frames, whose pictures are taken where they lie."""
-    pieces = rows[:, _OF_PIECE]
-    pieces[:, :2] *= radiance.strides[0]
-    pieces[:, :2] += address_of(radiance)
-    ends = np.cumsum(rows[:, COUNT])
+    if len(spikes) <= MAX_SEGMENT:
+        yield Stretch(state, pieces, (radiance,), spikes, spikes.shape[1])
+        return
+    ends = np.cumsum(pieces[:, loop.COUNT])
     first = done = 0
     while first < len(pieces):
         after = int(np.searchsorted(ends, done + MAX_SEGMENT, side="right"))
         stop = int(ends[after - 1])
         yield Stretch(state, pieces[first:after], (radiance,), spikes[done:stop], spikes.shape[1])
         first, done = after, stop
+
+
+@njit(cache=True, nogil=True)
+def _at_keys(rows, address, size):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Rows of `cuts` as pieces of `loop.advance`, the keys' pictures lying from an address on, `size` bytes from one to
+    the next; none where a row needs a picture that is no key's."""
+    pieces = np.empty((len(rows), loop.PIECE_COLUMNS), np.int64)
+    for k in range(len(rows)):
+        if rows[k, KEY0] < 0 or rows[k, KEY1] < 0:
+            return pieces[:0]
+        pieces[k, loop.LIGHT0] = address + rows[k, KEY0] * size
+        pieces[k, loop.LIGHT1] = address + rows[k, KEY1] * size
+        pieces[k, loop.LENGTH], pieces[k, loop.FIRST] = rows[k, LENGTH], rows[k, FIRST]
+        pieces[k, loop.COUNT] = rows[k, COUNT]
+    return pieces
 
 
 def _of_segments(state: FastState, segments: Iterator[Segment], spikes: NDArray[np.uint8]) -> Iterator[Stretch]:
