@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from numba import carray
 from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_memory
 from spikecam_env.compiled import njit
+from spikecam_env.sensor.kernels.intrinsics import pointer_to, take_ticket
 
 TEXELS_PER_PIXEL = 5
 """Of the prefiltered texture.  At a key the default disk is 0.75 % rms of full scale off 16 x 16 supersampling at 5,
@@ -46,38 +48,22 @@ class Texels:
         return replace(self, low=self.low * np.float32(gain), step=self.step * np.float32(gain))
 
 
-def paint_disk(
-    texels: Texels,
-    centre: tuple[float, float],
-    radius: float,
-    angle: float,
-    behind: NDArray[np.float32],
-    picture: NDArray[np.float32],
-) -> None:
-    """A disk over what is behind it, into `picture`; both (H, W), two arrays.
+def places_of(
+    side: NDArray[np.float64],
+    radius: NDArray[np.float64],
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    angle: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Where disks lie as they are painted: (R, 6) of x, y, u0, v0, cosine, sine (`_paint_disk`).
 
-    centre (x, y) and radius in pixels; angle in radians, counter-clockwise in the picture.
+    All (R,): side of the texels; radius, x, y in pixels; angle in radians, counter-clockwise in the picture.
     """
-    x, y = centre
-    scale = (texels.side - 2 * _MARGIN) / (2 * radius)
+    scale = (side - 2 * _MARGIN) / (2 * radius)
     cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
-    middle = (texels.side - 1) / 2
+    middle = (side - 1) / 2
     u, v = middle - cosine * x + sine * y, middle - sine * x - cosine * y
-    _paint_disk(
-        behind,
-        texels.pairs,
-        np.int32(texels.side),
-        texels.low,
-        texels.step,
-        x,
-        y,
-        radius,
-        u,
-        v,
-        cosine,
-        sine,
-        picture,
-    )
+    return np.stack([x, y, u, v, cosine, sine], axis=1)
 
 
 def prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.float32]:
@@ -105,6 +91,64 @@ def _turned_box(side: float) -> NDArray[np.float32]:
     share = np.clip(1 - towards_side / (np.pi / 4), 0, 1)
     kernel = share.reshape(size, fine, size, fine).mean(axis=(1, 3))
     return (kernel / kernel.sum()).astype(np.float32)
+
+
+_TILE, _TILE_ROWS, _TILE_COLUMNS, _ROWS, _COLUMNS, _UNMOVED, _OUT, _SIZE, _FIRST_KEY, _FIRST_DISC, _STOP_DISC = range(
+    11
+)
+"""Columns of the table of scenes."""
+
+
+@njit(cache=True, nogil=True)
+def paint_scenes(tickets, keys, scenes, pan, tilt, textures, numbers, places):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Pictures of tiles with disks before them: those that this thread gets hold of.
+
+    tickets     (1, 8) int64, shared: [0, 0] is the next picture, of `keys`
+    scenes      (N, 11) int64: address, rows and columns of the tile; rows and columns of the picture; address of the
+                tile as seen from (0, 0), or 0; address of the first picture, bytes to the next, its number; the scene's
+                disks, from and to
+    pan, tilt   (M,) where the tile is seen from, a picture after another
+    textures    (D, 3) int64: address of the texels (`Texels`), their side, row of `places` of the first picture
+    numbers     (D, 3): radius, low, step
+    places      (R, 6): of `places_of`
+    """
+    n = 0
+    while True:
+        m = take_ticket(tickets, 0)
+        if m >= keys:
+            return
+        while n + 1 < len(scenes) and scenes[n + 1, _FIRST_KEY] <= m:
+            n += 1
+        scene, key = scenes[n], m - scenes[n, _FIRST_KEY]
+        rows, columns = scene[_ROWS], scene[_COLUMNS]
+        picture = carray(pointer_to(scene[_OUT] + key * scene[_SIZE], np.float32), (rows, columns))
+        left = 0
+        for d in range(scene[_FIRST_DISC], scene[_STOP_DISC]):
+            left += _in_view(places[textures[d, 2] + key], numbers[d, 0], rows, columns)
+        spare = np.empty((rows, columns) if left else (0, 0), np.float32)
+        if scene[_UNMOVED] and left and pan[m] == 0.0 and tilt[m] == 0.0:
+            behind = carray(pointer_to(scene[_UNMOVED], np.float32), (rows, columns))
+        else:
+            behind = spare if left % 2 else picture
+            tile = carray(pointer_to(scene[_TILE], np.float32), (scene[_TILE_ROWS], scene[_TILE_COLUMNS]))
+            paint_tile(tile, pan[m], tilt[m], behind)
+        for d in range(scene[_FIRST_DISC], scene[_STOP_DISC]):
+            x, y, u, v, cosine, sine = places[textures[d, 2] + key]
+            radius, low, step = numbers[d]
+            if _in_view(places[textures[d, 2] + key], radius, rows, columns):
+                left -= 1
+                front, side = spare if left % 2 else picture, textures[d, 1]
+                pairs = carray(pointer_to(textures[d, 0], np.uint32), (side * side,))
+                light = np.float32(low), np.float32(step)
+                _paint_disk(behind, pairs, np.int32(side), *light, x, y, radius, u, v, cosine, sine, front)
+                behind = front
+
+
+@njit(inline="always")
+def _in_view(place, radius, rows, columns):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Whether a disk is seen at a place (`places_of`)."""
+    reach = radius + 1
+    return -reach < place[0] < columns - 1 + reach and -reach < place[1] < rows - 1 + reach
 
 
 @njit(cache=True, nogil=True)

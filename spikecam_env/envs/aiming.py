@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scenes.protocol import Gaze, Scene
 from spikecam_env.envs.episode import Episode, Standing
-from spikecam_env.envs.motor import Motor
+from spikecam_env.envs.motor import Motor, cut
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
 from spikecam_env.envs.task import REWARDS, distance_from_middle
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
@@ -67,7 +68,7 @@ class AimingEnv(SpikeCameraEnv):
         self._episode: Episode | None = None
         self._standing: Standing | None = None
         self._bare: Any = None  # the scene as it is, without what an action puts before the camera
-        self._rate = np.zeros(2)
+        self._rate = (0.0, 0.0)
 
     def set_top_rate(self, px_s: float) -> None:
         """Of the gaze [pixels/s]."""
@@ -101,23 +102,28 @@ class AimingEnv(SpikeCameraEnv):
     @property
     def gaze_rate_px_s(self) -> NDArray[np.float64]:
         """(2,) of the last step [pixels/s]."""
-        return self._rate.copy()
+        return np.array(self._rate)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """A new episode, with the camera at rest; see the class for the options."""
-        self._rate, self._standing = np.zeros(2), None
-        observation, info = super().reset(seed=seed, options=options)
+        self._rate, self._standing = (0.0, 0.0), None
+        super().begin(seed=seed, options=options)
         self._bare = self.scene
-        self._standing = self._stands(self._position, None)
+
+    def begun(self) -> tuple[NDArray[Any], dict[str, Any]]:
+        """See `SpikeCameraEnv.begun`."""
+        observation, info = super().begun()
+        self._standing = self._stands(None)
         return observation, info | self._of_standing()
 
-    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+    def turn(self, action: ArrayLike) -> None:
+        """The motor does what it can; the other numbers go to the episode."""
+        super().turn(self._command(action))
+
+    def outcome(self) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """See the class."""
-        command, before = self._command(action), self._position
-        observation, _, _, _, info = super().step(command)
-        reward, terminated, truncated = self._assess(before)
+        observation, _, _, _, info = super().outcome()
+        reward, terminated, truncated = self._assess()
         return observation, reward, terminated, truncated, info | self._of_standing()
 
     def close(self) -> None:
@@ -129,32 +135,30 @@ class AimingEnv(SpikeCameraEnv):
         self._episode = self._draw_episode(rng, options)
         return self._episode.scene
 
-    def _command(self, action: ArrayLike) -> NDArray[np.float64]:
-        """(2,): the rate that the motor reaches, in units of its top rate; the other numbers go to the episode."""
+    def _command(self, action: ArrayLike) -> tuple[float, float]:
+        """The rate that the motor reaches, in units of its top rate; the other numbers go to the episode."""
         given = np.asarray(action, np.float64)
-        if given.shape != self.action_space.shape or not np.isfinite(given).all():
+        numbers = [cut(number, 1.0) for number in given.reshape(-1).tolist()]
+        if given.shape != self.action_space.shape or not all(map(isfinite, numbers)):
             raise InputError(f"action is {action!r}; it must be {_numbers(self.action_space.shape)} in [-1, 1]")
-        given = np.clip(given, -1.0, 1.0)
-        first, rest = self.sensor.frame, tuple(float(number) for number in given[self.axes :])
-        self._episode = self.episode.acted(rest, first, first + self.frames_per_step)
+        first, top = self.sensor.frame, self.motor.top_px_s
+        self._episode = self.episode.acted(tuple(numbers[self.axes :]), first, first + self.frames_per_step)
         self._scene = self._episode.through(self._bare)
-        wanted = np.zeros(2)
-        wanted[: self.axes] = given[: self.axes] * self.motor.top_px_s
-        self._rate = self.motor.after(self._rate, wanted, self.step_s)
-        return self._rate / self.motor.top_px_s
+        wanted = [number * top for number in numbers[: self.axes]] + [0.0] * (2 - self.axes)
+        pan, tilt = self._rate = self.motor.after(self._rate, wanted, self.step_s)
+        return pan / top, tilt / top
 
-    def _assess(self, before: tuple[float, float]) -> tuple[float, bool, bool]:
-        """(reward, terminated, truncated) of a step that the gaze began at `before`."""
+    def _assess(self) -> tuple[float, bool, bool]:
+        """(reward, terminated, truncated) of a step."""
         last = self.standing
-        self._standing = now = self._stands(before, last)
+        self._standing = now = self._stands(last)
         end = self.episode.end(now)
         reward = REWARDS[self.reward](self.episode.worth(last), self.episode.worth(now))
         return reward + OUTCOME * (end is True), end is not None, end is None and now.step >= self.episode.steps
 
-    def _stands(self, before: tuple[float, float], last: Standing | None) -> Standing:
+    def _stands(self, last: Standing | None) -> Standing:
         stop = self.sensor.frame
-        gaze = Gaze(before, self._position, (stop - self.frames_per_step, stop))
-        place = self.episode.aim(stop, gaze)
+        place = self.episode.aim(stop, self._gaze)
         distance = distance_from_middle(place, self.shape)
         on = self.episode.is_on(stop, distance)
         if last is None:

@@ -7,10 +7,8 @@ for each axis; T is the time of a step, in which the rate is constant.  A rise o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_number
 
@@ -30,8 +28,13 @@ class Motor:
         """Of the rate of an axis within this time [pixels/s]."""
         return 2 * self.top_px_s if self.rise_s == 0 else self.top_px_s * seconds / self.rise_s
 
-    def after(self, rate: NDArray[np.float64], wanted: NDArray[np.float64], seconds: float) -> NDArray[np.float64]:
-        """The rate of a step of this length, from the last one's and the one that is wanted, all (2,) [pixels/s]."""
-        change = self.most_change_px_s(seconds)
-        wanted = np.clip(wanted, -self.top_px_s, self.top_px_s)
-        return rate + np.clip(wanted - rate, -change, change)
+    def after(self, rate: tuple[float, float], wanted: Sequence[float], seconds: float) -> tuple[float, float]:
+        """The rates (pan, tilt) of a step of this length, from the last one's and those wanted [pixels/s]."""
+        change, top = self.most_change_px_s(seconds), self.top_px_s
+        pan, tilt = (r + cut(cut(w, top) - r, change) for r, w in zip(rate, wanted, strict=True))
+        return pan, tilt
+
+
+def cut(value: float, most: float) -> float:
+    """The value, no further from 0 than this; NaN stays."""
+    return most if value > most else -most if value < -most else value

@@ -37,7 +37,7 @@ def number_of(rng: np.random.Generator, view: View) -> int:
     return int(rng.choice(view.pictures))
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def background(number: int, shape: tuple[int, int]) -> NDArray[np.float32]:
     """A tile of soft noise, larger than the picture on each side."""
     rng = np.random.default_rng([number, 1])
