@@ -173,14 +173,13 @@ def excess(deviates: Array, kept: Mask, groups: list[NDArray[np.intp]]) -> Array
     deviates: (n, H, W), of n parts of the time, each pixel's in its own standard deviations.
     """
     half, pairs = np.zeros(kept.shape), np.zeros(kept.shape)
-    for one, other in (((slice(1, None), slice(None)), (slice(None, -1), slice(None))),
-                       ((slice(None), slice(1, None)), (slice(None), slice(None, -1)))):  # fmt: skip
-        both = kept[one] & kept[other]
-        apart = deviates[(slice(None), *one)] - deviates[(slice(None), *other)]
-        square = np.where(both, 0.5 * np.mean(apart**2, axis=0), 0.0)
-        for side in (one, other):
-            half[side] += square
-            pairs[side] += both
+    by_rows, by_columns = (deviates, kept, half, pairs), (deviates.swapaxes(1, 2), kept.T, half.T, pairs.T)
+    for values, use, sums, number in (by_rows, by_columns):
+        both = use[1:] & use[:-1]
+        square = np.where(both, 0.5 * np.mean(np.diff(values, axis=1) ** 2, axis=0), 0.0)
+        for side in (slice(1, None), slice(None, -1)):
+            sums[side] += square
+            number[side] += both
     factor = np.ones(kept.size)
     for group in groups:
         factor[group] = max(half.reshape(-1)[group].sum() / max(pairs.reshape(-1)[group].sum(), 1.0), 1.0)
