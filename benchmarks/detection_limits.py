@@ -1,6 +1,9 @@
 """Detection limits of the catalogue's effects, from the diagnosis' own templates.
 
-    python -m benchmarks.detection_limits          prints the table and writes it into tests/hidden_world/limits.toml
+    python -m benchmarks.detection_limits                          prints the table and writes it into limits.toml
+    python -m benchmarks.detection_limits clock_feedthrough        of these effects alone
+
+The file is tests/hidden_world/limits.toml.
 
 Limit: the strength at which the statistic that shows the effect best stands CLEAR noises off, in 64 x 64 pixels and
 8000 frames of the standard design: recordings to fit, and held-out ones in motion, which may ring the alarm as well
@@ -12,6 +15,7 @@ where it is more than units differ by.  The base model's own effects are not amo
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -34,8 +38,9 @@ CLEAR = 6.0
 TABLE = Path(__file__).parents[1] / "tests/hidden_world/limits.toml"
 
 
-def measured() -> dict[str, float]:
-    """Strength by name; of an effect with several shapes the middle one."""
+def measured(only: Sequence[str] = ()) -> dict[str, float]:
+    """Strength by name, of these effects, or of all; of an effect with several shapes the middle one."""
+    wanted = set(only or [*HIDDEN, "excess_threshold_noise"])
     by_name: dict[str, list[float]] = {}
     templates = shipped_templates()
     told = heard(templates.keys)
@@ -44,9 +49,9 @@ def measured() -> dict[str, float]:
         peak = float(np.abs(entry.shift[told]).max())
         strength = abs(entry.parameters[CATALOGUE[entry.name].strength])
         by_name.setdefault(entry.name, []).append(strength * (CLEAR / peak) ** power)
-    limits = {name: float(np.median(values)) for name, values in by_name.items() if name in HIDDEN}
+    limits = {name: float(np.median(values)) for name, values in by_name.items() if name in wanted & set(HIDDEN)}
     limits |= of_pattern([name for name in limits if candidate(name).is_pattern], limits)
-    return limits | {"excess_threshold_noise": of_a_reset()}
+    return limits | ({"excess_threshold_noise": of_a_reset()} if "excess_threshold_noise" in wanted else {})
 
 
 def of_a_reset() -> float:
@@ -65,6 +70,8 @@ def heard(keys: Sequence[Key]) -> NDArray[np.bool_]:
 
 def of_pattern(names: list[str], near: dict[str, float]) -> dict[str, float]:
     """Strength by name from which units drawn with the effect stand CLEAR noises off, to 10 %."""
+    if not names:
+        return {}
     case, model, null = standard_case()
     told = heard(null.keys)
     found = {}
@@ -88,7 +95,7 @@ def written(text: str, limits: dict[str, float]) -> str:
 
 
 if __name__ == "__main__":
-    values = measured()
+    values = measured(sys.argv[1:])
     for name, value in values.items():
         print(f"{name:28s} {value:.2g}")
     TABLE.write_text(written(TABLE.read_text(encoding="utf-8"), values), encoding="utf-8")

@@ -130,9 +130,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
-from spikecam_env.sensor.within_frame import mean_decay
+from spikecam_env.sensor.frame_moments import mean_decay
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class SlowShutter(Effect):
     tau_us: float = parameter(500.0, unit="us", bounds=(0.0, 1e6), doc="time to open")
 
     stage = Stage.OPTICS
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "tau_us"
     identification = Identification(family="light", needs=Needs.STEADY, experiment="recordings begun after the shutter")
 
@@ -151,9 +151,9 @@ class SlowShutter(Effect):
 
 That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))` and `[[effect]]`
 in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
-anew. `within` says how it acts within a frame, and its docstring how far that is exact: charge is integrated over the
-frame, not sampled at its middle. `now.start` is when each frame begins, `spikecam_env/sensor/within_frame.py` has
-closed forms, and with `within_frame = True` a `Charge` says how light rises within the frame; a frame that holds keys
+anew. `acts` says how it acts within a frame, and its docstring how far that is exact: charge is integrated over the
+frame, not sampled at its middle. `now.start` is when each frame begins, `spikecam_env/sensor/frame_moments.py` has
+closed forms, and with `wants_rise = True` a `Charge` says how light rises within the frame; a frame that holds keys
 then comes piece by piece. What an effect cannot do in such a frame it says by `off_the_line`: beyond 1 % it is refused.
 
 The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero

@@ -47,14 +47,18 @@ def recorded(
     interval: Array, start: Array, table: Array, white: float, frames: int, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
     """(frames, P) spikes of pixels of free intervals (P,) [frames], in rows that begin at phases `start` (P,)."""
-    return _recorded(interval, start, table, np.sqrt(white), frames, rng)  # type: ignore[no-any-return]
+    spikes = np.zeros((frames, interval.size), np.uint8)
+    _fire(interval, start, table, np.sqrt(white), frames, rng, spikes)
+    return np.minimum(spikes, 1, out=spikes)
 
 
 def counts(
     interval: Array, start: Array, table: Array, white: float, frames: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     """(P,) numbers of spikes of the same pixels in `frames` frames."""
-    return _counts(interval, start, table, np.sqrt(white), frames, rng)  # type: ignore[no-any-return]
+    number = np.zeros((1, interval.size), np.int64)
+    _fire(interval, start, table, np.sqrt(white), frames, rng, number)
+    return number[0]
 
 
 @njit(cache=True)
@@ -90,8 +94,9 @@ def _theta(psi, y):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _recorded(interval, start, table, noise, frames, rng):  # type: ignore[no-untyped-def]
-    out = np.zeros((frames, interval.size), np.uint8)
+def _fire(interval, start, table, noise, frames, rng, out):  # type: ignore[no-untyped-def]
+    """Add the spikes to out, (frames, P) by frame, or (1, P) together."""
+    together = len(out) == 1
     psi = np.empty(table.size + 1)
     for p in range(interval.size):
         _psi(table, interval[p], psi)
@@ -102,21 +107,4 @@ def _recorded(interval, start, table, noise, frames, rng):  # type: ignore[no-un
             if frame >= frames:
                 break
             if frame >= 0:
-                out[int(frame), p] = 1
-    return out
-
-
-@njit(cache=True)
-def _counts(interval, start, table, noise, frames, rng):  # type: ignore[no-untyped-def]
-    out = np.zeros(interval.size, np.int64)
-    psi = np.empty(table.size + 1)
-    for p in range(interval.size):
-        _psi(table, interval[p], psi)
-        t = (rng.random() - 1.0 - _SETTLE) * interval[p]
-        while True:
-            t = _theta(psi, t + interval[p] * (1.0 + noise * rng.standard_normal()))
-            frame = np.floor(t - start[p])
-            if frame >= frames:
-                break
-            out[p] += frame >= 0
-    return out
+                out[0 if together else int(frame), p] += 1

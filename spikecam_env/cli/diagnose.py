@@ -103,7 +103,7 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
-    from spikecam_env.gap.report.quantities import at_most, bounded_parameter, quantity
+    from spikecam_env.gap.report.quantities import at_most, bounded_parameter, interval, quantity
     from spikecam_env.gap.report.words import bare, parameter_unit
 
     rows = [
@@ -112,6 +112,7 @@ def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "confidence": f"{e.confidence:.2f}",
             "parameter": bare(e.name, name),
             "value": quantity(estimate.value, parameter_unit(e.name, name), estimate.sd),
+            "90 %": interval(estimate, parameter_unit(e.name, name)),
         }
         for e in diagnosis.effects
         for name, estimate in e.parameters.items()

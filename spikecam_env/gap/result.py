@@ -26,10 +26,15 @@ VERDICTS = ("none", "named", "class", "unknown", "parameter", "data")
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter's value and its standard deviation, in the parameter's unit."""
+    """A parameter's value, its standard deviation, and where it is with 90 %, in the parameter's unit.
+
+    interval: low and high, of the coordinate in which it was fitted and within its range (`fit.coordinates`); None
+    where no error is known.
+    """
 
     value: float
     sd: float
+    interval: tuple[float, float] | None = None
 
 
 MOST_CONFIDENCE = 0.99

@@ -105,7 +105,7 @@ def error(effect: Effect, bend: Bend, now: Exposure) -> Array:
 
 
 def _sways(effect: Effect, first: Exposure) -> bool:
-    return effect.overrides("sway") and effect.intervals(first.frame_rate_hz) > 0
+    return effect.overrides("sway") and effect.parts(first.frame_rate_hz) > 0
 
 
 def _acts(feedback: Feedback) -> bool:

@@ -94,7 +94,7 @@ def expected_charge(
             )
         else:
             before = light
-            if pieces and effect.within_frame and effect.overrides("lead"):
+            if pieces and effect.wants_rise and effect.overrides("lead"):
                 light = _as_read(light, effect.lead(now), pieces)
             light, dark, memory[effect.name] = effect.collect(light, dark, now, memory[effect.name])
             if pieces and light is not before:
@@ -143,7 +143,7 @@ def _as_read(light: Charge, lead: Array | float, pieces: Sequence[Piece]) -> Cha
 
 def wants_rise(effects: Sequence[Effect]) -> bool:
     """Whether an effect asks how light changes within a frame."""
-    return any(effect.within_frame for effect in effects)
+    return any(effect.wants_rise for effect in effects)
 
 
 def wants_pieces(effects: Sequence[Effect]) -> bool:
@@ -153,13 +153,13 @@ def wants_pieces(effects: Sequence[Effect]) -> bool:
 
 def asks_for_pieces(effect: Effect) -> bool:
     """Whether an effect acts on light piece by piece; one of the read-out, which says where frames end, does not."""
-    return effect.within_frame and effect.stage < Stage.READOUT
+    return effect.wants_rise and effect.stage < Stage.READOUT
 
 
-def intervals(first: Exposure, effects: Sequence[Effect]) -> int:
+def parts(first: Exposure, effects: Sequence[Effect]) -> int:
     """Parts of a frame between the nodes of `Sway`; 0 where no reference moves and nobody is kicked within a frame."""
     kicked = any(effect.feedback(first).kick_at_once for effect in effects)
-    return max((effect.intervals(first.frame_rate_hz) for effect in effects), default=0) or int(kicked)
+    return max((effect.parts(first.frame_rate_hz) for effect in effects), default=0) or int(kicked)
 
 
 def lead(first: Exposure, effects: Sequence[Effect]) -> Array:
@@ -204,16 +204,16 @@ def movement(now: Exposure, effect: Effect) -> tuple[Array, Array]:
 
 def _sway(now: Exposure, effects: Sequence[Effect], factor: Array, common: Array) -> Sway | None:
     """How the references move within the frames besides factor and common (F or 1, H or 1, 1), which hold for each."""
-    parts = intervals(now, effects)
-    if parts == 0:
+    count = parts(now, effects)
+    if count == 0:
         return None
-    swaying = [effect for effect in effects if effect.intervals(now.frame_rate_hz)]
+    swaying = [effect for effect in effects if effect.parts(now.frame_rate_hz)]
     early = lead(now, effects)
-    at = _nodes(parts, [kink for effect in swaying for kink in effect.kinks(now)], early)
+    at = _nodes(count, [kink for effect in swaying for kink in effect.kinks(now)], early)
     early = early if early.any() else np.zeros((1, 1))
-    phase, piece = at - early, _beside(at, 1.0 / parts) - early
+    phase, beside = at - early, _beside(at, 1.0 / count) - early
     for effect in swaying:
-        shift = effect.sway(now, phase, piece)
+        shift = effect.sway(now, phase, beside)
         factor, common = factor * shift.factor, common + shift.millivolts
     nodes = at.shape[1]
     return Sway(at, *(np.broadcast_to(wave, (*wave.shape[:2], nodes)) for wave in (factor, common)))

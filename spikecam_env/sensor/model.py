@@ -16,7 +16,7 @@ from pydantic import ConfigDict, Field
 
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor.effects import CATALOGUE, Effect
-from spikecam_env.sensor.effects.base import build, check_intervals
+from spikecam_env.sensor.effects.base import build, check_parts
 from spikecam_env.sensor.own_effects import files_of
 from spikecam_env.sensor.ranges import check_parameters, parameter
 from spikecam_env.sensor.unit import Circuit, PixelArray, Unit, firing_law
@@ -70,7 +70,7 @@ class SensorModel:
         if not isinstance(self.circuit, Circuit):
             raise InputError(f"circuit = {shown(self.circuit)}; it must be a Circuit")
         object.__setattr__(self, "effects", _in_physical_order(self.effects))
-        check_intervals(self.effects, self.frame_rate_hz)
+        check_parts(self.effects, self.frame_rate_hz)
         alike = np.random.default_rng(0)
         self._pixels((1, 1), lambda _: alike).check()
 

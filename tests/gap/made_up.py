@@ -12,6 +12,7 @@ from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
 from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.unit.refit import free_refit
+from spikecam_env.gap.verdict.named_effects import estimates
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 
@@ -131,7 +132,8 @@ def _ranking(best: str, parameters: dict[str, Estimate]) -> tuple[Ranked, ...]:
 
 def named(effect: str = "photodiode_lag") -> Diagnosis:
     """One effect found, at its true value."""
-    found = {k: Estimate(v * 1.02, abs(v) * 0.02) for k, v in EFFECTS[effect].items()}
+    values = {k: 1.02 * v for k, v in EFFECTS[effect].items()}
+    found = estimates(effect, values, {k: 0.02 * abs(v) for k, v in EFFECTS[effect].items()})
     e = NamedEffect(effect, "light", 0.97, found, (("incomplete_reset", 0.02), ("optical_blur", 0.003)))
     loud = {"photodiode_lag": {"step": 38.0, "moving": 21.0}, "dead_time": {"rates": 44.0, "intervals": 12.0},
             "light_flicker": {"spectrum": 61.0, "drift": 30.0}}[effect]  # fmt: skip

@@ -165,7 +165,7 @@ def test_json_has_the_documented_entries(which, request, tmp_path):
     assert set(said["gap"]) == {"before", "after", "floor", "removed", "by_recording"}
     for e in said["effects"]:
         assert {"name", "family", "confidence", "parameters", "alternatives"} <= set(e)
-        assert all(set(p) == {"value", "sd"} for p in e["parameters"].values())
+        assert all(set(p) == {"value", "sd", "interval"} for p in e["parameters"].values())
         assert all({"name", "confidence"} <= set(a) <= {"name", "confidence", "removed"} for a in e["alternatives"])
         assert not e["alternatives"] or "removed" in e["alternatives"][0], "the best of them was confirmed"
     for d in said["discrepancies"]:

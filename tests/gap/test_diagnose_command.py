@@ -53,6 +53,8 @@ def test_a_terminal_is_told_the_verdict_and_what_was_found(verdict: str) -> None
     assert printed.startswith(f"{verdict}: {d.sentence}")
     for said in (*(e.name for e in d.effects), *d.parameters, *d.data):
         assert said in printed
+    if verdict == "named":
+        assert "6.12 ± 0.12 %" in printed and "5.93 … 6.32 %" in printed
     if verdict == "none":
         assert (
             "modulation (frequency 2000 Hz)" in printed

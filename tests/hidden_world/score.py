@@ -211,7 +211,7 @@ def _parameter_errors(diagnosis: Json, hidden: dict[str, Json]) -> Iterable[Json
                 true, value, sd = truth["parameters"][name], float(stated["value"]), stated.get("sd")
                 yield {
                     "effect": effect["name"], "parameter": name, "true": true, "value": value,
-                    "sd": None if sd is None else float(sd),
+                    "sd": None if sd is None else float(sd), "interval": stated.get("interval"),
                 }  # fmt: skip
 
 
@@ -326,11 +326,19 @@ def _parameter_figures(errors: Sequence[Json]) -> list[Figure]:
         what = "parameters within 15 % or twice their sd"
         made.append(Figure("5", what, sum(close) / len(close), ">= 0.9", len(close), low, high))
     if stated:
-        covered = [abs(e["value"] - e["true"]) <= 1.645 * e["sd"] for e in stated]
+        covered = [is_covered(e) for e in stated]
         low, high = binomial_90(sum(covered), len(covered))
         what = "90 % intervals cover"
         made.append(Figure("5", what, sum(covered) / len(covered), "in 0.80-0.97", len(covered), low, high))
     return made
+
+
+def is_covered(e: Json) -> bool:
+    """Whether the truth is in the interval that is stated (of a phase, through the end of its period where low is above
+    high); by its standard deviation where a record has no interval, as earlier ones have none."""
+    half = 1.645 * e["sd"]
+    low, high = e.get("interval") or (e["value"] - half, e["value"] + half)
+    return low <= e["true"] <= high if low <= high else e["true"] >= low or e["true"] <= high
 
 
 def _is_close(e: Json) -> bool:

@@ -18,7 +18,7 @@ from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 from tests.hidden_world.keys import BrokenSealError, key_text, open_key, seal
 from tests.hidden_world.outside import REPORT, TUNE
 from tests.hidden_world.record import in_short, pack, unpack
-from tests.hidden_world.score import FAMILIES, binomial_90, confusion, family_of, figures, score_case
+from tests.hidden_world.score import FAMILIES, binomial_90, confusion, family_of, figures, is_covered, score_case
 from tests.hidden_world.trial import as_text, chosen, code, is_done, run_trial, score_trial
 
 FULL = {part: cases("full", part) for part in PARTS}
@@ -224,6 +224,16 @@ def test_gap_and_parameters_of_right_names():
     assert value["90 % intervals cover"].value == pytest.approx(1 / 3)
     assert not value["90 % intervals cover"].met and not value["slowest diagnosis [s]"].met
     assert value["diagnoses within 120 s, threads: 1"].value == 0.0
+
+
+@pytest.mark.parametrize(
+    "true, interval, covered",
+    [(2.0, [1.0, 3.0], True), (4.0, [1.0, 3.0], False), (0.97, [0.9, 0.1], True), (0.5, [0.9, 0.1], False)],
+)
+def test_a_stated_interval_covers_what_is_in_it(true: float, interval: list[float], covered: bool):
+    """Of a phase through the end of its period too; the standard deviation beside it would say the other."""
+    error = {"effect": "", "parameter": "", "true": true, "value": 5.0, "sd": 1e-9 if covered else 9.0}
+    assert is_covered({**error, "interval": interval}) is covered
 
 
 def test_times_are_printed_by_threads_where_these_differ():

@@ -1,13 +1,14 @@
 """Motion in a recording that is said to be static: regions whose pixels change together, beyond what all pixels do.
 
-    z = sum (c - e) / sqrt(sum v),   v = f (1 - f) + noise        c: a pixel's count in a block of frames
+    z = sum (c - e) / sqrt(sum v),   v = k (f (1 - f) + noise)        c: a pixel's count in a block of frames
 
 f is the fractional part of the expected count e: an integrator that carries its charge over fires a whole number of
 times, and where it begins is uniform (DESIGN: variance 1/6 on average, 1/4 at most; not Poisson's e).  e is the
 pixel's mean times what its level does in that block (`common_mode`): lamp drift, flicker and ripple are in all pixels,
 dark-current drift in all by their dark level, so neither is motion.  A single pixel counts three standard deviations at
-most, so telegraph noise and hot pixels are none either.  Rows are no regions: windows are as high as wide, and even, in
-which what alternates from row to row cancels.
+most, so a hot pixel is none either.  k is by how much neighbours of a level scatter about each other beyond that law
+(`excess`): single events, false or missed spikes and telegraph noise, are each pixel's own; what moves, neighbours
+share.  Rows are no regions: windows are as high as wide, and even, in which what alternates from row to row cancels.
 
 Blind to: what changes in all pixels of a level by the same share, regions smaller than the least of SIDES, and contrast
 below LEAST_CONTRAST, which local effects of a camera reach; slow noise of single pixels (1/f) is below it in the mean
@@ -55,6 +56,14 @@ OWN_NOISE = 0.1
 """Variance of a count beside f (1 - f), which is 0 where whole numbers are expected: its ends are jittered.
 
 Jitter of s of an interval gives 1.13 s; a tenth is above the presets' (0.06 at most, in blocks of 100 spikes)."""
+
+PIXELS_OF_A_LEVEL = 256
+"""Pixels of neighbouring levels whose scatter is taken together: with two parts of the recording it is known to 7 %, by
+simulation."""
+
+FEW_SPIKES = 2.0
+"""Spikes by which a pixel has to be off a common mode to be left out of it: where most pixels have none, those that
+have one or two are the mean."""
 
 _ROUNDS = 20
 """Times at most that a recording is looked at again without what moved."""
@@ -135,7 +144,7 @@ def expected_variance(expected: Array) -> Array:
 
 def common_mode(counts: Array, mean: Array, use: Mask) -> Array:
     """(P,) counts that the level `mean` of a pixel lets expect in a block: the parabola through all pixels in `use`,
-    fitted without those off it, since what moves is not common."""
+    fitted without those off it, since what moves is not common; one by less than FEW_SPIKES is not off."""
     level = mean / max(float(mean[use].mean()), 1e-9)
     design = np.stack([np.ones_like(level), level, level**2], axis=1)
     expected, inside = mean, use
@@ -143,12 +152,47 @@ def common_mode(counts: Array, mean: Array, use: Mask) -> Array:
         weight = 1.0 / np.sqrt(expected_variance(np.maximum(expected, 0.0))[inside])
         line, *_ = np.linalg.lstsq(design[inside] * weight[:, None], counts[inside] * weight, rcond=1e-6)
         expected = np.maximum(design @ line, 0.0)
-        off = np.abs(counts - expected) / np.sqrt(expected_variance(expected))
+        spikes = np.abs(counts - expected)
+        off = spikes / np.sqrt(expected_variance(expected))
         usual = max(1.0, 1.4826 * float(np.median(off[use])))
-        inside = use & (off < MOST_OF_A_PIXEL * usual)
+        inside = use & ((off < MOST_OF_A_PIXEL * usual) | (spikes < FEW_SPIKES))
         if not inside.any():
             break
     return expected
+
+
+def of_one_level(level: Array, kept: Mask) -> list[NDArray[np.intp]]:
+    """Flat indices of the pixels kept, of neighbouring levels together.  level: (P,) mean count."""
+    order = np.flatnonzero(kept)[np.argsort(level[kept.reshape(-1)], kind="stable")]
+    return np.array_split(order, max(order.size // PIXELS_OF_A_LEVEL, 1))
+
+
+def excess(deviates: Array, kept: Mask, groups: list[NDArray[np.intp]]) -> Array:
+    """(P,) by how much more than 1 the deviates of neighbours scatter about each other, in each group; 1 at least.
+
+    deviates: (n, H, W), of n parts of the time, each pixel's in its own standard deviations.
+    """
+    half, pairs = np.zeros(kept.shape), np.zeros(kept.shape)
+    by_rows, by_columns = (deviates, kept, half, pairs), (deviates.swapaxes(1, 2), kept.T, half.T, pairs.T)
+    for values, use, sums, number in (by_rows, by_columns):
+        both = use[1:] & use[:-1]
+        square = np.where(both, 0.5 * np.mean(np.diff(values, axis=1) ** 2, axis=0), 0.0)
+        for side in (slice(1, None), slice(None, -1)):
+            sums[side] += square
+            number[side] += both
+    factor = np.ones(kept.size)
+    for group in groups:
+        factor[group] = max(half.reshape(-1)[group].sum() / max(pairs.reshape(-1)[group].sum(), 1.0), 1.0)
+    return factor
+
+
+def without_bias(deviates: Array, groups: list[NDArray[np.intp]]) -> Array:
+    """Deviates (n, P) whose mean over each group and all parts of the time is 0: those of few spikes are skewed, so
+    that a limit to what a pixel counts moves their mean."""
+    centred = deviates.copy()
+    for group in groups:
+        centred[:, group] -= deviates[:, group].mean()
+    return centred
 
 
 @dataclass(frozen=True)
@@ -171,6 +215,7 @@ def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask) -> Iterat
         return
     mean = counts.mean(axis=0)
     expected = np.stack([common_mode(block, mean, use) for block in counts])
+    groups = of_one_level(mean, kept)
     sizes = [(min(side, shape[0]), min(side, shape[1])) for side in SIDES]
     sizes = [s for s in dict.fromkeys(sizes) if s != shape]
     spans = [s for s in SPANS if s <= len(counts) // 2]
@@ -178,13 +223,15 @@ def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask) -> Iterat
                 for span in spans for h, w in sizes)  # fmt: skip
     limit = -float(ndtri(FALSE_ALARM / (2 * max(tests, 1))))
     for span in spans:
-        for first in range(0, len(counts) - span + 1, span):
-            part = slice(first, first + span)
-            hoped = expected[part].sum(axis=0)
-            sd = np.sqrt(expected_variance(hoped))
-            off = counts[part].sum(axis=0) - hoped
-            capped = np.clip(off, -MOST_OF_A_PIXEL * sd, MOST_OF_A_PIXEL * sd)
-            planes = [np.where(kept, a.reshape(shape), 0.0) for a in (off, capped, sd**2, hoped)]
+        firsts = range(0, len(counts) - span + 1, span)
+        hoped = np.stack([expected[first : first + span].sum(axis=0) for first in firsts])
+        off = np.stack([counts[first : first + span].sum(axis=0) for first in firsts]) - hoped
+        sd = np.sqrt(expected_variance(hoped))
+        deviates = without_bias(np.clip(off / sd, -MOST_OF_A_PIXEL, MOST_OF_A_PIXEL), groups)
+        scatter = excess(deviates.reshape(-1, *shape), kept, groups)
+        for i, first in enumerate(firsts):
+            parts = (off[i], deviates[i] * sd[i], scatter * sd[i] ** 2, hoped[i])
+            planes = [np.where(kept, a.reshape(shape), 0.0) for a in parts]
             for size in sizes:
                 yield from _beyond(planes, size, (first, first + span), limit)
 

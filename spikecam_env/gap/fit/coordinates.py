@@ -14,8 +14,15 @@ import numpy as np
 
 from spikecam_env.sensor import CATALOGUE
 
+SDS_OF_90_PERCENT = 1.645
+"""Standard deviations of a 90 % interval, of a normal error."""
+
 PHASE_UNIT = 0.1
 """Share of a period that counts as much as a factor of e; a choice: a derivative then steps over a twentieth of it."""
+
+
+_MOST_LOGARITHMS = 300.0
+"""Beyond every range, and below what overflows."""
 
 
 def moved_value(name: str, key: str, value: float, step: float) -> float:
@@ -31,6 +38,31 @@ def error_of(name: str, key: str, value: float, sd: float) -> float:
     """Standard deviation of a parameter, in its own unit, from that of its coordinate."""
     period = _period(name, key)
     return abs(value) * sd if period is None else PHASE_UNIT * period * sd
+
+
+def interval_of(name: str, key: str, value: float, sd: float, *, by_steps: bool = False) -> tuple[float, float] | None:
+    """Where a parameter is with 90 %, low and high, in its own unit: of a normal error of its coordinate.
+
+    It ends where the parameter's range does.  Of a phase it may go through the end of the period: low is above high
+    then.  None where no error is known.
+    sd: as of `error_of`.  by_steps: whether it was fitted as it is, and not by its logarithm; so is what is 0.
+    """
+    if not sd > 0 or not math.isfinite(sd):
+        return None
+    declared = CATALOGUE[name].__dataclass_fields__[key].metadata
+    (low, high), half = declared["bounds"], SDS_OF_90_PERCENT * sd
+    period = _period(name, key)
+    if period is not None:
+        return (
+            (low, high) if 2 * half >= period else tuple(low + (v - low) % period for v in (value - half, value + half))
+        )
+    if by_steps or value == 0:
+        ends = [value - half, value + half]
+    else:
+        factor = math.exp(min(half / abs(value), _MOST_LOGARITHMS))
+        ends = sorted([value / factor, value * factor])
+    most = high if declared["largest"] is None else declared["largest"]
+    return max(ends[0], low), min(ends[1], max(most, value))
 
 
 def is_apart(name: str, key: str, one: float, other: float, error: float) -> bool:

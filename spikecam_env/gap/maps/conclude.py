@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual
 from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.coordinates import interval_of
 from spikecam_env.gap.maps.bank import MapCase, with_use
 from spikecam_env.gap.maps.search import (
     FITTED_SPREADS,
@@ -175,7 +176,14 @@ def fit_estimates(tried: MapFit, name: str) -> dict[str, Estimate]:
     values = next(e for e in tried.state.model.effects if e.name == name).parameters()
     sd = {p: tried.sd.get(f"{name}.{p}", np.nan) for p in fitted_parameters(name)}
     sd = {p: s if s < MOST_RELATIVE_SD else np.nan for p, s in sd.items()}
-    return {p: Estimate(values[p], s * (1.0 if p in LINEAR_PARAMETERS else values[p])) for p, s in sd.items()}
+    return {p: _estimate(name, p, values[p], s) for p, s in sd.items()}
+
+
+def _estimate(name: str, key: str, value: float, sd: float) -> Estimate:
+    """sd: of what was fitted, the value or its logarithm."""
+    linear = key in LINEAR_PARAMETERS
+    own = sd * (1.0 if linear else value)
+    return Estimate(value, own, interval_of(name, key, value, own, by_steps=linear))
 
 
 def ranked_fit(t: MapFit, before: float, best: str, accepted: bool) -> Ranked:

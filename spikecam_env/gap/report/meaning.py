@@ -7,7 +7,7 @@ from typing import Any
 
 from spikecam_env.gap.report.cells import bullets, number, percent, value_in_words
 from spikecam_env.gap.report.parameters_off import parameters_off
-from spikecam_env.gap.report.quantities import interval_of_90_percent, quantity
+from spikecam_env.gap.report.quantities import interval, quantity
 from spikecam_env.gap.report.tables import bounds_tables
 from spikecam_env.gap.report.words import bare, equation_of, human, meaning_of, parameter_unit, sheet
 from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect
@@ -143,8 +143,7 @@ def effect_summary(name: str) -> Iterator[str]:
 def parameter_row(effect: str, name: str, e: Estimate) -> tuple[str, ...]:
     """Name, value with error, 90 % interval, meaning."""
     unit = parameter_unit(effect, name)
-    interval = interval_of_90_percent(e.value, unit, e.sd) if e.sd > 0 else "–"
-    return bare(effect, name), quantity(e.value, unit, e.sd), interval, meaning_of(effect, name)
+    return bare(effect, name), quantity(e.value, unit, e.sd), interval(e, unit), meaning_of(effect, name)
 
 
 def parameters_table(d: Diagnosis) -> str:

@@ -7,9 +7,6 @@ import math
 from spikecam_env.gap.report.words import bare, parameter_unit
 from spikecam_env.gap.result import Bound, Estimate, NamedEffect
 
-SDS_OF_90_PERCENT = 1.645
-"""Standard deviations of a 90 % interval, of a normal error."""
-
 
 def quantity(value: float, unit: str, sd: float | None = None) -> str:
     """A value with its standard deviation and unit, to the digits that the latter leaves.
@@ -30,17 +27,26 @@ def quantity(value: float, unit: str, sd: float | None = None) -> str:
     return f"{value:.{digits}f} ± {sd:.{digits}f} {unit}".rstrip()
 
 
-def interval_of_90_percent(value: float, unit: str, sd: float) -> str:
-    """Where a value is with 90 %, to the digits of `quantity`.
+def interval(estimate: Estimate, unit: str) -> str:
+    """Where a parameter is with 90 %, in the unit and to the digits of `quantity`, two of each end at least; a dash
+    where that is not known.
 
-    >>> interval_of_90_percent(0.3023, "relative", 0.0081)
-    '28.90 … 31.56 %'
+    >>> interval(Estimate(0.3023, 0.0081, (0.2893, 0.3159)), "relative")
+    '28.93 … 31.59 %'
+    >>> interval(Estimate(7.2, 6.8, (1.52, 34.06)), "us")
+    '1.5 … 34.1 us'
     """
-    scale, unit = readable(value, unit)
-    half = SDS_OF_90_PERCENT * sd * scale
-    digits = _digits(sd * scale)
-    low, high = (f"{value * scale + side * half:.{digits}f}" for side in (-1, 1))
+    if estimate.interval is None:
+        return "–"
+    scale, unit = readable(estimate.value, unit)
+    low, high = (_end(end * scale, _digits(estimate.sd * scale)) for end in estimate.interval)
     return f"{low} … {high} {unit}".rstrip()
+
+
+def _end(value: float, digits: int) -> str:
+    own = 1 - math.floor(math.log10(abs(value))) if value else 0
+    digits = max(digits, own)
+    return f"{value:.2g}" if digits > 7 else f"{value:.{digits}f}"
 
 
 def _digits(sd: float) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.coordinates import interval_of
 from spikecam_env.gap.result import MOST_CONFIDENCE, Estimate, NamedEffect
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.comparison import Comparison
@@ -29,7 +30,7 @@ def named_by_refit(found: Missing) -> NamedEffect:
     """An effect of the base pixel, as the refit measured it."""
     effect = found.effect
     key = type(effect).strength
-    estimate = {key: Estimate(effect.parameters()[key], found.sd)}
+    estimate = estimates(effect.name, {key: effect.parameters()[key]}, {key: found.sd})
     share = MOST_CONFIDENCE / (1 + len(found.also))
     rivals = tuple((name, share) for name in found.also)
     return NamedEffect(effect.name, candidate(effect.name).family, share, estimate, rivals)
@@ -43,7 +44,7 @@ def named_by_search(comparison: Comparison, found: Fit, turn: Round, place: str,
         found.name,
         candidate(found.name).family,
         min(1.0 / total, MOST_CONFIDENCE),
-        estimates(found.parameters, found.sd),
+        estimates(found.name, found.parameters, found.sd),
         tuple((name, w / total) for name, w in weights),
         where=place,
         when=time,
@@ -63,6 +64,7 @@ def removed_instead(comparison: Comparison, turn: Round) -> dict[str, float]:
     return {f.name: gap_of(case, null, values, given, f.prediction).removed for f in confirmed}
 
 
-def estimates(parameters: Mapping[str, float], sd: Mapping[str, float]) -> dict[str, Estimate]:
-    """Parameters with their standard deviations, NaN where none is known."""
-    return {k: Estimate(v, sd.get(k, np.nan)) for k, v in parameters.items()}
+def estimates(name: str, parameters: Mapping[str, float], sd: Mapping[str, float]) -> dict[str, Estimate]:
+    """An effect's parameters with their standard deviations, NaN where none is known, and intervals."""
+    known = {k: sd.get(k, np.nan) for k in parameters}
+    return {k: Estimate(v, known[k], interval_of(name, k, v, known[k])) for k, v in parameters.items()}

@@ -31,7 +31,7 @@ def ranked(found: Fit, turn: Round, *, accepted: bool) -> Ranked:
     """A row of the ranking; the misfit of what was added is beside all that was found, in their noise."""
     worst = float(np.abs(found.rho).max())
     reason = f"leaves {worst:.1f} noises at worst" if accepted else reason_against(found, turn)
-    own = estimates(found.parameters, found.sd)
+    own = estimates(found.name, found.parameters, found.sd)
     return Ranked(found.name, candidate(found.name).family, turn.misfit, found.misfit, own, accepted, reason)
 
 

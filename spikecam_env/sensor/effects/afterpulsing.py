@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Spikes, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -33,7 +33,7 @@ class Afterpulsing(Effect):
     delay_frames: int = parameter(2, unit="frames", bounds=(1, 1000), doc="time from a spike to its second report")
 
     stage = Stage.READOUT
-    within = Within.END
+    acts = Acts.END
     strength = "probability"
     identification = Identification(
         family="readout",

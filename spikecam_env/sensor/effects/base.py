@@ -14,7 +14,7 @@ for a block of frames, whatever fires in it; arrays have a leading axis of time:
 
     collect      charge expected, from light and in the dark, before shot noise
     compare      how the comparators' reference moves from frame to frame
-    sway         how it moves within them; `intervals` and `kinks` say how finely
+    sway         how it moves within them; `parts` and `kinks` say how finely
     read_out     bits reported
 
 and frame by frame, for what depends on the spikes:
@@ -47,20 +47,20 @@ from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.effects.identification import Identification
+from spikecam_env.sensor.frame_moments import Moments
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.ranges import parameter as parameter
 from spikecam_env.sensor.unit import PixelArray, Unit
-from spikecam_env.sensor.within_frame import Moments
 
 Array = NDArray[np.float64]
 Field = NDArray[np.float32]
 Spikes = NDArray[np.bool_]
 
 
-MOST_INTERVALS = 1024
+MOST_PARTS = 1024
 """Parts of a frame at most: 32 periods of a sine."""
 
-A_CYCLE = 32
+PARTS_OF_A_CYCLE = 32
 """Parts of a period of a sine that are taken as linear: within (2 pi / 32)^2 / 8, half a per cent of its amplitude."""
 
 
@@ -75,7 +75,7 @@ class Stage(IntEnum):
     READOUT = 6
 
 
-class Within(Enum):
+class Acts(Enum):
     """How an effect acts within a frame; its docstring says so in these words, and how far that is exact."""
 
     CONSTANT = "constant in time"
@@ -91,8 +91,9 @@ class Exposure:
 
     number: of its first frame, absolute, from 0.  shape: (rows, columns).  unit: the firing law of every pixel.
     frames: how many, F; one for the hooks that act frame by frame.
-    part: of a frame, where light bends and an effect `within_frame` is asked for pieces: the block is then one piece,
-    `number` 0, `frame_rate_hz` one over its length, and it begins `origin` such lengths after the recording does.
+    length: of a frame, in the camera's; below 1 where light bends and an effect that `wants_rise` is asked for pieces:
+    the block is then one piece, `number` 0, `frame_rate_hz` one over its length, and it begins `origin` such lengths
+    after the recording does.
     """
 
     number: int
@@ -100,7 +101,7 @@ class Exposure:
     shape: tuple[int, int]
     unit: Unit
     frames: int = 1
-    part: float = 1.0
+    length: float = 1.0
     origin: float = 0.0
 
     @property
@@ -116,11 +117,11 @@ class Exposure:
     def piece(self, start: float, length: float) -> Exposure:
         """A piece of one frame, from `start` in it on [frames]."""
         rate, origin = self.frame_rate_hz / length, (self.number + start) / length
-        return dataclasses.replace(self, number=0, frame_rate_hz=rate, part=length, origin=origin)
+        return dataclasses.replace(self, number=0, frame_rate_hz=rate, length=length, origin=origin)
 
     def charge_of(self, current_pA: float) -> Array:
         """Charge (H, W) that a current brings in a frame of the camera [thresholds]."""
-        return (current_pA * 1e3 / (self.frame_rate_hz * self.part) / self.unit.threshold_fC).reshape(self.shape)
+        return (current_pA * 1e3 / (self.frame_rate_hz * self.length) / self.unit.threshold_fC).reshape(self.shape)
 
 
 class Few(NamedTuple):
@@ -159,7 +160,7 @@ class Charge:
         if not rises.any():
             return Charge(self.pixels, self.factor * by.mean, 0.0, self.few, self.factor * by.tilt)
         x = self.values
-        return Charge(x * by.mean + rises * (by.tilt / 12.0), 1.0, x * by.tilt + rises * by.bend)
+        return Charge(x * by.mean + rises * (by.tilt / 12.0), 1.0, x * by.tilt + rises * by.square)
 
     def plus(self, few: Few) -> Charge:
         """This, and what a few pixels get besides."""
@@ -255,8 +256,8 @@ class Effect:
     """
 
     stage: ClassVar[Stage]
-    within: ClassVar[Within | None] = None
-    within_frame: ClassVar[bool] = False
+    acts: ClassVar[Acts | None] = None
+    wants_rise: ClassVar[bool] = False
     """Whether `collect` asks for the rise of light within a frame, and, but for effects of the read-out, is given light
     that bends within one piece by piece: its charge then is that of a frame as bright as the piece."""
     name: ClassVar[str] = "effect"
@@ -319,8 +320,8 @@ class Effect:
         """How the comparators' reference moves in these frames, and the memory."""
         return Shift(), memory
 
-    def intervals(self, frame_rate_hz: float) -> int:
-        """Parts of a frame in each of which the reference moves by `sway` as if linearly, at most MOST_INTERVALS; 0
+    def parts(self, frame_rate_hz: float) -> int:
+        """Parts of a frame in each of which the reference moves by `sway` as if linearly, at most MOST_PARTS; 0
         where it does not move within a frame."""
         return 0
 
@@ -328,12 +329,12 @@ class Effect:
         """Phases of the array's clock [frames], in [0, 1), at which `sway` jumps."""
         return ()
 
-    def sway(self, now: Exposure, phase: Array, piece: Array) -> Shift:
+    def sway(self, now: Exposure, phase: Array, beside: Array) -> Shift:
         """How the reference moves within these frames, at moments (H or 1, n) of each.
 
         phase: of the array's clock at those moments [frames]: 0 at the start of the frame, below 0 in the rows that
-        are read before its end.  piece: a phase beside it between the same two kinks: where the reference jumps there
-        are two moments, before and after, of the same phase and of different pieces.
+        are read before its end.  beside: a phase near it between the same two kinks: where the reference jumps there
+        are two moments, before and after, of the same phase, on either side of the jump.
         """
         return Shift()
 
@@ -392,14 +393,14 @@ def neighbour_sum(values: Array) -> Array:
     return total
 
 
-def check_intervals(effects: Sequence[Effect], frame_rate_hz: float) -> None:
+def check_parts(effects: Sequence[Effect], frame_rate_hz: float) -> None:
     """Raise InputError for a reference that moves too fast within a frame."""
     for effect in effects:
-        parts = effect.intervals(frame_rate_hz)
-        if parts > MOST_INTERVALS:
+        parts = effect.parts(frame_rate_hz)
+        if parts > MOST_PARTS:
             raise InputError(
                 f"{effect.name} moves the reference too fast: a frame of {1e6 / frame_rate_hz:g} us would be cut into "
-                f"{parts} parts; at most {MOST_INTERVALS} are allowed (32 periods of a sine); lower its frequency, "
+                f"{parts} parts; at most {MOST_PARTS} are allowed (32 periods of a sine); lower its frequency, "
                 "lengthen its time constant, or raise frame_rate_hz"
             )
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -23,7 +23,7 @@ class BiasVoltageSpread(Effect):
     sigma_V: float = parameter(0.0497, unit="V", bounds=(0.0, 0.5), doc="standard deviation over pixels")
 
     stage = Stage.THRESHOLD
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "sigma_V"
     identification = Identification(family="pattern", needs=Needs.EVEN, experiment=SECOND_V_D)
 

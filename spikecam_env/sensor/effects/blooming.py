@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -26,9 +26,9 @@ class Blooming(Effect):
     full: float = parameter(1.0, unit="thresholds a frame", bounds=(0.0, 2.0), doc="charge a frame that still stays")
 
     stage = Stage.PHOTODIODE
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "share"
-    within_frame = True
+    wants_rise = True
     identification = Identification(
         family="coupling",
         fitted=("share", "full"),

@@ -25,10 +25,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
-PARTS = 5
+PARTS_OF_TAU = 5
 """Parts of tau in which the decay is taken as linear: within (1/5)^2 / 8 of the amplitude."""
 
 
@@ -48,7 +48,7 @@ class ClockFeedthrough(Effect):
     )
 
     stage = Stage.THRESHOLD
-    within = Within.CROSSING
+    acts = Acts.CROSSING
     strength = "amplitude_mV"
     identification = Identification(
         family="clock",
@@ -58,15 +58,15 @@ class ClockFeedthrough(Effect):
         experiment="flats whose intervals are whole numbers of frames, and a hundredth more and less",
     )
 
-    def intervals(self, frame_rate_hz: float) -> int:
-        return math.ceil(PARTS / self.tau(frame_rate_hz)) if self.amplitude_mV else 0
+    def parts(self, frame_rate_hz: float) -> int:
+        return math.ceil(PARTS_OF_TAU / self.tau(frame_rate_hz)) if self.amplitude_mV else 0
 
     def kinks(self, first: Exposure) -> tuple[float, ...]:
         return (self.phase_frames % 1.0,)
 
-    def sway(self, now: Exposure, phase: Array, piece: Array) -> Shift:
+    def sway(self, now: Exposure, phase: Array, beside: Array) -> Shift:
         tau = self.tau(now.frame_rate_hz)
-        since = (phase - self.phase_frames) - np.floor(piece - self.phase_frames)
+        since = (phase - self.phase_frames) - np.floor(beside - self.phase_frames)
         mean = tau * (1.0 - math.exp(-1.0 / tau))
         return Shift(millivolts=(self.amplitude_mV * (np.exp(-since / tau) - mean))[None])
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Bend, Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Bend, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -32,9 +32,9 @@ class ClockJitter(Effect):
     sigma_ns: float = parameter(20.0, unit="ns", bounds=(0.0, 5000.0), doc="standard deviation of an edge")
 
     stage = Stage.READOUT
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "sigma_ns"
-    within_frame = True
+    wants_rise = True
     identification = Identification(family="common", square=True, needs=Needs.STEADY)
 
     def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:

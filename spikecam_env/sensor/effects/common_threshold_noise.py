@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -24,7 +24,7 @@ class CommonThresholdNoise(Effect):
     sigma_mV: float = parameter(1.0, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of the common reference")
 
     stage = Stage.THRESHOLD
-    within = Within.DRAWN
+    acts = Acts.DRAWN
     strength = "sigma_mV"
     identification = Identification(family="common", square=True, needs=Needs.STEADY)
 

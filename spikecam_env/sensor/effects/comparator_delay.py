@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -26,7 +26,7 @@ class ComparatorDelay(Effect):
     delay_us: float = parameter(0.1, unit="us", bounds=(0.0, 25.0), doc="delay c at one spike a frame (x = 1)")
 
     stage = Stage.RESET
-    within = Within.CROSSING
+    acts = Acts.CROSSING
     strength = "delay_us"
     identification = Identification(family="saturation", needs=Needs.LEVELS)
 

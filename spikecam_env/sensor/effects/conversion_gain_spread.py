@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -23,7 +23,7 @@ class ConversionGainSpread(Effect):
     sigma: float = parameter(0.0584 / 1.0128, unit="relative", bounds=(0.0, 1.0), doc="standard deviation over mean")
 
     stage = Stage.PHOTODIODE
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "sigma"
     identification = Identification(family="pattern", needs=Needs.EVEN)
 

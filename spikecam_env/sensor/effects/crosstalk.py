@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.sensor.effects.base import (
+    Acts,
     Array,
     Effect,
     Exposure,
     Feedback,
     Spikes,
     Stage,
-    Within,
     neighbour_sum,
     parameter,
 )
@@ -43,7 +43,7 @@ class Crosstalk(Effect):
     when: str = parameter("at_spike", unit="", choices=("at_spike", "frame_end"), doc="when the charge arrives")
 
     stage = Stage.RESET
-    within = Within.CROSSING
+    acts = Acts.CROSSING
     strength = "kick"
     identification = Identification(family="coupling", mixed=True, needs=Needs.STEADY)
 

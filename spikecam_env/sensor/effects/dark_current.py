@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -22,7 +22,7 @@ class DarkCurrent(Effect):
     mean_pA: float = parameter(0.4442, unit="pA", bounds=(0.0, 1e3), doc="mean dark current of a pixel")
 
     stage = Stage.PHOTODIODE
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "mean_pA"
     identification = Identification(family="dark", needs=Needs.DARK)
 

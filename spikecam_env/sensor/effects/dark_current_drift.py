@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
-from spikecam_env.sensor.within_frame import mean_decay
+from spikecam_env.sensor.frame_moments import mean_decay
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class DarkCurrentDrift(Effect):
     tau_ms: float = parameter(50.0, unit="ms", bounds=(1e-3, 1e8), doc="time constant of the warming")
 
     stage = Stage.PHOTODIODE
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "rise"
     identification = Identification(
         family="dark", fitted=("rise", "tau_ms"), shapes={"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=Needs.DARK

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -23,7 +23,7 @@ class DarkCurrentSpread(Effect):
     sigma_pA: float = parameter(0.1731, unit="pA", bounds=(0.0, 1e3), doc="standard deviation over pixels")
 
     stage = Stage.PHOTODIODE
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "sigma_pA"
     identification = Identification(family="dark", needs=Needs.DARK)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -24,7 +24,7 @@ class DarkCurrentTail(Effect):
     sigma: float = parameter(0.45, unit="log", bounds=(0.0, 3.0), doc="standard deviation of the logarithm")
 
     stage = Stage.PHOTODIODE
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "sigma"
     identification = Identification(family="dark", needs=Needs.DARK)
 

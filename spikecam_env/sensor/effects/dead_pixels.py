@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -24,7 +24,7 @@ class DeadPixels(Effect):
     fraction: float = parameter(1e-4, unit="relative", bounds=(0.0, 1.0), doc="share of pixels that are dead")
 
     stage = Stage.READOUT
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "fraction"
     identification = Identification(family="defects", needs=Needs.EVEN, share=("fraction", "pixels"))
 

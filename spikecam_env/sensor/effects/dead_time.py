@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -23,7 +23,7 @@ class DeadTime(Effect):
     tau_us: float = parameter(0.1, unit="us", bounds=(0.0, 25.0), doc="time without integration after a spike")
 
     stage = Stage.RESET
-    within = Within.CROSSING
+    acts = Acts.CROSSING
     strength = "tau_us"
     identification = Identification(family="saturation", needs=Needs.LEVELS)
 

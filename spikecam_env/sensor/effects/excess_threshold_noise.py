@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -24,7 +24,7 @@ class ExcessThresholdNoise(Effect):
     sigma_mV: float = parameter(2.0, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a spike's threshold")
 
     stage = Stage.THRESHOLD
-    within = Within.CROSSING
+    acts = Acts.CROSSING
     strength = "sigma_mV"
     identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 

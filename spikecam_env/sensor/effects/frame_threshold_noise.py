@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.random_fields import Words, white_field, words
 
@@ -24,7 +24,7 @@ class FrameThresholdNoise(Effect):
     sigma_mV: float = parameter(6.36, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a frame's reference")
 
     stage = Stage.THRESHOLD
-    within = Within.DRAWN
+    acts = Acts.DRAWN
     strength = "sigma_mV"
     identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -25,7 +25,7 @@ class HotPixels(Effect):
     mean_pA: float = parameter(3.0, unit="pA", bounds=(0.0, 1e4), doc="mean extra current of a hot pixel")
 
     stage = Stage.PHOTODIODE
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "fraction"
     identification = Identification(
         family="dark",

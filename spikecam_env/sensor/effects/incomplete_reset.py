@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.decay import LONG, decayed
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -27,7 +27,7 @@ class IncompleteReset(Effect):
     tau_us: float = parameter(250.0, unit="us", bounds=(0.1, 1e7), doc="time constant of filling")
 
     stage = Stage.RESET
-    within = Within.END
+    acts = Acts.END
     strength = "fraction"
     identification = Identification(
         family="reset", fitted=("fraction", "tau_us"), shapes={"tau_us": (50.0, 250.0, 1250.0)}, needs=Needs.LEVELS

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -29,7 +29,7 @@ class IrDrop(Effect):
     )
 
     stage = Stage.THRESHOLD
-    within = Within.END
+    acts = Acts.END
     strength = "droop"
     identification = Identification(
         family="saturation",

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -35,7 +35,7 @@ class LampDrift(Effect):
     )
 
     stage = Stage.OPTICS
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "sigma_per_root_s"
     identification = Identification(family="light", square=True, needs=Needs.STEADY, random_course=True)
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
-from spikecam_env.sensor.within_frame import wave_moments
+from spikecam_env.sensor.frame_moments import wave_moments
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class LightFlicker(Effect):
     phase_cycles: float = parameter(0.0, unit="cycles", bounds=(0.0, 1.0), doc="phase p at frame 0")
 
     stage = Stage.OPTICS
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "modulation"
-    within_frame = True
+    wants_rise = True
     identification = Identification(
         family="light", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=Needs.STEADY
     )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Spikes, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -23,7 +23,7 @@ class MissedSpikes(Effect):
     probability: float = parameter(1e-3, unit="relative", bounds=(0.0, 1.0), doc="chance p to lose a spike")
 
     stage = Stage.READOUT
-    within = Within.END
+    acts = Acts.END
     strength = "probability"
     identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "spikes"))
 

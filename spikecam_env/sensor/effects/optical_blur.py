@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 from scipy.optimize import brentq
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 _NO_BLUR = 1e-9
@@ -33,7 +33,7 @@ class OpticalBlur(Effect):
     sigma_pixels: float = parameter(0.5, unit="pixels", bounds=(0.0, 20.0), doc="standard deviation of the spread")
 
     stage = Stage.OPTICS
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "sigma_pixels"
     identification = Identification(family="optics", square=True, needs=Needs.EDGES, only_contrast=True)
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -22,9 +22,9 @@ class PhotoResponseNonlinearity(Effect):
     beta: float = parameter(0.01, unit="per threshold a frame", bounds=(-0.25, 0.25), doc="loss at one spike a frame")
 
     stage = Stage.PHOTODIODE
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "beta"
-    within_frame = True
+    wants_rise = True
     identification = Identification(family="saturation", needs=Needs.LEVELS)
 
     def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:

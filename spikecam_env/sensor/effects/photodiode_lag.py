@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
-from spikecam_env.sensor.within_frame import decay_moment
+from spikecam_env.sensor.frame_moments import decay_moment
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class PhotodiodeLag(Effect):
     tau_us: float = parameter(1000.0, unit="us", bounds=(0.1, 1e7), doc="time constant of the late charge")
 
     stage = Stage.PHOTODIODE
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "fraction"
-    within_frame = True
+    wants_rise = True
     identification = Identification(
         family="lag",
         fitted=("fraction", "tau_us"),

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Few, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Charge, Effect, Exposure, Few, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 AHEAD = 4096
@@ -52,7 +52,7 @@ class RandomTelegraphNoise(Effect):
     dwell_ms: float = parameter(10.0, unit="ms", bounds=(1e-3, 1e7), doc="mean time in a state")
 
     stage = Stage.PHOTODIODE
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "amplitude_pA"
     identification = Identification(
         family="dark",

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Charge, Effect, Exposure, Spikes, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -34,9 +34,9 @@ class ReadoutSkew(Effect):
     )
 
     stage = Stage.READOUT
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "span"
-    within_frame = True
+    wants_rise = True
     identification = Identification(
         family="readout",
         needs=Needs.MOTION,

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -25,7 +25,7 @@ class ResetNoise(Effect):
     sigma_mV: float = parameter(0.976, unit="mV", bounds=(0.0, 100.0), doc="standard deviation of a reset's voltage")
 
     stage = Stage.THRESHOLD
-    within = Within.CROSSING
+    acts = Acts.CROSSING
     strength = "sigma_mV"
     identification = Identification(family="noise", square=True, needs=Needs.STEADY, experiment=SECOND_V_D)
 

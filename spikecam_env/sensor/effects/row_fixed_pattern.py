@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -24,7 +24,7 @@ class RowFixedPattern(Effect):
     sigma_mV: float = parameter(5.0, unit="mV", bounds=(0.0, 200.0), doc="standard deviation over rows")
 
     stage = Stage.THRESHOLD
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "sigma_mV"
     identification = Identification(family="pattern", needs=Needs.EVEN)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -35,7 +35,7 @@ class ShotNoise(Effect):
     )
 
     stage = Stage.INTEGRATION
-    within = Within.INTEGRATED
+    acts = Acts.INTEGRATED
     strength = "quanta"
     neutral = math.inf
     identification = Identification(family="noise", needs=Needs.STEADY, experiment=SECOND_V_D)

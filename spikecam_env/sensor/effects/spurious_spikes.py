@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Spikes, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Spikes, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 _AT_ONCE = 256
@@ -38,7 +38,7 @@ class SpuriousSpikes(Effect):
     probability: float = parameter(1e-5, unit="per frame", bounds=(0.0, 1.0), doc="chance p of a false spike")
 
     stage = Stage.READOUT
-    within = Within.END
+    acts = Acts.END
     strength = "probability"
     identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "frames"))
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import A_CYCLE, Array, Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import PARTS_OF_A_CYCLE, Acts, Array, Effect, Exposure, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -30,16 +30,16 @@ class SupplyRipple(Effect):
     phase_cycles: float = parameter(0.0, unit="cycles", bounds=(0.0, 1.0), doc="phase p at frame 0")
 
     stage = Stage.THRESHOLD
-    within = Within.CROSSING
+    acts = Acts.CROSSING
     strength = "ripple"
     identification = Identification(
         family="common", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=Needs.STEADY
     )
 
-    def intervals(self, frame_rate_hz: float) -> int:
-        return max(1, math.ceil(A_CYCLE * self.frequency_hz / frame_rate_hz)) if self.ripple else 0
+    def parts(self, frame_rate_hz: float) -> int:
+        return max(1, math.ceil(PARTS_OF_A_CYCLE * self.frequency_hz / frame_rate_hz)) if self.ripple else 0
 
-    def sway(self, now: Exposure, phase: Array, piece: Array) -> Shift:
+    def sway(self, now: Exposure, phase: Array, beside: Array) -> Shift:
         frame = (now.number + np.arange(now.frames, dtype=np.float64))[:, None, None]
         cycles = self.frequency_hz * ((frame + phase) / now.frame_rate_hz) + self.phase_cycles
         return Shift(factor=1.0 + self.ripple * np.sin(2.0 * np.pi * cycles))

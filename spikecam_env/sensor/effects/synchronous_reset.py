@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Array, Effect, Exposure, Feedback, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -22,7 +22,7 @@ class SynchronousReset(Effect):
     )
 
     stage = Stage.RESET
-    within = Within.CROSSING
+    acts = Acts.CROSSING
     strength = "fraction"
     identification = Identification(family="reset", needs=Needs.STEADY)
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.random_fields import Words, octave_field, words
 
@@ -37,7 +37,7 @@ class ThresholdFlickerNoise(Effect):
     )
 
     stage = Stage.THRESHOLD
-    within = Within.DRAWN
+    acts = Acts.DRAWN
     strength = "sigma_mV"
     identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Effect, Stage, Within, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.unit import PixelArray
 
@@ -27,7 +27,7 @@ class Vignetting(Effect):
     centre_y: float = parameter(0.5, unit="relative", bounds=(0.0, 1.0), doc="first row 0, last row 1")
 
     stage = Stage.OPTICS
-    within = Within.CONSTANT
+    acts = Acts.CONSTANT
     strength = "falloff"
     identification = Identification(family="optics", needs=Needs.EVEN)
 

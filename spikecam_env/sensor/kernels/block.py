@@ -151,7 +151,7 @@ class _Part:
 
 def _longest(first: Exposure, effects: Sequence[Effect]) -> int:
     """Frames of a block at most, whatever the light."""
-    return max(min(_LONGEST, _NODES // (first.shape[0] * (drive.intervals(first, effects) + 1))), 1)
+    return max(min(_LONGEST, _NODES // (first.shape[0] * (drive.parts(first, effects) + 1))), 1)
 
 
 def _blocks(law: BlockLaw, segments: Iterable[Segment], longest: int) -> Iterator[list[_Part]]:

@@ -41,6 +41,25 @@ def test_no_effect_that_changes_static_recordings_is_motion(name: str) -> None:
     assert [looked_at(model, picture(), FRAMES, seed) for seed in range(3)] == [None] * 3
 
 
+SINGLE_EVENTS: list[tuple[str, dict[str, float], float]] = [
+    ("spurious_spikes", {"probability": 0.01}, 0.005),
+    ("spurious_spikes", {"probability": 0.01}, 0.125),
+    ("hot_pixels", {"fraction": 0.05, "mean_pA": 100.0}, 0.03),
+    ("random_telegraph_noise", {"fraction": 0.5, "amplitude_pA": 5.0, "dwell_ms": 5.0}, 0.005),
+    ("random_telegraph_noise", {"fraction": 0.5, "amplitude_pA": 20.0, "dwell_ms": 1.0}, 0.125),
+    ("afterpulsing", {"probability": 0.1}, 0.005),
+    ("missed_spikes", {"probability": 0.1}, 0.125),
+]
+"""Effect, parameters, level: what made each pixel's count vary more than an integrator's does."""
+
+
+@pytest.mark.parametrize(("name", "parameters", "level"), SINGLE_EVENTS)
+def test_events_of_single_pixels_are_no_motion(name: str, parameters: dict[str, float], level: float) -> None:
+    model = SCSIM.with_effect(CATALOGUE[name](**parameters))
+    flat = np.full(SHAPE, level, np.float32)
+    assert [looked_at(model, flat, FRAMES, seed) for seed in range(4)] == [None] * 4
+
+
 def test_a_square_is_found_where_and_when_it_is() -> None:
     """8 x 8 pixels of + 20 %: a block of 32 frames has 4.8 + 0.8 (of the mean, which has a quarter of it) spikes of
     variance at most 0.35, so z is 8 x 0.8 / 0.6 = 10.  Windows of 16 pixels reach 16 beyond, blocks one block."""

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline import motion, static_part
-from spikecam_env.gap.baseline.motion import expected_variance, find_motion
+from spikecam_env.gap.baseline.motion import common_mode, excess, expected_variance, find_motion, of_one_level
 from spikecam_env.gap.baseline.static_part import Observed, without_motion
 from spikecam_env.gap.observe.conditions import Condition
 
@@ -128,3 +128,47 @@ def test_a_quarter_of_the_pixels_has_to_be_static(share: float, kept: bool, monk
     recording = SimpleNamespace(packed=lambda: None)
     seen, _ = without_motion(Observed((recording,), (SCENE,), (SimpleNamespace(shape=SHAPE),)), static_only=True)
     assert [mask.mean() == pytest.approx(share, abs=1e-3) for mask in seen.seen] == [True] * kept
+
+
+def scatter(level: NDArray[np.float64], noisy: NDArray[np.bool_], seed: int = 0) -> NDArray[np.float64]:
+    """(P,) excess of normal deviates of two parts of the time, of standard deviation 2 where noisy, else 1."""
+    deviates = np.random.default_rng(seed).standard_normal((2, *SHAPE)) * np.where(noisy, 2.0, 1.0)
+    kept = np.ones(SHAPE, bool)
+    return excess(deviates, kept, of_one_level(level.reshape(-1), kept))
+
+
+@pytest.mark.parametrize(("factor", "apart"), [(0.5, True), (1.0, True), (2.0, False)])
+def test_the_noise_of_a_level_is_its_own(factor: float, apart: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The 256 dimmest pixels scatter by 2, in a corner of 16 x 16: 4 times, but for its border; of 512, 2.5 times."""
+    monkeypatch.setattr(motion, "PIXELS_OF_A_LEVEL", int(factor * motion.PIXELS_OF_A_LEVEL))
+    noisy = np.zeros(SHAPE, bool)
+    noisy[:16, :16] = True
+    level = np.where(noisy, 1.0, 5.0) + 1e-3 * np.arange(noisy.size).reshape(SHAPE) / noisy.size
+    found = scatter(level, noisy).reshape(SHAPE)[:16, :16]
+    print(found.min(), found.max())
+    assert (found.min() > 3.3) == apart
+
+
+@pytest.mark.parametrize(("factor", "precise"), [(0.5, False), (1.0, True), (2.0, True)])
+def test_the_noise_of_a_level_is_known_to_eight_percent(
+    factor: float, precise: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(motion, "PIXELS_OF_A_LEVEL", int(factor * motion.PIXELS_OF_A_LEVEL))
+    level, quiet = np.arange(float(SHAPE[0] * SHAPE[1])).reshape(SHAPE), np.ones(SHAPE, bool)
+    found = np.concatenate([np.unique(scatter(level, quiet, seed)) for seed in range(30)]) / 4.0
+    print(spread := float(found.std()))
+    assert (spread < 0.08) == precise
+
+
+@pytest.mark.parametrize(("factor", "dim", "steady"), [(0.5, False, True), (1.0, True, True), (2.0, True, False)])
+def test_few_spikes_are_no_outliers(factor: float, dim: bool, steady: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 0.05 spikes in pairs: all but one pixel in forty have none, and the mean is theirs.  Of one spike, a tenth of
+    the pixels have three more: they are off."""
+    monkeypatch.setattr(motion, "FEW_SPIKES", factor * motion.FEW_SPIKES)
+    use = np.ones(2000, bool)
+    pairs = np.where(np.arange(2000) % 40 == 0, 2.0, 0.0)
+    expected = common_mode(pairs, np.full(2000, 0.05), use)
+    assert (abs(expected.mean() - 0.05) < 0.01) == dim
+    more = np.where(np.arange(2000) % 10 == 0, 4.0, 1.0)
+    expected = common_mode(more, np.full(2000, 1.0), use)
+    assert (abs(expected.mean() - 1.0) < 0.1) == steady

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from scipy import stats
 
-from spikecam_env.gap.report.quantities import SDS_OF_90_PERCENT, at_most, bounded_parameter, quantity
-from spikecam_env.gap.result import Bound
+from spikecam_env.gap.report.quantities import at_most, bounded_parameter, interval, quantity
+from spikecam_env.gap.result import Bound, Estimate
 
 
 @pytest.mark.parametrize(
@@ -34,5 +33,17 @@ def test_a_bound_is_rounded_up_and_says_where_it_holds():
     assert at_most(Bound("spurious_spikes", "probability", "per frame", 3.81e-7)) == "3.9e-07 per frame"
 
 
-def test_a_parameter_s_interval_is_of_ninety_per_cent() -> None:
-    assert stats.norm.cdf(SDS_OF_90_PERCENT) - stats.norm.cdf(-SDS_OF_90_PERCENT) == pytest.approx(0.9, abs=1e-3)
+@pytest.mark.parametrize(
+    "value, unit, sd, ends, said",
+    [
+        (0.3023, "relative", 0.0081, (0.2893, 0.3159), "28.93 … 31.59 %"),
+        (7.2, "us", 6.8, (1.5226, 34.06), "1.5 … 34.1 us"),
+        (3.0, "us", 9.0, (0.0213, 411.0), "0.021 … 411.0 us"),
+        (1500.0, "us", 300.0, (1079.0, 2084.0), "1.08 … 2.08 ms"),
+        (0.02, "frames", 0.05, (0.94, 0.1), "0.940 … 0.100 frames"),
+        (1e-12, "V", 1e-13, (8.5e-13, 1.2e-12), "8.5e-13 … 1.2e-12 V"),
+        (5.0, "mV", float("nan"), None, "–"),
+    ],
+)
+def test_an_interval_has_the_digits_of_its_quantity_and_two_at_least(value, unit, sd, ends, said) -> None:
+    assert interval(Estimate(value, sd, ends), unit) == said

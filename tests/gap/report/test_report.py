@@ -119,7 +119,7 @@ def test_a_page_fetches_nothing_runs_nothing_and_is_small(verdict: str) -> None:
 def test_the_page_says_what_the_diagnosis_says() -> None:
     d = made_up.named()
     text = Page(written("named")).text
-    for said in ("6.12 ± 0.12 %", "1.224 ± 0.024 ms", "5.92 … 6.32 %", "97 % of the gap is removed", "bars-fast",
+    for said in ("6.12 ± 0.12 %", "1.224 ± 0.024 ms", "5.93 … 6.32 %", "97 % of the gap is removed", "bars-fast",
                  command_of(d), "Seed 7", "incomplete reset", "leaves 11 sd in the step response"):  # fmt: skip
         assert said in text
     assert " ".join(d.patched.toml().split()) in text

@@ -196,8 +196,8 @@ def test_is_documented(name: str) -> None:
     assert {"Stage", "Seen in", "Source"} <= set(sheet.sections) <= set(SECTIONS)
     assert sheet.sections["Stage"].rstrip(".").replace("-", "").upper() == effect.stage.name
     assert all(f.metadata["doc"] and f.metadata["unit"] is not None for f in fields(effect))
-    assert effect.within is not None, f"{name} does not declare how it acts within a frame (`within`)"
-    assert sheet.sections.get("Within a frame", "").startswith(effect.within.value)
+    assert effect.acts is not None, f"{name} does not declare how it acts within a frame (`acts`)"
+    assert sheet.sections.get("Within a frame", "").startswith(effect.acts.value)
     if "Twins" in sheet.sections:
         assert sheet.twins and name not in sheet.twins
 

@@ -14,7 +14,7 @@ from laws import check, check_mean
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import Charge, Exposure
 from spikecam_env.sensor.effects.random_telegraph_noise import TICKS, share_in_upper
-from spikecam_env.sensor.within_frame import decay_moment
+from spikecam_env.sensor.frame_moments import decay_moment
 
 FRAMES, FINE = 24, 1000
 RATE_HZ = 40_000.0

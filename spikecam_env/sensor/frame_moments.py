@@ -2,9 +2,9 @@
 
 An effect that multiplies charge by w(t) needs, of t in frames from the middle of the frame,
 
-    mean = integral of w        tilt = 12 integral of t w        bend = 12 integral of t^2 w        over [-1/2, 1/2]
+    mean = integral of w        tilt = 12 integral of t w        square = 12 integral of t^2 w        over [-1/2, 1/2]
 
-for light x + d t then collects x mean + d tilt / 12 and rises by x tilt + d bend (`Charge.modulated`).
+for light x + d t then collects x mean + d tilt / 12 and rises by x tilt + d square (`Charge.modulated`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Moments(NamedTuple):
 
     mean: Array
     tilt: Array
-    bend: Array
+    square: Array
 
 
 def wave_moments(amplitude: float, cycles_per_frame: float, cycles_at_middle: Array) -> Moments:
