@@ -48,7 +48,8 @@ class Agent:
     def load(cls, source: str | os.PathLike[str]) -> Agent:
         """The shipped agent of a task's id, or the one in a file.
 
-        Raises InputError for a task without a shipped agent, and for a file that is missing, damaged or of another kind.
+        Raises InputError for a task without a shipped agent, and for a file that is missing, damaged or
+        of another kind.
         """
         path = _path(source)
         data = read_plain(path)
@@ -66,8 +67,8 @@ class Agent:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file; it appears whole.  Weights lose what float16 does not hold, one part in a thousand."""
         weights = {name: tensor.detach().half().contiguous() for name, tensor in self.policy.state_dict().items()}
-        told = {"task": self.task, "obs": self.obs, "recipe": self.policy.recipe.model_dump(), "weights": weights}
-        write_whole(path, {"format": FORMAT, **told, "training": self.training})
+        what = {"task": self.task, "obs": self.obs, "recipe": self.policy.recipe.model_dump(), "weights": weights}
+        write_whole(path, {"format": FORMAT, **what, "training": self.training})
 
     def make(self, **options: Any) -> gymnasium.Env[Any, Any]:
         """An environment of its task, as it sees it; options: of the environment, e.g. split="test"."""
@@ -97,7 +98,9 @@ class Agent:
         recipe = self.policy.recipe
         expected = (recipe.channels, *recipe.shape)
         if not isinstance(observation, dict) or set(observation) != {"picture", "gaze", "age"}:
-            raise InputError("an agent acts on observations with picture, gaze and age; make the task with obs_state=True")
+            raise InputError(
+                "an agent acts on observations with picture, gaze and age; make the task with obs_state=True"
+            )
         shape = np.shape(observation["picture"])
         if shape[-3:] != expected or len(shape) not in (3, 4):
             raise InputError(f"a picture has shape {shape}; this agent sees {expected}, of obs={self.obs!r}")

@@ -6,7 +6,8 @@
     known     = mlp(places, levels, state)                            the action's mean, the value and where the target
                                                                       is are linear in it
 
-A softmax over places gives positions finer than the maps' pixels with few weights.  Source: Levine et al., JMLR 17 (2016).
+A softmax over places gives positions finer than the maps' pixels with few weights.  Source: Levine et al., JMLR 17
+(2016).
 """
 
 from __future__ import annotations
@@ -50,6 +51,11 @@ class Recipe(Declared):
 
 class Policy(nn.Module):
     """pictures (N, L C, H, W) uint8 and state (N, S) float32 -> mean of the action (N, A), value (N,)."""
+
+    middle: Tensor
+    variance: Tensor
+    spread: Tensor
+    count: Tensor
 
     def __init__(self, recipe: Recipe) -> None:
         super().__init__()

@@ -1,11 +1,12 @@
-"""Proximal policy optimisation, in one file: from a task's id to a policy and its learning curve.
+"""Proximal policy optimisation, in one file: a policy learns from what many environments give.
 
     r      = p(action) / p_old(action)
-    loss   = -E[min(r A, clip(r, 1 - c, 1 + c) A)] + (value - target)^2 / 2 - entropy
-    A      = sum (gamma lambda)^k (reward + gamma V' - V)             (GAE)
+    A      = sum_k (gamma lambda)^k (reward + gamma V' - V)                                     (GAE)
+    loss   = -E[min(r A, clip(r, 1 - c, 1 + c) A)] + (V - A - V_old)^2 / 2 + w (place - target)^2
 
-An episode that ends by its time is worth V beyond its end; a decided one is worth nothing.  Everything is drawn anew
-from (seed, leg) at the beginning of a leg, so that a run that was resumed is the run that was not stopped.
+The last term asks the policy where the target is, which is known in training alone (`info["target"]`); w = 0 is plain
+PPO.  An episode that ends by its time is worth V beyond its end; a decided one nothing.  Everything is drawn anew from
+(seed, leg) at the beginning of a leg: a run that was resumed is the run that was not stopped.
 Sources: Schulman et al., arXiv 1707.06347 and 1506.02438; the form of Huang et al., JMLR 23 (2022), "CleanRL".
 """
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -26,6 +28,9 @@ from denoiser.run import Run
 from spikecam_env.agents.history import History
 from spikecam_env.agents.policy import Policy
 
+Cameras = VectorEnv[Any, Any, Any]
+Ended = tuple[float, ...]
+"""(return, performance, success) of an episode."""
 UPDATES_A_LEG = 16
 """Between two checkpoints; at each the environments begin new episodes."""
 LEAST_RATE = 0.02
@@ -34,45 +39,46 @@ LEAST_RATE = 0.02
 
 @dataclass(frozen=True)
 class PPO:
-    """Numbers of the learner; steps: of all environments together, rollout: of each between two updates."""
+    """steps: of all environments together; rollout: of each between updates; place: w."""
 
-    steps: int = 300_000
+    steps: int = 98_304
     rollout: int = 64
-    epochs: int = 3
+    epochs: int = 4
     minibatch: int = 256
     lr: float = 1e-3
     gamma: float = 0.98
     decay: float = 0.95
     clip: float = 0.2
-    entropy: float = 0.0
     place: float = 1.0
     most_gradient: float = 0.5
 
 
-def train(envs: VectorEnv, run: Run, ppo: PPO, seed: int, save: Callable[[], None]) -> None:
+def train(envs: Cameras, run: Run, ppo: PPO, seed: int, save: Callable[[], None]) -> None:
     """Go on learning until `ppo.steps`.  run: of a `Policy`; `save` is called after every leg."""
-    policy, a_leg = run.network, UPDATES_A_LEG * ppo.rollout * envs.num_envs
+    policy, a_rollout = run.network, ppo.rollout * envs.num_envs
     assert isinstance(policy, Policy)
-    for leg in tqdm(range(run.step // a_leg, -(-ppo.steps // a_leg)), desc="learning", unit="leg", disable=None):
-        began, source = time.process_time(), np.random.SeedSequence([seed, leg])
-        first, *seeds = (int(word) for word in source.generate_state(envs.num_envs + 1) >> 1)
-        torch.manual_seed(first)
-        player, ended = _Player(envs, policy, ppo, seeds), []
-        for update in range(UPDATES_A_LEG):
-            run.set_rate(ppo.lr * max(1 - (leg + update / UPDATES_A_LEG) * a_leg / ppo.steps, LEAST_RATE))
+    updates = -(-ppo.steps // a_rollout)
+    for first in tqdm(range(run.step // a_rollout, updates, UPDATES_A_LEG), desc="learning", unit="leg", disable=None):
+        began, last = time.process_time(), min(first + UPDATES_A_LEG, updates)
+        drawn, *seeds = np.random.SeedSequence([seed, first]).generate_state(envs.num_envs + 1).tolist()
+        torch.manual_seed(drawn)
+        player, ended = _Player(envs, policy, ppo, seeds), list[Ended]()
+        for update in range(first, last):
+            run.set_rate(ppo.lr * max(1 - update / updates, LEAST_RATE))
             batch, episodes = player.roll()
             ended += episodes
             _learn(policy, run.optimiser, batch, ppo)
-        run.step, run.seconds = (leg + 1) * a_leg, run.seconds + time.process_time() - began
-        means = dict(zip(("return", "performance", "success"), np.mean(ended or [[0.0] * 3], axis=0).tolist()))
-        run.curve.append({"steps": run.step, "cpu_s": run.seconds, "episodes": len(ended), **means})
+        run.step, run.seconds = last * a_rollout, run.seconds + time.process_time() - began
+        returns, performance, success = np.mean(ended or [(0.0, 0.0, 0.0)], axis=0).tolist()
+        row = {"return": returns, "performance": performance, "success": success, "episodes": len(ended)}
+        run.curve.append({"steps": run.step, "cpu_s": run.seconds, **row})
         save()
 
 
 class _Player:
     """Plays the policy on and on from where it stands."""
 
-    def __init__(self, envs: VectorEnv, policy: Policy, ppo: PPO, seeds: list[int]) -> None:
+    def __init__(self, envs: Cameras, policy: Policy, ppo: PPO, seeds: Any) -> None:
         self.envs, self.policy, self.ppo = envs, policy, ppo
         self.history, self.totals = History(policy.recipe.lags, policy.recipe.pool), np.zeros(envs.num_envs)
         observation, self.info = envs.reset(seed=seeds)
@@ -80,32 +86,37 @@ class _Player:
         self.seen = self.history.push(observation, self.over)
 
     @torch.no_grad()
-    def roll(self) -> tuple[dict[str, Tensor], list[tuple[float, float, float]]]:
-        """A rollout's samples, and (return, performance, success) of the episodes that ended in it."""
-        rows, ended = [], []
+    def roll(self) -> tuple[dict[str, Tensor], list[Ended]]:
+        """A rollout's samples by name, and the episodes that ended in it."""
+        rows, ended, sigma = [], [], self.policy.log_sigma.exp()
         for _ in range(self.ppo.rollout):
             pictures, state = map(torch.from_numpy, self.seen)
             self.policy.watch(state)
             mean, value, _ = self.policy(pictures, state)
-            target = self.policy.scaled(torch.from_numpy(np.stack(self.info["target"]).astype(np.float32)))
-            law = Normal(mean, self.policy.log_sigma.exp())
+            place = self.policy.scaled(torch.from_numpy(np.stack(self.info["target"]).astype(np.float32)))
+            law = Normal(mean, sigma)
             action = law.sample()
             observation, reward, terminated, truncated, self.info = self.envs.step(action.clamp(-1, 1).numpy())
-            played, self.over = ~self.over, terminated | truncated
+            played, self.over = ~self.over, terminated | truncated  # an episode's last picture is no step of it
             self.seen = self.history.push(observation, ~played)
             self.totals = np.where(played, self.totals + reward, 0.0)
-            ended += [(self.totals[n], self.info["performance"][n], self.info["is_success"][n]) for n in np.flatnonzero(self.over)]
+            figures = np.stack([self.totals, self.info["performance"], self.info["is_success"]], axis=1)
+            ended += [tuple(row) for row in figures[self.over].tolist()]
             flags = (torch.from_numpy(np.array(x, np.float32)) for x in (reward, terminated, self.over, played))
-            rows.append((pictures, state, target, action, law.log_prob(action).sum(1), value, *flags))
+            rows.append((pictures, state, place, action, law.log_prob(action).sum(1), value, *flags))
         *samples, value, reward, terminated, over, played = (torch.stack(column) for column in zip(*rows, strict=True))
         after = torch.cat([value[1:], self.policy(*map(torch.from_numpy, self.seen))[1][None]])
-        surprise = reward + self.ppo.gamma * after * (1 - terminated) - value
-        gain = [torch.zeros(self.envs.num_envs)]
-        for n in reversed(range(len(rows))):
-            gain.append(surprise[n] + self.ppo.gamma * self.ppo.decay * (1 - over[n]) * gain[-1])
-        gain = torch.stack(gain[:0:-1])
+        gain = _gain(reward + self.ppo.gamma * after * (1 - terminated) - value, over, self.ppo)
         names = ("pictures", "state", "place", "action", "log_p", "gain", "worth")
         return {k: x[played > 0] for k, x in zip(names, (*samples, gain, gain + value), strict=True)}, ended
+
+
+def _gain(surprise: Tensor, over: Tensor, ppo: PPO) -> Tensor:
+    """(steps, N): A of the head of this file."""
+    gain, later = torch.zeros_like(surprise), torch.zeros_like(surprise[0])
+    for n in reversed(range(len(surprise))):
+        gain[n] = later = surprise[n] + ppo.gamma * ppo.decay * (1 - over[n]) * later
+    return gain
 
 
 def _learn(policy: Policy, optimiser: torch.optim.Optimizer, batch: dict[str, Tensor], ppo: PPO) -> None:
@@ -113,13 +124,11 @@ def _learn(policy: Policy, optimiser: torch.optim.Optimizer, batch: dict[str, Te
         for some in torch.randperm(len(batch["gain"])).split(ppo.minibatch):
             part = {name: column[some] for name, column in batch.items()}
             mean, value, place = policy(part["pictures"], part["state"])
-            law = Normal(mean, policy.log_sigma.exp())
-            ratio = (law.log_prob(part["action"]).sum(1) - part["log_p"]).exp()
+            ratio = (Normal(mean, policy.log_sigma.exp()).log_prob(part["action"]).sum(1) - part["log_p"]).exp()
             gain = (part["gain"] - part["gain"].mean()) / (part["gain"].std() + 1e-8)
             surrogate = torch.min(ratio * gain, ratio.clamp(1 - ppo.clip, 1 + ppo.clip) * gain).mean()
-            loss = -surrogate + 0.5 * (value - part["worth"]).square().mean() - ppo.entropy * law.entropy().sum(1).mean()
-            loss = loss + ppo.place * (place - part["place"]).square().mean()
+            wrong = 0.5 * (value - part["worth"]).square().mean() + ppo.place * (place - part["place"]).square().mean()
             optimiser.zero_grad()
-            loss.backward()
+            (wrong - surrogate).backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), ppo.most_gradient)
             optimiser.step()

@@ -1,7 +1,7 @@
 """A classical tracker: it finds the target in a picture of rates, and turns the camera by the motor's law.
 
     Track, LowLight, Exposure    the centroid of what is brighter than its surroundings
-    Saccade                      the largest 8th angular harmonic, |sum_r,phi p(r, phi) e^(8 i phi)|: spokes, at any angle
+    Saccade                      the largest 8th angular harmonic, |sum p(r, phi) e^(8 i phi)|: spokes, at any angle
     Catch                        a line through the ball's places, met where it crosses the bright row
 
     place of the target seen from a camera at rest:  x = seen - middle + gaze
@@ -54,7 +54,7 @@ class Tracker:
             raise unknown_name("task of a tracker", task, FINDERS)
         self._find = FINDERS[task](min(env.shape))
         self._aim = _crossing if task == "Catch" else _place
-        self._axes, self._numbers = env.axes, env.action_space.shape[0]
+        self._axes, self._actions = env.axes, env.action_space.shape
         self._middle = np.array([(size - 1) / 2 for size in env.shape[::-1]])
         self._top = env.motor.top_px_s * env.step_s
         self._change = env.motor.most_change_px_s(env.step_s) * env.step_s
@@ -72,7 +72,7 @@ class Tracker:
         seen = self._find(observation["picture"][0].astype(np.float32) / 255)
         if seen is not None:
             self._remember(seen + gaze)
-        action = np.zeros(self._numbers, np.float32)
+        action = np.zeros(self._actions or (), np.float32)
         if self._places:
             aim, motion = self._aim(self._places, self._motion, self._rows)
             move = motion + approach(aim - gaze - self._middle, self._change)

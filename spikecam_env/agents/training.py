@@ -1,8 +1,8 @@
 """From a task's name to a trained agent: what `spikecam train-agent` does.
 
-    OUT/last.pt     to go on from (`denoiser.run`)
-    OUT/agent.pt    the agent so far (`agents.agent`)
-    OUT/curve.json  rows: steps, processor seconds, episodes, their mean return, performance and success
+OUT/last.pt     to go on from (`denoiser.run`)
+OUT/agent.pt    the agent so far (`agents.agent`)
+OUT/curve.json  rows: steps, processor seconds, episodes, their mean return, performance and success
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 
 import gymnasium
 import torch
+from gymnasium.spaces import Box, Dict
 from gymnasium.vector import VectorEnv
 
 from denoiser.run import Run
@@ -71,45 +72,54 @@ LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4)}
 """Steps ago of the pictures that a task is learned from; others from (0, 4)."""
 POOL = {"Saccade": 1, "ReadSpin": 1}
 """Pixels squared that are averaged; others 2.  Spokes are finer than two pixels."""
-GAMMA = {"Catch": 0.98}
+STEPS = {"Track": 81_920, "Catch": 98_304, "Saccade": 98_304}
+"""Of training, of a task's shipped agent; others 98 304."""
 
 
 def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
     """The network for a task."""
-    name, picture = study.task.split("-")[0], envs.single_observation_space["picture"]
+    name, spaces, action = study.task.split("-")[0], envs.single_observation_space, envs.single_action_space
+    assert isinstance(spaces, Dict) and isinstance(action, Box)
+    picture = spaces["picture"]
+    assert isinstance(picture, Box)
     return Recipe(
         channels=picture.shape[0],
         shape=picture.shape[1:],
         high=int(picture.high.max()),
         lags=LAGS.get(name, (0, 4)),
-        actions=envs.single_action_space.shape[0],
+        actions=action.shape[0],
         pool=POOL.get(name, 2),
     )
 
 
-def train_agent(study: Study, out: Path, ppo: PPO = PPO(), seed: int = 0, environments: int = 16) -> Agent:
-    """Train, or go on from `out/last.pt`; out: a folder that is there."""
-    envs = study.make_vec(environments)
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # of networks as small as this one, and the same sums on every machine
+def budget(study: Study, steps: int | None = None) -> PPO:
+    """The learner's numbers for a task, with its steps or so many."""
+    return PPO(steps=steps or STEPS.get(study.task.split("-")[0], 98_304))
+
+
+def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16) -> Agent:
+    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `budget(study)`."""
+    ppo = ppo or budget(study)
+    envs, threads = study.make_vec(environments), torch.get_num_threads()
+    torch.set_num_threads(1)  # as many as pay for so small a network
     try:
         torch.manual_seed(seed)
-        run = Run.begin(recipe_of(study, envs).network())
+        policy = recipe_of(study, envs).network()
+        run = Run.begin(policy)
         if (out / "last.pt").exists():
             run.load(out / "last.pt")
+        record = {"sight": study.sight, "seed": seed, "environments": environments, "ppo": asdict(ppo)}
 
-        def agent() -> Agent:
-            made = {"task": study.task, "sight": study.sight, "seed": seed, "environments": environments, "ppo": asdict(ppo)}
-            return Agent(study.task, str(SIGHTS[study.sight]["obs"]), run.network, made | {"curve": run.curve})
+        def trained() -> Agent:
+            return Agent(study.task, str(SIGHTS[study.sight]["obs"]), policy, record | {"curve": run.curve})
 
         def save() -> None:
             run.save(out / "last.pt")
-            agent().save(out / "agent.pt")
+            trained().save(out / "agent.pt")
             write_text_whole(out / "curve.json", json.dumps(run.curve, indent=1) + "\n")
-            run.network.train()
 
         train(envs, run, ppo, seed, save)
-        return agent()
+        return trained()
     finally:
         torch.set_num_threads(threads)
         envs.close()
