@@ -1,13 +1,13 @@
 """Proximal policy optimisation, in one file: a policy learns from what many environments give.
 
     r      = p(action) / p_old(action)
-    A      = sum_k (gamma lambda)^k (reward + gamma V' - V)                                     (GAE)
+    A      = sum_k (gamma decay)^k (reward + gamma V' - V)
     loss   = -E[min(r A, clip(r, 1 - c, 1 + c) A)] + (V - A - V_old)^2 / 2 + w (place - target)^2
 
 The last term asks the policy where the target is, which is known in training alone (`info["target"]`); w = 0 is plain
 PPO.  An episode that ends by its time is worth V beyond its end; a decided one nothing.  Everything is drawn anew from
-(seed, leg) at the beginning of a leg: a run that was resumed is the run that was not stopped.
-Sources: Schulman et al., arXiv 1707.06347 and 1506.02438; the form of Huang et al., JMLR 23 (2022), "CleanRL".
+(seed, update) when a leg begins: a run that was resumed is the run that was not stopped.  Sources: Schulman et al.,
+arXiv 1707.06347 and 1506.02438; the form of Huang et al., JMLR 23 (2022), "CleanRL".
 """
 
 from __future__ import annotations
@@ -29,20 +29,16 @@ from spikecam_env.agents.history import History
 from spikecam_env.agents.policy import Policy
 
 Cameras = VectorEnv[Any, Any, Any]
-Ended = tuple[float, ...]
-"""(return, performance, success) of an episode."""
-UPDATES_A_LEG = 16
-"""Between two checkpoints; at each the environments begin new episodes."""
-LEAST_RATE = 0.02
-"""Of learning, at the end of its fall."""
+Ended = tuple[float, ...]  # (return, performance, success) of an episode
 
 
 @dataclass(frozen=True)
 class PPO:
-    """steps: of all environments together; rollout: of each between updates; place: w."""
+    """steps: of all environments together; rollout: of each between updates; leg: updates; place: w."""
 
     steps: int = 98_304
     rollout: int = 64
+    leg: int = 16
     epochs: int = 4
     minibatch: int = 256
     lr: float = 1e-3
@@ -58,20 +54,20 @@ def train(envs: Cameras, run: Run, ppo: PPO, seed: int, save: Callable[[], None]
     policy, a_rollout = run.network, ppo.rollout * envs.num_envs
     assert isinstance(policy, Policy)
     updates = -(-ppo.steps // a_rollout)
-    for first in tqdm(range(run.step // a_rollout, updates, UPDATES_A_LEG), desc="learning", unit="leg", disable=None):
-        began, last = time.process_time(), min(first + UPDATES_A_LEG, updates)
+    for first in tqdm(range(run.step // a_rollout, updates, ppo.leg), desc="learning", unit="leg", disable=None):
+        began, last = time.process_time(), min(first + ppo.leg, updates)
         drawn, *seeds = np.random.SeedSequence([seed, first]).generate_state(envs.num_envs + 1).tolist()
         torch.manual_seed(drawn)
         player, ended = _Player(envs, policy, ppo, seeds), list[Ended]()
         for update in range(first, last):
-            run.set_rate(ppo.lr * max(1 - update / updates, LEAST_RATE))
+            run.set_rate(ppo.lr * (1 - update / updates))
             batch, episodes = player.roll()
             ended += episodes
             _learn(policy, run.optimiser, batch, ppo)
         run.step, run.seconds = last * a_rollout, run.seconds + time.process_time() - began
-        returns, performance, success = np.mean(ended or [(0.0, 0.0, 0.0)], axis=0).tolist()
-        row = {"return": returns, "performance": performance, "success": success, "episodes": len(ended)}
-        run.curve.append({"steps": run.step, "cpu_s": run.seconds, **row})
+        means = np.mean(ended or [(0.0, 0.0, 0.0)], axis=0).tolist()
+        row = dict(zip(("return", "performance", "success"), means, strict=True))
+        run.curve.append({"steps": run.step, "cpu_s": run.seconds, "episodes": len(ended), **row})
         save()
 
 
