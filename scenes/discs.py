@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.keys import interval_for, painted
-from scenes.painted_disk import Texels, paint_disk, paint_tile
+from scenes.keys import interval_for, key_frames
+from scenes.painted_disk import Texels
+from scenes.planes import Laid, Plane, PlanarScene, painted_planes
 from scenes.protocol import Gaze, Truth
-from spikecam_env.sensor import Keyframes
 
 MOTION_PER_KEY = 0.6
 """Most that anything moves between two keys [pixels], as of `scenes.disk`: 1.2 % rms of a frame's light."""
@@ -46,10 +47,9 @@ class Path:
         ends = np.array([start, np.asarray(start) + frames * np.asarray(velocity)], np.float64)
         return cls(np.array([0.0, frames]), ends)
 
-    def at(self, frame: float) -> tuple[float, float]:
-        """(x, y) at a frame [pixels]."""
-        x, y = (float(np.interp(frame, self.frame, self.place[:, axis])) for axis in (0, 1))
-        return x, y
+    def at(self, frame: Any) -> tuple[Any, Any]:
+        """(x, y) at a frame, or at each of several [pixels]."""
+        return np.interp(frame, self.frame, self.place[:, 0]), np.interp(frame, self.frame, self.place[:, 1])
 
     def velocity(self, frame: float) -> tuple[float, float]:
         """(x, y) [pixels/frame] of the piece that a frame lies in."""
@@ -84,7 +84,7 @@ class Disc:
 
 
 @dataclass(frozen=True, eq=False)
-class Discs:
+class Discs(PlanarScene):
     """Scene: see the head of this file.
 
     shape          (rows, columns)
@@ -100,16 +100,15 @@ class Discs:
     tile: NDArray[np.float32]
     discs: dict[str, Disc]
 
-    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
-        """Keys that cover frames [start, stop], see `scenes.keys.painted`."""
+    def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
+        """See `PlanarScene`."""
         interval = interval_for(self._own_speed + (float(np.hypot(*gaze.rate)) if gaze else 0.0), MOTION_PER_KEY)
-        return painted(self.shape, start, stop, interval, gaze, lambda t, picture: self._paint(t, gaze, picture))
+        return self._at(key_frames(self.shape, start, stop, interval, gaze).astype(np.float64), gaze or _AT_REST)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame; see `scenes.protocol.Truth`."""
         gaze = gaze or _AT_REST
-        radiance = np.empty(self.shape, np.float32)
-        self._paint(frame, gaze, radiance)
+        radiance = painted_planes([self._at(np.array([frame], np.float64), gaze)])[0].radiance[0]
         flow, owner = np.zeros((*self.shape, 2), np.float32), np.zeros(self.shape, np.int32)
         rows, columns = np.indices(self.shape)
         poses: dict[str, tuple[float, ...]] = {"camera": gaze.at(frame)}
@@ -140,23 +139,14 @@ class Discs:
 
     def _centre(self, disc: Disc, frame: float, gaze: Gaze) -> tuple[float, float]:
         (x, y), (pan, tilt) = disc.path.at(frame), gaze.at(frame)
-        return x - pan, y - tilt
+        return float(x - pan), float(y - tilt)
 
-    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
-        """The radiance at a frame, into `picture` (H, W)."""
-        gaze = gaze or _AT_REST
-        seen = [(disc, self._centre(disc, frame, gaze)) for disc in self.discs.values()]
-        seen = [(disc, (x, y)) for disc, (x, y) in seen if self._in_view(x, y, disc.radius)]
-        front, behind = picture, np.empty_like(picture)
-        if len(seen) % 2:
-            front, behind = behind, front
-        paint_tile(self.tile, *gaze.at(frame), front)
-        for disc, centre in seen:
-            front, behind = behind, front
+    def _at(self, frame: NDArray[np.float64], gaze: Gaze) -> Plane:
+        """What is seen at these frames (K,)."""
+        pan, tilt = gaze.at(frame)
+        laid = []
+        for disc in self.discs.values():
+            x, y = disc.path.at(frame)
             angle = disc.angle + disc.turn(self.frame_rate_hz) * frame
-            paint_disk(disc.texels, centre, disc.radius, angle, behind, front)
-
-    def _in_view(self, x: float, y: float, radius: float) -> bool:
-        rows, columns = self.shape
-        reach = radius + 1
-        return -reach < x < columns - 1 + reach and -reach < y < rows - 1 + reach
+            laid.append(Laid(disc.texels, disc.radius, x - pan, y - tilt, angle))
+        return Plane(self.shape, frame, self.tile, pan, tilt, laid)

@@ -15,14 +15,16 @@ at most `motion_per_key` pixels between two, down to one a frame, and are painte
 from __future__ import annotations
 
 import copy
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
 
-from scenes.keys import interval_for, painted
-from scenes.painted_disk import Texels, paint_disk, paint_tile, prefiltered
+from scenes.keys import interval_for, key_frames
+from scenes.painted_disk import Texels, paint_tile, prefiltered
+from scenes.planes import Laid, Plane, PlanarScene, painted_planes
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
 from spikecam_env.checked import (
@@ -33,7 +35,6 @@ from spikecam_env.checked import (
     checked_shape,
 )
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import Keyframes
 
 MOST_RADIUS = 6000.0
 """[pixels] Texels are counted in 32 bits, TEXELS_PER_PIXEL^2 of them to a pixel of the disk's square."""
@@ -49,7 +50,7 @@ _RANGES = {
 }
 
 
-class RotatingDisk:
+class RotatingDisk(PlanarScene):
     """A disk that spins and drifts over a background.
 
     shape           (rows, columns) of the sensor
@@ -110,14 +111,10 @@ class RotatingDisk:
             f"centre={self.centre}, drift_px_s={self.drift_px_s}, angle={self.angle:g})"
         )
 
-    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
-        """Keys that cover frames [start, stop]: (K,) float64 whole frames, (K, H, W) float32.
-
-        Without gaze keys are multiples of a fixed interval.  With gaze there are keys at `start` and `stop`
-        too, where the camera's path may bend.  Errors: InputError unless start < stop.
-        """
+    def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
+        """See `PlanarScene`."""
         interval = interval_for(self._speed(gaze), self.motion_per_key)
-        return painted(self.shape, start, stop, interval, gaze, lambda t, picture: self._paint(t, gaze, picture))
+        return self._at(key_frames(self.shape, start, stop, interval, gaze).astype(np.float64), gaze or _AT_REST)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame; see `scenes.protocol.Truth`."""
@@ -126,8 +123,7 @@ class RotatingDisk:
         dx, dy = np.arange(self.shape[1]) - x, (np.arange(self.shape[0]) - y)[:, None]
         inside = dx**2 + dy**2 <= self.radius**2
         drift = np.asarray(self.drift_px_s) / self.frame_rate_hz
-        radiance = np.empty(self.shape, np.float32)
-        self._paint(frame, gaze, radiance)
+        radiance = painted_planes([self._at(np.array([frame], np.float64), gaze)])[0].radiance[0]
         flow = np.empty((*self.shape, 2), np.float32)
         flow[..., 0] = np.where(inside, self._turn * dy + drift[0], 0.0) - gaze.rate[0]
         flow[..., 1] = np.where(inside, -self._turn * dx + drift[1], 0.0) - gaze.rate[1]
@@ -159,12 +155,12 @@ class RotatingDisk:
         other._tile, other._background = self._tile * by, self._background * by
         return other
 
-    def angle_at(self, frame: float) -> float:
-        """Of the disk, in [0, 2 pi) [radians]."""
+    def angle_at(self, frame: Any) -> Any:
+        """Of the disk at a frame, or at each of several, in [0, 2 pi) [radians]."""
         return (self.angle + self._turn * frame) % (2 * np.pi)
 
-    def centre_at(self, frame: float, gaze: Gaze | None = None) -> tuple[float, float]:
-        """(x, y) of the disk's centre in the picture [pixels]."""
+    def centre_at(self, frame: Any, gaze: Gaze | None = None) -> tuple[Any, Any]:
+        """(x, y) of the disk's centre in the picture at a frame, or at each of several [pixels]."""
         seconds = frame / self.frame_rate_hz
         pan, tilt = (gaze or _AT_REST).at(frame)
         return (
@@ -186,16 +182,11 @@ class RotatingDisk:
         moving = self.rim_speed + float(np.hypot(*self.drift_px_s)) / self.frame_rate_hz
         return moving + (float(np.hypot(*gaze.rate)) if gaze else 0.0)
 
-    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
-        """The radiance at a frame, into `picture` (H, W)."""
-        pan, tilt = (gaze or _AT_REST).at(frame)
-        if (pan, tilt) == (0.0, 0.0):
-            behind = self._background
-        else:
-            behind = np.empty_like(picture)
-            paint_tile(self._tile, pan, tilt, behind)
+    def _at(self, frame: NDArray[np.float64], gaze: Gaze) -> Plane:
+        """What is seen at these frames (K,)."""
         x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
-        paint_disk(self._disk, (x, y), self.radius, self.angle_at(frame), behind, picture)
+        disk = Laid(self._disk, self.radius, x, y, self.angle_at(frame))
+        return Plane(self.shape, frame, self._tile, *gaze.at(frame), [disk], self._background)
 
 
 def _checked(name: str, value: float) -> float:

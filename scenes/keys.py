@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import count, takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory, checked_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
-from spikecam_env.threads import as_many, together
+from spikecam_env.threads import as_many, share_out
 
 LONGEST_INTERVAL = 64
 """Frames between two keys, at most."""
@@ -37,10 +36,15 @@ def painted(
     gaze: Gaze | None,
     paint: Callable[[float, NDArray[np.float32]], None],
 ) -> Keyframes:
-    """Keys that cover frames [start, stop], painted side by side by paint(frame, picture (H, W)).
+    """Keys that cover frames [start, stop] (`key_frames`), painted side by side by paint(frame, picture (H, W))."""
+    return paint_keys(shape, key_frames(shape, start, stop, interval, gaze), paint)
+
+
+def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaze: Gaze | None) -> NDArray[np.int64]:
+    """Frames (K,) of the keys that cover [start, stop].
 
     Without gaze they are multiples of the interval; with gaze there are keys at `start` and `stop` too, where the
-    camera's path may bend.  Errors: InputError unless start < stop.
+    camera's path may bend.  Errors: InputError unless start < stop, and where the pictures do not fit in memory.
     """
     checked_whole(start, "start")
     checked_whole(stop, "stop")
@@ -49,11 +53,9 @@ def painted(
     keys = (stop - start) // interval + 2
     checked_memory(4 * keys * shape[0] * shape[1], f"light of frames {start} to {stop}, {keys} keys,")
     if gaze is None:
-        frame = np.arange(start // interval, -(-stop // interval) + 1) * interval
-    else:
-        inner = np.arange(start // interval + 1, -(-stop // interval)) * interval
-        frame = np.concatenate([[start], inner, [stop]])
-    return paint_keys(shape, frame, paint)
+        return np.arange(start // interval, -(-stop // interval) + 1) * interval
+    inner = np.arange(start // interval + 1, -(-stop // interval)) * interval
+    return np.concatenate([[start], inner, [stop]])
 
 
 def paint_keys(
@@ -70,10 +72,9 @@ def side_by_side(paint: Callable[[int], None], keys: int, threads: int | None = 
 
     threads: default NUMBA_NUM_THREADS, fewer where there are few keys.
     """
-    waiting = count()
+    share_out(paint, keys, threads_for(keys, threads))
 
-    def work() -> None:
-        for key in takewhile(lambda key: key < keys, waiting):
-            paint(key)
 
-    together([work] * as_many(threads, keys // _WORTH_A_THREAD), shared=True)
+def threads_for(keys: int, threads: int | None = None) -> int:
+    """Threads that pay to paint so many keys; default NUMBA_NUM_THREADS at most."""
+    return as_many(threads, keys // _WORTH_A_THREAD)

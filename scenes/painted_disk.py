@@ -46,36 +46,39 @@ class Texels:
         return replace(self, low=self.low * np.float32(gain), step=self.step * np.float32(gain))
 
 
-def paint_disk(
-    texels: Texels,
-    centre: tuple[float, float],
-    radius: float,
-    angle: float,
-    behind: NDArray[np.float32],
-    picture: NDArray[np.float32],
-) -> None:
-    """A disk over what is behind it, into `picture`; both (H, W), two arrays.
+def places_of(
+    texels: Texels, radius: float, x: NDArray[np.float64], y: NDArray[np.float64], angle: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Where a disk lies at K instants, as it is painted: (K, 6) of x, y, u0, v0, cosine, sine (`_paint_disk`).
 
-    centre (x, y) and radius in pixels; angle in radians, counter-clockwise in the picture.
+    x, y (K,) and radius in pixels; angle (K,) in radians, counter-clockwise in the picture.
     """
-    x, y = centre
     scale = (texels.side - 2 * _MARGIN) / (2 * radius)
     cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
     middle = (texels.side - 1) / 2
     u, v = middle - cosine * x + sine * y, middle - sine * x - cosine * y
+    return np.stack([x, y, u, v, cosine, sine], axis=1)
+
+
+@njit(inline="always")
+def paint_disk_into(behind, pairs, side, numbers, place, picture):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """A disk over what is behind it, into `picture`; both (H, W), two arrays.
+
+    pairs, side, numbers (radius, low, step): see `Texels`; place (6,): see `places_of`.
+    """
     _paint_disk(
         behind,
-        texels.pairs,
-        np.int32(texels.side),
-        texels.low,
-        texels.step,
-        x,
-        y,
-        radius,
-        u,
-        v,
-        cosine,
-        sine,
+        pairs,
+        np.int32(side),
+        np.float32(numbers[1]),
+        np.float32(numbers[2]),
+        place[0],
+        place[1],
+        numbers[0],
+        place[2],
+        place[3],
+        place[4],
+        place[5],
         picture,
     )
 

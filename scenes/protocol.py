@@ -8,7 +8,7 @@ fire once a frame.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +60,8 @@ class Gaze:
         duration = self.frames[1] - self.frames[0]
         return (self.stop[0] - self.start[0]) / duration, (self.stop[1] - self.start[1]) / duration
 
-    def at(self, frame: float) -> tuple[float, float]:
-        """(pan, tilt) at a frame [pixels], on the straight line through start and stop."""
+    def at(self, frame: Any) -> tuple[Any, Any]:
+        """(pan, tilt) at a frame, or at each of several [pixels], on the straight line through start and stop."""
         share = (frame - self.frames[0]) / (self.frames[1] - self.frames[0])
         return (
             self.start[0] + share * (self.stop[0] - self.start[0]),

@@ -12,6 +12,8 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from itertools import count as counter
+from itertools import takewhile
 
 from numba import config
 
@@ -45,6 +47,20 @@ def together(parts: list[Callable[[], None]], *, shared: bool = False) -> None:
     for other in others:
         if not (shared and other.cancel()):
             other.result()
+
+
+def share_out(work: Callable[[int], None], count: int, threads: int | None = None) -> None:
+    """Call work(0) ... work(count - 1), in any order; each thread takes the next one when it is ready.
+
+    threads: default NUMBA_NUM_THREADS, at most `count`.
+    """
+    waiting = counter()
+
+    def one_after_another() -> None:
+        for number in takewhile(lambda number: number < count, waiting):
+            work(number)
+
+    together([one_after_another] * as_many(threads, count), shared=True)
 
 
 def _elsewhere(taken: int, work: Callable[[], None]) -> None:

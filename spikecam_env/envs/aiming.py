@@ -103,21 +103,26 @@ class AimingEnv(SpikeCameraEnv):
         """(2,) of the last step [pixels/s]."""
         return self._rate.copy()
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """A new episode, with the camera at rest; see the class for the options."""
         self._rate, self._standing = np.zeros(2), None
-        observation, info = super().reset(seed=seed, options=options)
+        super().begin(seed=seed, options=options)
         self._bare = self.scene
-        self._standing = self._stands(self._position, None)
+
+    def begun(self) -> tuple[NDArray[Any], dict[str, Any]]:
+        """See `SpikeCameraEnv.begun`."""
+        observation, info = super().begun()
+        self._standing = self._stands(None)
         return observation, info | self._of_standing()
 
-    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+    def turn(self, action: ArrayLike) -> None:
+        """The motor does what it can; the other numbers go to the episode."""
+        super().turn(self._command(action))
+
+    def outcome(self) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """See the class."""
-        command, before = self._command(action), self._position
-        observation, _, _, _, info = super().step(command)
-        reward, terminated, truncated = self._assess(before)
+        observation, _, _, _, info = super().outcome()
+        reward, terminated, truncated = self._assess()
         return observation, reward, terminated, truncated, info | self._of_standing()
 
     def close(self) -> None:
@@ -134,7 +139,7 @@ class AimingEnv(SpikeCameraEnv):
         given = np.asarray(action, np.float64)
         if given.shape != self.action_space.shape or not np.isfinite(given).all():
             raise InputError(f"action is {action!r}; it must be {_numbers(self.action_space.shape)} in [-1, 1]")
-        given = np.clip(given, -1.0, 1.0)
+        given = np.minimum(np.maximum(given, -1.0), 1.0)
         first, rest = self.sensor.frame, tuple(float(number) for number in given[self.axes :])
         self._episode = self.episode.acted(rest, first, first + self.frames_per_step)
         self._scene = self._episode.through(self._bare)
@@ -143,18 +148,17 @@ class AimingEnv(SpikeCameraEnv):
         self._rate = self.motor.after(self._rate, wanted, self.step_s)
         return self._rate / self.motor.top_px_s
 
-    def _assess(self, before: tuple[float, float]) -> tuple[float, bool, bool]:
-        """(reward, terminated, truncated) of a step that the gaze began at `before`."""
+    def _assess(self) -> tuple[float, bool, bool]:
+        """(reward, terminated, truncated) of a step."""
         last = self.standing
-        self._standing = now = self._stands(before, last)
+        self._standing = now = self._stands(last)
         end = self.episode.end(now)
         reward = REWARDS[self.reward](self.episode.worth(last), self.episode.worth(now))
         return reward + OUTCOME * (end is True), end is not None, end is None and now.step >= self.episode.steps
 
-    def _stands(self, before: tuple[float, float], last: Standing | None) -> Standing:
+    def _stands(self, last: Standing | None) -> Standing:
         stop = self.sensor.frame
-        gaze = Gaze(before, self._position, (stop - self.frames_per_step, stop))
-        place = self.episode.aim(stop, gaze)
+        place = self.episode.aim(stop, self._gaze)
         distance = distance_from_middle(place, self.shape)
         on = self.episode.is_on(stop, distance)
         if last is None:

@@ -33,5 +33,5 @@ class Motor:
     def after(self, rate: NDArray[np.float64], wanted: NDArray[np.float64], seconds: float) -> NDArray[np.float64]:
         """The rate of a step of this length, from the last one's and the one that is wanted, all (2,) [pixels/s]."""
         change = self.most_change_px_s(seconds)
-        wanted = np.clip(wanted, -self.top_px_s, self.top_px_s)
-        return rate + np.clip(wanted - rate, -change, change)
+        wanted = np.minimum(np.maximum(wanted, -self.top_px_s), self.top_px_s)
+        return rate + np.minimum(np.maximum(wanted - rate, -change), change)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any
+from typing import Any, TypeVar
 
 import gymnasium
 import numpy as np
@@ -12,12 +12,13 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import lit
+from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
 from spikecam_env.checked import checked_number
 from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
-from spikecam_env.sensor import SensorModel, SpikeSensor
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
 from spikecam_env.streams.packing import check_shape
 
 MakeScene = Callable[[np.random.Generator, dict[str, Any]], Scene]
@@ -25,6 +26,16 @@ MakeScene = Callable[[np.random.Generator, dict[str, Any]], Scene]
 
 Judge = Callable[[Any, float, Gaze], tuple[float, bool]]
 """(scene, frame, gaze) at the end of a step -> (reward, terminated)."""
+
+T = TypeVar("T")
+Each = Callable[[Callable[[int], Any], Sequence[int]], list[Any]]
+"""(work, numbers) -> what work of each number returns."""
+
+
+def in_turn(work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
+    """Work of each number, one after another."""
+    return [work(number) for number in numbers]
+
 
 RENDER_FRAMES = 40
 """Frames a rendered picture counts spikes over, at least."""
@@ -102,7 +113,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._drawn: Any = None  # the scene as it was drawn: in its own light, and with all that its task knows of it
         self._seen: Any = None
         self._blocks: Blocks | None = None
-        self._position = (0.0, 0.0)
+        self._gaze = Gaze.fixed(0.0, 0.0)  # the path of the block that is exposed last, or next
         self._recent: list[NDArray[np.uint8]] = []
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         picture = self.observation.space(self.view)
@@ -110,6 +121,21 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new episode; `options` but for `model` and `light` go to `make_scene`."""
+        self.begin(seed=seed, options=options)
+        expose([self])
+        return self.begun()
+
+    def step(self, action: ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Turn the camera at the action's rate for K frames.  Never truncates: that is `TimeLimit`'s."""
+        self.turn(action)
+        expose([self])
+        return self.outcome()
+
+    def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
+        """What `reset` does before the first block is exposed; a task that knows more overrides it, as the next three.
+
+        So a vector environment exposes the blocks of all its cameras in one call (`expose`).
+        """
         self._open()
         given = dict(options or {})
         model = self._checked_model(given.pop("model", self.model))
@@ -120,19 +146,27 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._scene = lit(self._drawn, light)
         self._load(model, int(self.np_random.integers(2**31)))
         self._seen = self.observation.start(self.view, 1)
-        self._position = (0.0, 0.0)
         self._recent = []
-        observation, info, _ = self._expose((0.0, 0.0))
-        return observation, info
+        self._gaze = Gaze((0.0, 0.0), (0.0, 0.0), (0, self.frames_per_step))
 
-    def step(self, action: ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Turn the camera at the action's rate for K frames.  Never truncates: that is `TimeLimit`'s."""
+    def begun(self) -> tuple[Any, dict[str, Any]]:
+        """What `reset` returns, once the first block is exposed."""
+        return self._shown()
+
+    def turn(self, action: ArrayLike) -> None:
+        """What `step` does before the block is exposed: the camera's path is set."""
         rate = np.asarray(action, np.float64)
         if rate.shape != (2,) or not np.isfinite(rate).all():
             raise InputError(f"action is {action!r}; it must be two finite numbers in [-1, 1], (pan, tilt)")
-        pan, tilt = np.clip(rate, -1.0, 1.0) * (self.max_gaze_rate_px_s / self.model.frame_rate_hz)
-        observation, info, gaze = self._expose((float(pan), float(tilt)))
-        reward, terminated = self._judge(self._drawn, self.sensor.frame, gaze)
+        rate = np.minimum(np.maximum(rate, -1.0), 1.0) * (self.max_gaze_rate_px_s / self.model.frame_rate_hz)
+        (pan, tilt), first, frames = self._position, self.sensor.frame, self.frames_per_step
+        stop = pan + float(rate[0]) * frames, tilt + float(rate[1]) * frames
+        self._gaze = Gaze((pan, tilt), stop, (first, first + frames))
+
+    def outcome(self) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """What `step` returns, once the block is exposed."""
+        observation, info = self._shown()
+        reward, terminated = self._judge(self._drawn, self.sensor.frame, self._gaze)
         return observation, float(reward), bool(terminated), False, info
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
@@ -199,27 +233,40 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             return NotReadyError("the environment is closed; make a new one")
         return NotReadyError("the environment has no scene yet; call reset first")
 
-    def _expose(self, rate: tuple[float, float]) -> tuple[Any, dict[str, Any], Gaze]:
-        """The next K frames while the gaze moves at `rate` [pixels/frame]: (observation, info, the gaze's path)."""
-        scene = self.scene
-        first, stop = self.sensor.frame, self.sensor.frame + self.frames_per_step
-        pan, tilt = self._position
-        self._position = pan + rate[0] * self.frames_per_step, tilt + rate[1] * self.frames_per_step
-        gaze = Gaze((pan, tilt), self._position, (first, stop))
-        light = scene.radiance(first, stop, gaze)
-        spikes = self.sensor.step(light, frames=self.frames_per_step)
+    @property
+    def _position(self) -> tuple[float, float]:
+        """Where the camera looks, (pan, tilt) [pixels]."""
+        return self._gaze.stop
+
+    @property
+    def renders(self) -> bool:
+        """Whether the scene is more than a plane: its light and truth belong to the thread that it was made on."""
+        return not isinstance(self.scene, PlanarScene)
+
+    @property
+    def asked(self) -> tuple[int, int, Gaze]:
+        """Frames from and to, and the camera's path, of the block that is to be exposed."""
+        first, stop = self._gaze.frames
+        return int(first), int(stop), self._gaze
+
+    def take(self, light: Keyframes, spikes: NDArray[np.uint8]) -> None:
+        """A block, exposed along the camera's path: spikes (K, H, W)."""
         self._blocks = Blocks(spikes[None], (light,), self.model.frame_rate_hz)
         if self.render_mode is not None:
             blocks = -(-RENDER_FRAMES // self.frames_per_step)
             self._recent = [*self._recent, spikes.copy()][-blocks:]
-        picture, self._seen = self.observation.step(self._blocks, self._seen)
-        age = np.broadcast_to(self.observation.age(self._seen), (1,))
-        info = self._info(self._drawn, gaze) | {"age": float(age[0])}
-        if not self.obs_state:
-            return picture[0], info, gaze
-        return {name: array[0] for name, array in with_state(picture, gaze.stop, age).items()}, info, gaze
 
-    def _info(self, scene: Scene, gaze: Gaze) -> dict[str, Any]:
+    def _shown(self) -> tuple[Any, dict[str, Any]]:
+        """What is seen of the last block, and what is known of it."""
+        picture, self._seen = self.observation.step(self.blocks, self._seen)
+        age = float(np.asarray(self.observation.age(self._seen)).reshape(-1)[0])
+        info = self._info() | {"age": age}
+        if not self.obs_state:
+            return picture[0], info
+        return {name: array[0] for name, array in with_state(picture, self._gaze.stop, age).items()}, info
+
+    def _info(self) -> dict[str, Any]:
+        gaze = self._gaze
         first, stop = gaze.frames
         info: dict[str, Any] = {
             "time_s": float(stop / self.model.frame_rate_hz),
@@ -249,6 +296,29 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
                 f"the scene is {scene.shape} at {scene.frame_rate_hz} Hz; the camera {self.shape} at {rate} Hz"
             )
         return scene
+
+
+def expose(
+    envs: Sequence[SpikeCameraEnv],
+    *,
+    outs: Sequence[NDArray[np.uint8] | None] | None = None,
+    threads: int | None = 1,
+    each: Each = in_turn,
+) -> None:
+    """The next block of every environment, along the path that its camera has taken: planes are painted in one call,
+    cameras stepped in one call.
+
+    outs: arrays (K, H, W) uint8 for the spikes.  threads: of these calls.  each: asks the scenes that are no planes.
+    """
+    flat = [n for n, env in enumerate(envs) if not env.renders]
+    other = [n for n, env in enumerate(envs) if env.renders]
+    planes = [envs[n].scene.plane(*envs[n].asked) for n in flat]  # type: ignore[attr-defined]
+    light = dict(zip(flat, painted_planes(planes, threads), strict=True))
+    light |= dict(zip(other, each(lambda n: envs[n].scene.radiance(*envs[n].asked), other), strict=True))
+    lights = [light[n] for n in range(len(envs))]
+    spikes = step_together([env.sensor for env in envs], lights, envs[0].frames_per_step, outs=outs, threads=threads)
+    for env, own, block in zip(envs, lights, spikes, strict=True):
+        env.take(own, block)
 
 
 def _observation(obs: str | Observation, packed: bool) -> Observation:

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from copy import deepcopy
-from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import checked_count
 from spikecam_env.envs.observations import Blocks, Spikes, restarted, with_state
-from spikecam_env.envs.spike_camera import SpikeCameraEnv
+from spikecam_env.envs.spike_camera import SpikeCameraEnv, expose, in_turn
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.threads import as_many
 
@@ -87,7 +86,6 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         for env in self.envs:
             env.observation, env.obs_state = Spikes(), False
         self._seen: Any = None
-        self._spikes = np.empty((self.num_envs, self._view.frames_per_step, *self._view.shape), np.int8)
         self._over = np.zeros(self.num_envs, bool)
         self._steps = np.zeros(self.num_envs, int)
 
@@ -97,10 +95,11 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         """New episodes everywhere; `options` are given to each."""
         self._open()
         seeds = _seeds(seed, self.num_envs)
-        begun = self._everywhere(lambda n: self._begin(n, seeds[n], options))
+        numbers = range(self.num_envs)
+        self._each(lambda n: self.envs[n].begin(seed=seeds[n], options=options), numbers)
         self._seen = self.observation.start(self._view, self.num_envs)
-        self._over[:] = False
-        seen, _, _, _, info = self._together(begun)
+        self._over[:], self._steps[:] = False, 0
+        seen, _, _, _, info = self._exposed(np.ones(self.num_envs, bool))
         return seen, info
 
     def step(
@@ -116,10 +115,13 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
                 f"actions have shape {given.shape}; they must be one an environment, ({self.num_envs}, ...)"
             )
         fresh = self._over.copy()
-        outcomes = self._everywhere(lambda n: self._begin(n) if fresh[n] else self._go_on(n, given[n]))
+        self._each(lambda n: self.envs[n].begin(), np.flatnonzero(fresh).tolist())
+        for n in np.flatnonzero(~fresh).tolist():
+            self.envs[n].turn(given[n])
         if fresh.any():
             self._seen = restarted(self.observation, self._view, self._seen, fresh)
-        return self._together(outcomes)
+        self._steps = np.where(fresh, 0, self._steps + 1)
+        return self._exposed(fresh)
 
     def render(self) -> tuple[Any, ...] | None:
         """N pictures (H, W, 3) uint8, or None without a render mode."""
@@ -129,59 +131,80 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         """Close every environment on its thread, and end the threads."""
         if self._process != os.getpid():  # a fork has no threads, and what they hold is not its own
             return
-        self._everywhere(lambda n: self.envs[n].close())
+        self._each(lambda n: self.envs[n].close(), range(self.num_envs))
         for worker in self._workers:
             worker.shutdown()
 
-    def _begin(self, n: int, seed: int | None = None, options: dict[str, Any] | None = None) -> Outcome:
-        block, info = self.envs[n].reset(seed=seed, options=options)
-        self._spikes[n], self._steps[n] = block, 0
-        return 0.0, False, False, info
-
-    def _go_on(self, n: int, action: NDArray[Any]) -> Outcome:
-        block, reward, terminated, truncated, info = self.envs[n].step(action)
-        self._spikes[n] = block
-        self._steps[n] += 1
-        late = self.max_episode_steps is not None and self._steps[n] >= self.max_episode_steps
-        return reward, terminated, truncated or late, info
-
-    def _everywhere(self, work: Callable[[int], T]) -> list[T]:
-        """What `work` of every environment's number returns, done on its thread.  Raises what the first that fails
-        raises, when all are done.  Blocks go into memory of their own."""
-        count = len(self._workers)
-        self._spikes = np.empty_like(self._spikes)
-        shares: list[Future[list[T]]] = [
-            worker.submit(partial(_all, work, range(n, self.num_envs, count))) for n, worker in enumerate(self._workers)
-        ]
-        wait(shares)
-        done = [share.result() for share in shares]
-        return [done[n % count][n // count] for n in range(self.num_envs)]
-
-    def _together(
-        self, outcomes: list[Outcome]
+    def _exposed(
+        self, fresh: NDArray[np.bool_]
     ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """The outcomes as gymnasium's vectors have them, and what is seen."""
-        rewards, terminated, truncated, infos = zip(*outcomes, strict=True)
+        """The next block of all, in memory of its own, and what follows from it; fresh (N,): the first of an episode."""
+        spikes = np.empty((self.num_envs, self._view.frames_per_step, *self._view.shape), np.uint8)
+        expose(self.envs, outs=list(spikes), threads=len(self._workers), each=self._each)
         light = [env.blocks.light[0] for env in self.envs]
-        blocks = Blocks(self._spikes, light, self._view.frame_rate_hz)
-        picture, self._seen = self.observation.step(blocks, self._seen)
-        age = np.broadcast_to(self.observation.age(self._seen), (self.num_envs,))
-        together: dict[str, Any] = {}
-        for n, info in enumerate(infos):
-            together = self._add_info(together, {**info, "age": float(age[n])}, n)
-        ends = np.array(terminated, bool), np.array(truncated, bool)
+        picture, self._seen = self.observation.step(Blocks(spikes, light, self._view.frame_rate_hz), self._seen)
+        age = np.broadcast_to(self.observation.age(self._seen), (self.num_envs,)).astype(np.float64)
+        numbers = range(self.num_envs)
+        in_turn_or_not = self._each if any(env.renders for env in self.envs) else in_turn
+        outcomes = in_turn_or_not(lambda n: self._outcome(n, bool(fresh[n])), numbers)
+        rewards, terminated, truncated, infos = zip(*outcomes, strict=True)
+        late = False if self.max_episode_steps is None else self._steps >= self.max_episode_steps
+        ends = np.array(terminated, bool), np.array(truncated, bool) | (late & ~fresh)
         self._over = ends[0] | ends[1]
-        gaze = np.array([info["gaze"] for info in infos])
-        seen = with_state(picture, gaze, age) if self.obs_state else picture
-        return seen, np.array(rewards, np.float64), *ends, together
+        info = batched(infos) | {"age": age, "_age": np.ones(self.num_envs, bool)}
+        seen = with_state(picture, info["gaze"], age) if self.obs_state else picture
+        return seen, np.array(rewards, np.float64), *ends, info
+
+    def _outcome(self, n: int, fresh: bool) -> Outcome:
+        if fresh:
+            return 0.0, False, False, self.envs[n].begun()[1]
+        _, reward, terminated, truncated, info = self.envs[n].outcome()
+        return reward, terminated, truncated, info
+
+    def _each(self, work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
+        """What `work` of each of these environments returns, done on its own thread.  Raises what the first that fails
+        raises, when all are done."""
+        shares: dict[int, list[int]] = {}
+        for n in numbers:
+            shares.setdefault(n % len(self._workers), []).append(n)
+        futures = {n: self._workers[n].submit(in_turn, work, share) for n, share in shares.items()}
+        wait(futures.values())
+        done = {n: iter(future.result()) for n, future in futures.items()}
+        return [next(done[n % len(self._workers)]) for n in numbers]
 
     def _open(self) -> None:
         if self.closed:
             raise NotReadyError("the environments are closed; make new ones")
 
 
-def _all(work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
-    return [work(n) for n in numbers]
+def batched(infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Infos of N environments as gymnasium's vectors have them: by name an array (N, ...), and as `_name` who has it.
+
+    Numbers and arrays are 0 where there is none; dictionaries are dictionaries of such; anything else is an object.
+    """
+    together: dict[str, Any] = {}
+    for name in dict.fromkeys(name for info in infos for name in info):
+        has = np.array([name in info for info in infos])
+        values = [info[name] for info in infos if name in info]
+        together[name], together[f"_{name}"] = _batched_values(values, has), has
+    return together
+
+
+def _batched_values(values: list[Any], has: NDArray[np.bool_]) -> Any:
+    first = values[0]
+    if isinstance(first, dict):
+        given = iter(values)
+        return batched([next(given) if one else {} for one in has])
+    if type(first) in (int, float, bool) or isinstance(first, (np.number, np.ndarray)):
+        kind = first.dtype if isinstance(first, (np.number, np.ndarray)) else type(first)
+        if has.all():
+            return np.array(values, dtype=kind)
+        array = np.zeros((len(has), *np.shape(first)), kind)
+    else:
+        array = np.full(len(has), None, dtype=object)
+    for n, value in zip(np.flatnonzero(has), values, strict=True):
+        array[n] = value
+    return array
 
 
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:

@@ -6,7 +6,7 @@ from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
 from spikecam_env.sensor.light import Keyframes
 from spikecam_env.sensor.model import SensorModel
 from spikecam_env.sensor.own_effects import effects_from, load_effects, load_installed_effects
-from spikecam_env.sensor.sensor import SensorState, SpikeSensor
+from spikecam_env.sensor.sensor import SensorState, SpikeSensor, step_together
 from spikecam_env.sensor.unit import Circuit, Unit
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ __all__ = [
     "effects_from",
     "load_effects",
     "load_installed_effects",
+    "step_together",
 ]
 
 

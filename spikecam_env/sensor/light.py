@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.between_keys import key_weights
 
@@ -244,33 +245,58 @@ def segments(
     the ramps depend on the keys alone.  A frame with keys inside it is a segment of its own, with its course where
     `courses` are asked for.
     """
-    at, stop = start, start + frames
+    if not isinstance(light, Keyframes):
+        yield from _held(light, start, start + frames)
+        return
+    at = start
+    for key0, key1, begin, length, first, count in cuts(light.frame, start, start + frames).tolist():
+        if length:
+            r0 = light.radiance[key0] if key0 >= 0 else light.at(begin)
+            r1 = light.radiance[key1] if key1 >= 0 else light.at(begin + length)
+            low = r0.reshape(-1)
+            yield Segment(low, low if key0 == key1 >= 0 else r1.reshape(-1), length, first, count)
+        elif courses:
+            yield replace(_frame_with_keys(light, at), course=course(light, at))
+        else:
+            yield _frame_with_keys(light, at)
+        at += count
+
+
+KEY0, KEY1, BEGIN, LENGTH, FIRST, COUNT = range(6)
+"""Columns of `cuts`."""
+
+
+@njit(cache=True, nogil=True)
+def cuts(times, start, stop):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """How keys at `times` (K,) cut frames start .. stop into segments: (S, 6) int64, a row each.
+
+    KEY0, KEY1: the keys whose pictures are the light at its start and at its end; -1 where no key is at that frame.
+    BEGIN, LENGTH: of its key interval [frames]; a LENGTH of 0 is a frame with keys inside it.  FIRST, COUNT: which
+    frames of the interval.
+    """
+    rows = np.empty((16, 6), np.int64)
+    used, at = 0, start
+    after = np.searchsorted(times, at, side="right")
     while at < stop:
-        pieces = _segments_from(light, at, stop) if isinstance(light, Keyframes) else _held(light, at, stop)
-        for segment in pieces:
-            if courses and segment.rise is not None and isinstance(light, Keyframes):
-                yield replace(segment, course=course(light, at))
-            else:
-                yield segment
-            at += segment.count
-
-
-def _segments_from(light: Keyframes, at: int, stop: int) -> Iterator[Segment]:
-    """One segment or more from frame `at` on, up to the next frame that holds a key at most."""
-    times = light.frame
-    after = int(np.searchsorted(times, at, side="right"))
-    if after < times.size and times[after] < at + 1:
-        yield _frame_with_keys(light, at)
-    elif after == times.size:
-        yield from _held(light.radiance[-1], at, stop)
-    elif after == 0:
-        yield from _held(light.radiance[0], at, min(stop, math.floor(times[0])))
-    else:
-        begin, end = math.ceil(times[after - 1]), math.floor(times[after])
-        begin += (at - begin) // MAX_SEGMENT * MAX_SEGMENT
-        end = min(end, begin + MAX_SEGMENT)
-        r0, r1 = light.at(begin).reshape(-1), light.at(end).reshape(-1)
-        yield Segment(r0, r1, end - begin, at - begin, min(stop, end) - at)
+        while after < times.size and times[after] <= at:
+            after += 1
+        if used == len(rows):
+            rows = np.concatenate((rows, np.empty_like(rows)))
+        if after < times.size and times[after] < at + 1:
+            rows[used] = -1, -1, at, 0, 0, 1
+        elif after == 0 or after == times.size:
+            key, until = (0, min(stop, int(np.floor(times[0])))) if after == 0 else (after - 1, stop)
+            rows[used] = key, key, at, MAX_SEGMENT, 0, min(MAX_SEGMENT, until - at)
+        else:
+            begin, end = int(np.ceil(times[after - 1])), int(np.floor(times[after]))
+            begin += (at - begin) // MAX_SEGMENT * MAX_SEGMENT
+            end = min(end, begin + MAX_SEGMENT)
+            key0 = after - 1 if times[after - 1] == begin else -1
+            key1 = after if times[after] == end else -1
+            rows[used] = key0, key1, begin, end - begin, at - begin, min(stop, end) - at
+        at += rows[used, COUNT]
+        used += 1
+    return rows[:used]
 
 
 def _frame_with_keys(light: Keyframes, at: int) -> Segment:

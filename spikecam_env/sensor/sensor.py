@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
+from itertools import zip_longest
 from types import ModuleType
 from typing import Any
 
@@ -19,9 +21,11 @@ from spikecam_env.sensor.drive import wants_pieces
 from spikecam_env.sensor.effects.base import Exposure
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import ahead, block, fast
+from spikecam_env.sensor.kernels.stretches import stretches
 from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_beside
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import UNIT_RANGES, Unit
+from spikecam_env.threads import share_out
 
 ENGINES = ("auto", "cuda", "fast", "reference")
 BENT_LIGHT = ("refuse", "allow")
@@ -110,24 +114,7 @@ class SpikeSensor:
         pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light, frames < 1, and
         light that bends within a frame where `bent_light` says so; the camera is then as it was.
         """
-        frames = checked_count(frames)
-        light = as_light(radiance, self.shape)
-        if isinstance(light, Keyframes) and self._looks_for_bends:
-            bent.check_bent(light, self.frame, frames, self._first_exposure(), self._frame_effects, self._imaging.image)
-        spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)
-        if light is not self._film:
-            warn_beside(light, self.frame, frames)
-        self._film = light if isinstance(light, Keyframes) else None
-        seen = map(self._imaging.seen, segments(light, self.frame, frames, self._wants_courses))
-        if self.engine == "fast" and self._frame_effects:
-            block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
-        else:
-            done = 0
-            for segment in seen:
-                self._run(segment, spikes[done : done + segment.count])
-                done += segment.count
-        self.frame += frames
-        return spikes.reshape(frames, *self.shape)
+        return step_together([self], [radiance], frames, outs=[out], threads=self.threads)[0]
 
     def state(self) -> SensorState:
         """A copy of everything that the next step depends on, besides the model."""
@@ -189,6 +176,38 @@ class SpikeSensor:
         else:
             self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
 
+    def _exposing(
+        self, radiance: Keyframes | ArrayLike, frames: int, out: NDArray[np.uint8] | None = None
+    ) -> _Exposing:
+        """The arguments of `step`, checked; nothing is exposed yet."""
+        frames = checked_count(frames)
+        light = as_light(radiance, self.shape)
+        if isinstance(light, Keyframes) and self._looks_for_bends:
+            bent.check_bent(light, self.frame, frames, self._first_exposure(), self._frame_effects, self._imaging.image)
+        spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)
+        if light is not self._film:
+            warn_beside(light, self.frame, frames)
+        jumps = self.engine == "fast" and not self._frame_effects
+        return _Exposing(self, light, spikes, jumps and frames > ahead.FEW and self._pixels.ready is None)
+
+    def _expose(self, given: _Exposing) -> None:
+        """What was asked for, by this camera alone."""
+        light, spikes = given.light, given.spikes
+        seen = map(self._imaging.seen, segments(light, self.frame, len(spikes), self._wants_courses))
+        if self.engine == "fast" and self._frame_effects:
+            block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
+            return
+        done = 0
+        for segment in seen:
+            self._run(segment, spikes[done : done + segment.count])
+            done += segment.count
+
+    def _exposed(self, given: _Exposing) -> NDArray[np.uint8]:
+        """The spikes (frames, H, W), once they are there."""
+        self._film = given.light if isinstance(given.light, Keyframes) else None
+        self.frame += len(given.spikes)
+        return given.spikes.reshape(-1, *self.shape)
+
     def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
         if self.engine == "fast":
             ahead.run(self._pixels, segment, out, threads=self.threads)
@@ -201,6 +220,51 @@ class SpikeSensor:
 
     def _first_exposure(self) -> Exposure:
         return Exposure(0, self.model.frame_rate_hz, self.shape, self.unit)
+
+
+@dataclass(frozen=True)
+class _Exposing:
+    """What a camera is about to expose: its light, checked, and where the spikes (frames, P) go.
+
+    together: whether pixels go from spike to spike by themselves, so that many cameras go in one call.
+    """
+
+    sensor: SpikeSensor
+    light: Keyframes | NDArray[np.float32]
+    spikes: NDArray[np.uint8]
+    together: bool
+
+    def stretches(self) -> Iterator[fast.Stretch]:
+        """What the fast engine is to do, 64 frames at a time."""
+        sensor = self.sensor
+        return stretches(sensor._pixels.pixels, self.light, sensor.frame, sensor._imaging, self.spikes)
+
+
+def step_together(
+    sensors: Sequence[SpikeSensor],
+    radiances: Sequence[Keyframes | ArrayLike],
+    frames: int = 1,
+    *,
+    outs: Sequence[NDArray[np.uint8] | None] | None = None,
+    threads: int | None = None,
+) -> list[NDArray[np.uint8]]:
+    """Expose the next frames of every camera, each in its own light: as many (frames, H, W) uint8.
+
+    Arguments as of `SpikeSensor.step`, one a camera; the bits are those of each camera by itself.  Cameras of the fast
+    engine without effects from frame to frame are stepped in one compiled call, whose threads share all pixels; others
+    a camera a thread.
+    threads: default NUMBA_NUM_THREADS.
+    Raises InputError as `SpikeSensor.step` does; all cameras are then as they were.
+    """
+    given = [
+        sensor._exposing(radiance, frames, out)
+        for sensor, radiance, out in zip(sensors, radiances, outs or [None] * len(sensors), strict=True)
+    ]
+    for stretches_now in zip_longest(*(one.stretches() for one in given if one.together)):
+        fast.run_together([stretch for stretch in stretches_now if stretch is not None], threads=threads)
+    alone = [one for one in given if not one.together]
+    share_out(lambda number: alone[number].sensor._expose(alone[number]), len(alone), threads)
+    return [one.sensor._exposed(one) for one in given]
 
 
 def _frame_effects(model: SensorModel) -> str:

@@ -12,21 +12,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects import Effect
 from spikecam_env.sensor.kernels import loop
+from spikecam_env.sensor.kernels.intrinsics import address_of
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.light import GRAINS, Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
-
-_NO_BITS = np.empty((0, 0), dtype=np.uint8)
-_NO_WORDS = np.empty((0, 0), dtype=np.uint64)
 
 DENSE = 0.7
 """Spikes a pixel and frame from which on streaming frame by frame is faster than jumping."""
@@ -110,50 +108,93 @@ def run(
 
     out: (count, P) uint8, C-contiguous.  threads: default NUMBA_NUM_THREADS.
     """
-    pixels = segment.radiance0.size
     if out is None:
-        out = np.empty((segment.count, pixels), dtype=np.uint8)
-    padded = pixels + -pixels % 8
-    spikes = out if pixels == padded else np.empty((segment.count, padded), dtype=np.uint8)
-    _advance(state, segment, _NO_BITS, spikes.view(np.uint64), threads)
-    if spikes is not out:
-        out[:] = spikes[:, :pixels]
+        out = np.empty((segment.count, segment.radiance0.size), dtype=np.uint8)
+    run_together([Stretch.of(state, [segment], out)], threads=threads)
     return out
 
 
 def run_packed(state: FastState, segment: Segment, *, threads: int | None = None) -> NDArray[np.uint8]:
     """Advance `state` over a segment; returns spikes (count, ceil(P/8)) uint8: pixel p is bit p % 8 of byte p // 8."""
     packed = np.empty((segment.count, (segment.radiance0.size + 7) // 8), dtype=np.uint8)
-    _advance(state, segment, packed, _NO_WORDS, threads)
+    _advance([Stretch.of(state, [segment], packed)], [packed], True, threads)
     return packed
 
 
+class Stretch(NamedTuple):
+    """Frames, MAX_SEGMENT at most, that one camera is to be advanced over.
+
+    pieces: (S, PIECE_COLUMNS) int64, addresses of light and frames of key intervals, see `loop.advance`.
+    light: the arrays at those addresses.  out: (frames, P) uint8, C-contiguous, where spikes go.  pixels: P.
+    """
+
+    state: FastState
+    pieces: NDArray[np.int64]
+    light: Sequence[NDArray[np.float32]]
+    out: NDArray[np.uint8]
+    pixels: int
+
+    @classmethod
+    def of(cls, state: FastState, segments: Sequence[Segment], out: NDArray[np.uint8]) -> Stretch:
+        """Over segments that follow one another."""
+        light = [np.ascontiguousarray(end) for each in segments for end in (each.radiance0, each.radiance1)]
+        pieces = [
+            (address_of(low), address_of(high), each.length, each.first, each.count)
+            for each, low, high in zip(segments, light[::2], light[1::2], strict=True)
+        ]
+        return cls(state, np.array(pieces, np.int64), light, out, segments[0].radiance0.size)
+
+
+def run_together(stretches: Sequence[Stretch], *, threads: int | None = None) -> None:
+    """Advance cameras, each over its stretch, in one compiled call a thread: spikes go where each says.
+
+    threads: default NUMBA_NUM_THREADS.
+    """
+    whole = [one.out if one.pixels % 8 == 0 else _wide(one) for one in stretches]
+    _advance(stretches, whole, False, threads)
+    for one, spikes in zip(stretches, whole, strict=True):
+        if spikes is not one.out:
+            one.out[:] = spikes[:, : one.pixels]
+
+
+def _wide(one: Stretch) -> NDArray[np.uint8]:
+    """Room for whole words of pixels."""
+    return np.empty((len(one.out), one.pixels + -one.pixels % 8), dtype=np.uint8)
+
+
 def _advance(
-    state: FastState, segment: Segment, packed: NDArray[np.uint8], spikes: NDArray[np.uint64], threads: int | None
+    stretches: Sequence[Stretch], outs: Sequence[NDArray[np.uint8]], packed: bool, threads: int | None
 ) -> None:
-    bands = -(-state.remaining.size // loop.WIDTH)
-    threads = as_many_as_pay(threads, bands, segment.radiance0.size * segment.count)
-    tickets = np.zeros((threads, 8), dtype=np.int64)
-    tickets[:, 0] = bands * np.arange(threads) // threads
+    """outs: where the spikes of each go, as bits or as bytes (`loop.advance`)."""
+    polynomials = np.array([one.state.law.polynomial for one in stretches], np.float32)
+    cameras, bands, done = [], [], 0
+    for number, (one, polynomial, out) in enumerate(zip(stretches, polynomials, outs, strict=True)):
+        pieces = done, done + len(one.pieces)
+        cameras.append((*_addresses(one.state, polynomial), address_of(out), *_words(one), len(out), *pieces))
+        bands += [(number, band) for band in range(-(-one.state.remaining.size // loop.WIDTH))]
+        done = pieces[1]
+    steps = sum(one.pixels * len(one.out) for one in stretches)
+    count = as_many_as_pay(threads, len(bands), steps)
+    tickets = np.zeros((count, 8), dtype=np.int64)
+    tickets[:, 0] = len(bands) * np.arange(count) // count
     work = (
         tickets,
-        compilable(segment.radiance0),
-        compilable(segment.radiance1),
-        np.int32(segment.length),
-        np.int32(segment.first),
-        np.int32(segment.count),
-        state.law.gain,
-        state.law.dark,
-        state.law.spread,
-        state.law.polynomial,
-        *state.seeds,
-        state.remaining,
-        state.fired,
+        np.array(cameras, np.int64),
+        np.array(bands, np.int32),
+        np.concatenate([one.pieces for one in stretches]) if len(stretches) > 1 else stretches[0].pieces,
         np.float32(DENSE),
         packed,
-        spikes,
     )
-    together([partial(loop.advance, i, *work) for i in range(threads)], shared=True)
+    together([partial(loop.advance, worker, *work) for worker in range(count)], shared=True)
+
+
+def _addresses(state: FastState, polynomial: NDArray[np.float32]) -> tuple[int, ...]:
+    law = state.law
+    return tuple(map(address_of, (law.gain, law.dark, law.spread, polynomial, state.remaining, state.fired)))
+
+
+def _words(one: Stretch) -> tuple[int, int, int]:
+    return int(one.state.seeds[0]), int(one.state.seeds[1]), one.pixels
 
 
 def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Two instructions to the compiler that numba has no word for.  Neither can change a bit of what is computed."""
+"""Instructions to the compiler that numba has no word for.  None can change a bit of what is computed."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
+from numpy.typing import NDArray
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -37,3 +38,22 @@ def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
         return builder.atomic_rmw("add", counter, cgutils.intp_t(1), "monotonic")
 
     return types.int64(tickets, types.int64), fetch_and_add
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def pointer_to(typing_context: Any, address: Any, kind: Any) -> Any:
+    """The pointer to numbers of this kind (np.float32, ...) at an address: for `numba.carray`.
+
+    So one call takes the arrays of many cameras, as a table of addresses.  Whoever makes the table keeps the arrays.
+    """
+    pointer = types.CPointer(kind.dtype)
+
+    def cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(pointer))
+
+    return pointer(address, kind), cast
+
+
+def address_of(array: NDArray[Any]) -> int:
+    """Where an array begins in memory."""
+    return int(array.__array_interface__["data"][0])

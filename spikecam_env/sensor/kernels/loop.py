@@ -23,9 +23,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import carray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.kernels.intrinsics import take_ticket, use_widest_vectors
+from spikecam_env.sensor.kernels.intrinsics import pointer_to, take_ticket, use_widest_vectors
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
 
 TILE = 256
@@ -209,12 +210,12 @@ def find_live(s: Any, flags: Any, end: Any, live: Any) -> Any:
 
 @njit(inline="always")
 def wake(s: Any, f: Any, live: Any, groups: Any, p0: Any, number: Any, spread: Any, low: Any, high: Any) -> None:
-    """Rows COUNTER, KEY, SPREAD of the live groups; low, high: the seed."""
+    """Rows COUNTER, KEY, SPREAD of the live groups; number: spikes before those of row SPIKES; low, high: the seed."""
     for i in range(groups):
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
             key = first_key(p0 + j, low)
-            s[_COUNTER + j] = _I(_U(key + _U(number[j] * GOLDEN)))
+            s[_COUNTER + j] = _I(_U(key + _U(_U(number[j] + _U(s[_SPIKES + j])) * GOLDEN)))
             s[_KEY + j] = _I(second_key(key, high))
             f[_SPREAD + j] = spread[j]
 
@@ -250,7 +251,10 @@ def reset(s: Any, j: Any, active: Any, charge: Any, low: Any, high: Any) -> Any:
 
 @njit(inline="always")
 def jump(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, first: Any) -> Any:
-    """Let each live pixel fire in the frame that its light says; returns how many groups stay live."""
+    """Let each live pixel fire in the frame that its light says; returns how many groups stay live.
+
+    first: frame of the key interval that bit 0 stands for.
+    """
     for i in range(groups):
         q = live[i] & _INSIDE
         for j in range(q, q + _GROUP):
@@ -279,7 +283,7 @@ def jump(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, first: Any) ->
 
 @njit(inline="always")
 def stream(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, at: Any) -> Any:
-    """As `jump`, where every live pixel fires in frame `at` of the segment."""
+    """As `jump`, where every live pixel fires in the frame that bit `at` stands for."""
     bit = _I(_I(1) << _I(at & _I(31)))
     low = _I(bit * _I(at < _I(32)))
     high = _I(bit * _I(at >= _I(32)))
@@ -297,124 +301,144 @@ def stream(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, at: Any) -> 
 
 
 @njit(inline="always")
-def write(eights: Any, start: Any, words: Any, count: Any, packed: Any, spikes: Any) -> None:
-    """A band's planes, each a byte a pixel that holds its eight frames, to frames: bits or bytes."""
-    for plane in range((count + 7) // 8):
+def write_bits(eights: Any, start: Any, words: Any, out: Any) -> None:
+    """A band's planes, each a byte a pixel that holds its eight frames, to frames of bits (F, ceil(P/8)) uint8."""
+    for plane in range((out.shape[0] + 7) // 8):
         of_plane = eights[plane * (WIDTH // 8) : plane * (WIDTH // 8) + words]
-        if packed.size:
-            transpose_bits(of_plane)
-        for k in range(8 * plane, min(8 * plane + 8, count)):
-            if packed.size:
-                bits = packed[k, start : start + words]
-                byte = _Q(8 * (k & 7))
-                for j in range(words):
-                    bits[j] = _B(of_plane[j] >> byte)
-            else:
-                pixels = spikes[k, start : start + words]
-                bit = _Q(k & 7)
-                for j in range(words):
-                    pixels[j] = (of_plane[j] >> bit) & _Q(0x0101010101010101)
+        transpose_bits(of_plane)
+        for k in range(8 * plane, min(8 * plane + 8, out.shape[0])):
+            bits = out[k, start : start + words]
+            byte = _Q(8 * (k & 7))
+            for j in range(words):
+                bits[j] = _B(of_plane[j] >> byte)
+
+
+@njit(inline="always")
+def write_bytes(eights: Any, start: Any, words: Any, out: Any) -> None:
+    """The same to frames of bytes, (F, ceil(P/8)) uint64 of eight pixels each."""
+    for plane in range((out.shape[0] + 7) // 8):
+        of_plane = eights[plane * (WIDTH // 8) : plane * (WIDTH // 8) + words]
+        for k in range(8 * plane, min(8 * plane + 8, out.shape[0])):
+            pixels = out[k, start : start + words]
+            bit = _Q(k & 7)
+            for j in range(words):
+                pixels[j] = (of_plane[j] >> bit) & _Q(0x0101010101010101)
+
+
+# Columns of a table of cameras: addresses of arrays, then numbers.
+CAMERA_COLUMNS = 13
+_GAIN, _DARK, _SPREAD_OF, _POLYNOMIAL, _REMAINING, _FIRED, _OUT = range(7)
+_SEED_LOW, _SEED_HIGH, _PIXELS, _FRAMES, _FIRST_PIECE, _STOP_PIECE = range(7, 13)
+
+# Columns of a table of pieces: addresses of the light at both ends of a key interval, then which frames of it.
+PIECE_COLUMNS = 5
+LIGHT0, LIGHT1, LENGTH, FIRST, COUNT = range(5)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def advance(  # type: ignore[no-untyped-def]
-    worker,
-    tickets,
-    radiance0,
-    radiance1,
-    length,
-    first,
-    count,
-    gain,
-    dark,
-    spread,
-    polynomial,
-    seed_low,
-    seed_high,
-    remaining,
-    fired,
-    dense,
-    packed,
-    spikes,
-):
-    """Frames first .. first + count of a key interval, for the bands of tiles that this thread gets hold of.
+def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ignore[no-untyped-def]
+    """Frames of one or more cameras, for the bands of tiles that this thread gets hold of.
 
     worker: which of the threads at work this is.  tickets: int64 (threads, 8), shared: in [:, 0] the next band of each
         one's share.  Who is through with his own takes others'.
-    radiance0, radiance1: (P,) float32.  length, first, count: int32.
-    gain, dark: float32 [grains/frame]; spread: float32 [grains]; remaining: int32 [grains] and fired: uint32, updated;
-        these five are padded to whole tiles.
-    polynomial: 8 float32.  seed_low, seed_high: uint32.
+    cameras: int64 (C, CAMERA_COLUMNS).  Addresses of
+        gain, dark: float32 [grains/frame]; spread: float32 [grains]; polynomial: 8 float32;
+        remaining: int32 [grains] and fired: uint32, updated; these but the polynomial are padded to whole tiles;
+        out: see `packed`, overwritten.
+        Then the seed's two words, pixels P, frames F (at most MAX_SEGMENT), and which pieces are the camera's.
+    bands: int32 (B, 2), every camera's bands: the camera, and which of its bands.
+    pieces: int64 (S, PIECE_COLUMNS), those of a camera one after another, F frames together: addresses of the light at
+        the start and at the end of a key interval, (P,) float32 each, its length, and which of its frames: from, count.
     dense: expected spikes a pixel and frame from which on a tile is streamed.
-    packed: uint8 (count, ceil(P/8)), overwritten: pixel p is bit p % 8 of byte p // 8; or empty, and then
-    spikes: uint64 (count, ceil(P/8)), overwritten: pixel p is byte p % 8 of word p // 8, 0 or 1.
+    packed: out is uint8 (F, ceil(P/8)), pixel p is bit p % 8 of byte p // 8; or else
+        uint64 (F, ceil(P/8)), pixel p is byte p % 8 of word p // 8, 0 or 1.
     """
     use_widest_vectors()  # type: ignore[call-arg]
-    pixels = radiance0.shape[0]
-    stop = _I(first + count)
     s = np.empty(_SCRATCH, np.int32)
     f = s.view(np.float32)
     live = np.empty(TILE // _GROUP + 1, np.int64)
     flags = np.empty(TILE, np.uint8)
     planes = np.empty(8 * WIDTH, np.uint8)
     eights = planes.view(np.uint64)
-    bands = (pixels + WIDTH - 1) // WIDTH
     workers = tickets.shape[0]
     share = worker
-    band = take_ticket(tickets, share)
+    ticket = take_ticket(tickets, share)
     while True:
-        while band >= bands * (share + 1) // workers:
+        while ticket >= len(bands) * (share + 1) // workers:
             share = (share + 1) % workers
             if share == worker:
                 return
-            band = take_ticket(tickets, share)
+            ticket = take_ticket(tickets, share)
+        camera, band = cameras[bands[ticket, 0]], bands[ticket, 1]
+        pixels, frames = camera[_PIXELS], camera[_FRAMES]
+        low, high = _U(camera[_SEED_LOW]), _U(camera[_SEED_HIGH])
+        whole = (pixels + TILE - 1) // TILE * TILE
+        gain = carray(pointer_to(camera[_GAIN], np.float32), (whole,))
+        dark = carray(pointer_to(camera[_DARK], np.float32), (whole,))
+        spread = carray(pointer_to(camera[_SPREAD_OF], np.float32), (whole,))
+        remaining = carray(pointer_to(camera[_REMAINING], np.int32), (whole,))
+        fired = carray(pointer_to(camera[_FIRED], np.uint32), (whole,))
+        c = carray(pointer_to(camera[_POLYNOMIAL], np.float32), (8,))
+        polynomial = (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7])
         for p0 in range(band * WIDTH, min(pixels, (band + 1) * WIDTH), TILE):
             n = min(TILE, pixels - p0)
             left = remaining[p0 : p0 + TILE]
             number = fired[p0 : p0 + TILE]
-            integrate(
-                s,
-                radiance0[p0 : p0 + n],
-                radiance1[p0 : p0 + n],
-                gain[p0 : p0 + TILE],
-                dark[p0 : p0 + TILE],
-                n,
-                length,
-            )
             for j in range(TILE):
-                s[_X + j] = _I(left[j] + collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], first))
+                s[_X + j] = left[j]
                 s[_SPIKES + j] = 0
                 s[_LOW + j] = 0
                 s[_HIGH + j] = 0
-            groups = find_live(s, flags, stop, live)
-            awake = groups
-            wake(s, f, live, groups, p0, number, spread[p0 : p0 + TILE], seed_low, seed_high)
-            if count == 1 or expected(s, first, stop) >= dense * count * TILE:
-                for at in range(count):
-                    if count > 1:
-                        groups = find_live(s, flags, _I(first + at + 1), live)
+            done: Any = 0
+            for k in range(camera[_FIRST_PIECE], camera[_STOP_PIECE]):
+                first, count = _I(pieces[k, FIRST]), _I(pieces[k, COUNT])
+                stop = _I(first + count)
+                light0 = carray(pointer_to(pieces[k, LIGHT0], np.float32), (pixels,))
+                light1 = carray(pointer_to(pieces[k, LIGHT1], np.float32), (pixels,))
+                integrate(
+                    s,
+                    light0[p0 : p0 + n],
+                    light1[p0 : p0 + n],
+                    gain[p0 : p0 + TILE],
+                    dark[p0 : p0 + TILE],
+                    n,
+                    _I(pieces[k, LENGTH]),
+                )
+                for j in range(TILE):
+                    s[_X + j] = _I(s[_X + j] + collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], first))
+                groups = find_live(s, flags, stop, live)
+                wake(s, f, live, groups, p0, number, spread[p0 : p0 + TILE], low, high)
+                if count == 1 or expected(s, first, stop) >= dense * count * TILE:
+                    for at in range(count):
+                        if count > 1:
+                            groups = find_live(s, flags, _I(first + at + 1), live)
+                        while groups:
+                            draw(s, f, live, groups)
+                            groups = stream(s, f, live, groups, polynomial, _I(done + at))
+                else:
                     while groups:
                         draw(s, f, live, groups)
-                        groups = stream(s, f, live, groups, polynomial, _I(at))
-            else:
-                while groups:
-                    draw(s, f, live, groups)
-                    groups = jump(s, f, live, groups, polynomial, first)
-            for j in range(TILE):
-                left[j] = _I(s[_X + j] - s[_END + j])
-            if awake:
+                        groups = jump(s, f, live, groups, polynomial, _I(first - done))
                 for j in range(TILE):
-                    number[j] = _U(number[j] + _U(s[_SPIKES + j]))
-            for plane in range((count + 7) // 8):
+                    s[_X + j] = _I(s[_X + j] - s[_END + j])
+                done += count
+            for j in range(TILE):
+                left[j] = s[_X + j]
+                number[j] = _U(number[j] + _U(s[_SPIKES + j]))
+            for plane in range((frames + 7) // 8):
                 word = _HIGH if plane >= 4 else _LOW
                 shift = _U(8 * (plane & 3))
                 column = plane * WIDTH + (p0 - band * WIDTH)
                 of_tile = planes[column : column + TILE]
                 for j in range(TILE):
                     of_tile[j] = _B(_U(s[word + j]) >> shift)
-        start = band * (WIDTH // 8)
-        write(eights, start, min(WIDTH // 8, (pixels + 7) // 8 - start), count, packed, spikes)
-        band = take_ticket(tickets, share)
+        start, words = band * (WIDTH // 8), (pixels + 7) // 8
+        wide = min(WIDTH // 8, words - start)
+        if packed:
+            write_bits(eights, start, wide, carray(pointer_to(camera[_OUT], np.uint8), (frames, words)))
+        else:
+            write_bytes(eights, start, wide, carray(pointer_to(camera[_OUT], np.uint64), (frames, words)))
+        ticket = take_ticket(tickets, share)
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
