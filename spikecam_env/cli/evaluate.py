@@ -1,4 +1,4 @@
-"""`spikecam evaluate`: how much a denoiser helps, and how well agents' tasks are done."""
+"""`spikecam evaluate`: how much a denoiser helps, how well agents' tasks are done, and how well agents learn."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 
 from spikecam_env.checked import checked_count
+from spikecam_env.cli.evaluate_agents import Agents
 from spikecam_env.cli.evaluate_spikezoo import SpikeZoo
 from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
 from spikecam_env.cli.evaluate_tasks import Tasks
@@ -51,7 +52,8 @@ class Quick:
 
 @dataclass
 class Evaluate:
-    """How much a denoiser helps (docs/tables.md, docs/evaluation.md), and agents' tasks (docs/environments.md).
+    """How much a denoiser helps (docs/tables.md, docs/evaluation.md), agents' tasks (docs/environments.md), agents
+    (docs/agents.md).
 
     example:  spikecam evaluate quick --out evaluation
     """
@@ -65,6 +67,7 @@ class Evaluate:
         | Annotated[StillScenes, tyro.conf.subcommand("still", prefix_name=False)]
         | Annotated[SpikeZoo, tyro.conf.subcommand("spikezoo", prefix_name=False)]
         | Annotated[Tasks, tyro.conf.subcommand("tasks", prefix_name=False)]
+        | Annotated[Agents, tyro.conf.subcommand("agents", prefix_name=False)]
         | Annotated[Truth, tyro.conf.subcommand("truth", prefix_name=False)]
     ) = field(default_factory=Quick)
 

@@ -25,6 +25,7 @@ from spikecam_env.cli.options import check_options
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
+from spikecam_env.cli.train_agent import TrainAgent
 from spikecam_env.cli.warned import warnings_as_lines
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import Stopped
@@ -48,6 +49,7 @@ COMMANDS: dict[str, Any] = {
     "export": Export,
     "denoise": Denoise,
     "train": Train,
+    "train-agent": TrainAgent,
     "evaluate": Evaluate,
     "calibrate": Calibrate,
     "campaign": Campaigns,

@@ -31,7 +31,7 @@ def on_ray(plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, addr
     wants RAY_AUTH_MODE=token, and the token, set for this process too.
     Errors: what a worker raised; InputError without Ray, without that cluster, and if workers keep dying.
     """
-    ray = _connected(address, jobs)
+    ray = connected(address, jobs)
     try:
         task = ray.remote(num_cpus=1, max_retries=RETRIES)(_file_of)
         waiting = [task.remote(plan, folder, entry) for entry in entries]
@@ -82,7 +82,7 @@ def _check_answers(address: str) -> None:
         raise InputError(f"no Ray cluster answers at {address!r} ({error}); give host:port, auto or {LOCAL}") from error
 
 
-def _connected(address: str, jobs: int) -> ModuleType:
+def connected(address: str, jobs: int) -> ModuleType:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray

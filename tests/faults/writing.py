@@ -148,6 +148,10 @@ WRITINGS: dict[str, Writing] = {
     ),
     "evaluate spikezoo": Writing("evaluate spikezoo {recordings} --out {out}", "evaluation", SPIKEZOO),
     "evaluate tasks": Writing("evaluate tasks --tasks Catch-v1 --episodes 1 --json {out}", "tasks.json", TASKS),
+    "train-agent": Writing("train-agent Catch-v1 --out {out} --steps 2 --environments 2", "agent", {}),
+    "evaluate agents": Writing(
+        "evaluate agents --tasks Catch-v1 --observations tracker --seeds 1 --episodes 1 --out {out}", "study", {}
+    ),
     "evaluate truth": Writing("evaluate truth --out {out}", "evaluation", TRUTH),
     "export": Writing("export {recording} --frames 33 --out {out}", "exported", {}),
     "calibrate": Writing("calibrate {campaign} --out {out}", "calibrated", CALIBRATION),

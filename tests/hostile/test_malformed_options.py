@@ -219,6 +219,19 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--no-refine": ((),),
         },
     ),
+    "train-agent": (
+        ("train-agent", "--out", "{out}", "--steps", 1),
+        {"": ("", "Cath-v1", "Fan-v0", "\x00")},
+    ),
+    "train-agent Catch-v1": (
+        ("train-agent", "Catch-v1", "--out", "{out}", "--steps", 1),
+        {
+            "--obs": ("", "tpf", "\x00"),
+            "--seed": SEEDS,
+            "--steps": COUNTS,
+            "--environments": (*COUNTS, 1025),
+        },
+    ),
     "evaluate quick": (
         ("evaluate", "quick", "--out", "{out}"),
         {"--seed": SEEDS, "--scenes": COUNTS, "--best": ("{here}/a.dat",)},
@@ -254,6 +267,19 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
     "evaluate tasks": (
         ("evaluate", "tasks", "--json", "{out}.json", "--tasks", "Catch-v1", "--episodes", 1),
         {"--tasks": ("", "Cath-v1", "\x00"), "--episodes": (*COUNTS, 1001), "--seed": SEEDS, "--size": SIZES},
+    ),
+    "evaluate agents": (
+        ("evaluate", "agents", "--out", "{out}", "--steps", 1, "--episodes", 1),
+        {
+            "--tasks": ("", "Cath-v1", "\x00"),
+            "--observations": ("", "tpf", "\x00"),
+            "--intervals": FLOATS,
+            "--seeds": COUNTS,
+            "--first-seed": SEEDS,
+            "--steps": COUNTS,
+            "--episodes": (*COUNTS, 1001),
+            "--jobs": WORKERS,
+        },
     ),
     "evaluate truth": (
         ("evaluate", "truth", "--out", "{out}"),

@@ -1,0 +1,125 @@
+"""A trained policy that acts, before one environment or many: shipped, or from a file.
+
+    agent = Agent.load("Catch-v1")
+    env = agent.make(split="test")
+    observation, info = env.reset(seed=0)
+    agent.begin()
+    observation, reward, *_ = env.step(agent.act(observation))
+
+A file is `torch.save` of plain values: format, task, obs, recipe, float16 weights, and the record of its training.  A
+foreign file cannot run code (`denoiser.plain_torch`).
+"""
+
+from __future__ import annotations
+
+import os
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from denoiser.plain_torch import read_plain, tensors_like
+from denoiser.weights import write_whole
+from spikecam_env.agents.history import History
+from spikecam_env.agents.policy import Policy, Recipe
+from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
+from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.untrusted import declared
+
+FORMAT = "spikecam-agent/1"
+ENDING = ".pt"
+
+
+class Agent:
+    """task: an id, e.g. "Catch-v1"; obs: name of what it sees; policy: its network; training: how it was made.
+
+    The observations are those of environments with `obs=obs, obs_state=True`.
+    """
+
+    def __init__(self, task: str, obs: str, policy: Policy, training: dict[str, Any] | None = None) -> None:
+        self.task, self.obs, self.policy, self.training = task, obs, policy.eval(), dict(training or {})
+        self.begin()
+
+    @classmethod
+    def load(cls, source: str | os.PathLike[str]) -> Agent:
+        """The shipped agent of a task's id, or the one in a file.
+
+        Raises InputError for a task without a shipped agent, and for a file that is missing, damaged or
+        of another kind.
+        """
+        path = _path(source)
+        data = read_plain(path)
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise InputError(f"{path} holds no agent ({FORMAT}); give a file of `spikecam train-agent`")
+        recipe = declared(Recipe, data.get("recipe"), f"{path}: recipe")
+        task, obs, training = (data.get(name) for name in ("task", "obs", "training"))
+        if not (isinstance(task, str) and isinstance(obs, str) and isinstance(training, dict)):
+            raise InputError(f"{path}: task, obs or training is missing; copy the file again")
+        policy = recipe.network()
+        expected = {name: tensor.half() for name, tensor in policy.state_dict().items()}
+        policy.load_state_dict(tensors_like(expected, data.get("weights"), str(path)))
+        return cls(task, obs, policy, training)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file; it appears whole.  Weights lose what float16 does not hold, one part in a thousand."""
+        weights = {name: tensor.detach().half().contiguous() for name, tensor in self.policy.state_dict().items()}
+        what = {"task": self.task, "obs": self.obs, "recipe": self.policy.recipe.model_dump(), "weights": weights}
+        write_whole(path, {"format": FORMAT, **what, "training": self.training})
+
+    def make(self, **options: Any) -> gymnasium.Env[Any, Any]:
+        """An environment of its task, as it sees it; options: of the environment, e.g. split="test"."""
+        register()
+        return gymnasium.make(f"spikecam_env/{self.task}", **{"obs": self.obs, "obs_state": True, **options})
+
+    def begin(self) -> None:
+        """Forget what was seen: the next observation is the first of an episode, everywhere."""
+        self._history = History(self.policy.recipe.lags, self.policy.recipe.pool)
+
+    def act(self, observation: dict[str, NDArray[Any]], fresh: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
+        """The action (A,), the policy's mean; with a leading axis N where the observation has one.
+
+        fresh: (N,) which of N are the first of an episode.  Raises InputError for an observation of another kind.
+        """
+        many = self._checked(observation)
+        together = observation if many else {name: np.asarray(array)[None] for name, array in observation.items()}
+        count = len(together["picture"])
+        seen = self._history.push(together, np.zeros(count, bool) if fresh is None else np.asarray(fresh, bool))
+        with torch.inference_mode():
+            mean, _, _ = self.policy(*map(torch.from_numpy, seen))
+        actions = mean.clamp(-1, 1).numpy()
+        return actions if many else actions[0]
+
+    def _checked(self, observation: Any) -> bool:
+        """Whether it is of many environments."""
+        recipe = self.policy.recipe
+        expected = (recipe.channels, *recipe.shape)
+        if not isinstance(observation, dict) or set(observation) != {"picture", "gaze", "age"}:
+            raise InputError(
+                "an agent acts on observations with picture, gaze and age; make the task with obs_state=True"
+            )
+        shape = np.shape(observation["picture"])
+        if shape[-3:] != expected or len(shape) not in (3, 4):
+            raise InputError(f"a picture has shape {shape}; this agent sees {expected}, of obs={self.obs!r}")
+        return len(shape) == 4
+
+
+def shipped() -> list[str]:
+    """Tasks of which an agent comes with the package."""
+    return sorted(path.name[: -len(ENDING)] for path in _folder().glob(f"*{ENDING}"))
+
+
+def _folder() -> Path:
+    return Path(str(resources.files("spikecam_env.agents") / "weights"))
+
+
+def _path(source: str | os.PathLike[str]) -> Path:
+    name = str(source).removeprefix("spikecam_env/")
+    if name in shipped():
+        return _folder() / f"{name}{ENDING}"
+    if f"spikecam_env/{name}" in TASK_ENVIRONMENTS or (ENDING not in name and os.sep not in name):
+        raise unknown_name("agent", name, shipped())
+    return Path(source)

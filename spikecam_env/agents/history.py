@@ -1,0 +1,55 @@
+"""What an agent remembers: the last pictures, and where the camera looked when it took them.
+
+    pictures   (N, L C, H, W) uint8      those of `lags` steps ago, the newest first
+    state      (N, S) float32            the gaze's motion in the last step and since each lag, the picture's age
+
+An episode begins as if its first picture had been there for ever, seen by a camera at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Seen(NamedTuple):
+    """pictures, state: see the head of this file."""
+
+    pictures: NDArray[np.uint8]
+    state: NDArray[np.float32]
+
+
+class History:
+    """Of N streams.  lags: steps ago, rising from 0; pool: pictures are means over so many pixels squared."""
+
+    def __init__(self, lags: Sequence[int], pool: int = 1) -> None:
+        self.lags, self.pool = tuple(lags), pool
+        self._pictures: list[NDArray[np.uint8]] = []
+        self._gazes: list[NDArray[np.float32]] = []
+
+    def push(self, observation: dict[str, NDArray[Any]], fresh: NDArray[np.bool_]) -> Seen:
+        """Observations (N, ...) with `obs_state`; fresh: (N,), which are the first of an episode."""
+        picture = pooled(observation["picture"].view(np.uint8), self.pool)
+        gaze = observation["gaze"].astype(np.float32)
+        length = self.lags[-1] + 2
+        if not self._pictures:
+            fresh = np.ones(len(picture), bool)
+            self._pictures, self._gazes = [picture] * length, [gaze] * length
+        again, moved = fresh[:, None, None, None], fresh[:, None]
+        self._pictures = [picture, *(np.where(again, picture, old) for old in self._pictures[: length - 1])]
+        self._gazes = [gaze, *(np.where(moved, gaze, old) for old in self._gazes[: length - 1])]
+        motion = [gaze - self._gazes[lag] for lag in (1, *self.lags[1:])]
+        state = np.concatenate([*motion, observation["age"].astype(np.float32)], axis=1)
+        return Seen(np.concatenate([self._pictures[lag] for lag in self.lags], axis=1), state)
+
+
+def pooled(pictures: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
+    """(N, C, H, W) -> (N, C, H // side, W // side), means rounded down."""
+    if side == 1:
+        return pictures
+    rows, columns = (size // side for size in pictures.shape[2:])
+    cut = pictures[:, :, : rows * side, : columns * side].astype(np.uint16)
+    return (cut.reshape(*cut.shape[:2], rows, side, columns, side).sum(axis=(3, 5)) // side**2).astype(np.uint8)

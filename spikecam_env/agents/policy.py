@@ -1,0 +1,133 @@
+"""The network of an agent: it finds places in the pictures, and steers by them.
+
+    maps      = conv(conv(conv(pictures)))                            (M, h, w)
+    place     = sum softmax(maps) * (column, row)                     in [-1, 1], an expected place a map
+    level     = log mean exp(maps)                                    how strongly something is there
+    known     = mlp(places, levels, state)                            the action's mean, the value and where the target
+                                                                      is are linear in it
+
+A softmax over places gives positions finer than the maps' pixels with few weights.  Source: Levine et al., JMLR 17
+(2016).
+"""
+
+from __future__ import annotations
+
+from math import log
+from typing import Annotated
+
+import torch
+from pydantic import Field
+from torch import Tensor, nn
+
+from spikecam_env.untrusted import Declared, Side
+
+
+class Recipe(Declared):
+    """What a network is.
+
+    channels  of an observation's picture
+    shape     (rows, columns) of it
+    high      largest value of a picture
+    lags      steps ago of the pictures that it sees, as of `History`
+    actions   numbers of an action
+    pool      pixels squared that are averaged before anything else
+    maps      whose places are found
+    width     of the convolutions and, times four, of what steers
+    """
+
+    channels: Annotated[int, Field(ge=1, le=256)]
+    shape: Annotated[tuple[Side, Side], Field(strict=False)]
+    high: Annotated[int, Field(ge=1, le=255)]
+    lags: Annotated[tuple[Annotated[int, Field(ge=0, le=1000)], ...], Field(min_length=1, max_length=16, strict=False)]
+    actions: Annotated[int, Field(ge=1, le=16)]
+    pool: Annotated[int, Field(ge=1, le=8)] = 2
+    maps: Annotated[int, Field(ge=1, le=64)] = 12
+    width: Annotated[int, Field(ge=1, le=64)] = 16
+
+    def network(self) -> Policy:
+        """With weights at random."""
+        return Policy(self)
+
+
+class Policy(nn.Module):
+    """pictures (N, L C, H, W) uint8 and state (N, S) float32 -> mean of the action (N, A), value (N,)."""
+
+    middle: Tensor
+    variance: Tensor
+    spread: Tensor
+    count: Tensor
+
+    def __init__(self, recipe: Recipe) -> None:
+        super().__init__()
+        self.recipe, width, maps = recipe, recipe.width, recipe.maps
+        states = 2 * len(recipe.lags) + 1
+        self.eye = nn.Sequential(
+            nn.Conv2d(len(recipe.lags) * recipe.channels, width, 5, stride=2, padding=2),
+            nn.ReLU(),
+            nn.Conv2d(width, width, 3, stride=1 if recipe.pool > 1 else 2, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(width, maps, 3, padding=1),
+        )
+        self.sharpness = nn.Parameter(torch.full((maps, 1), SHARPNESS))
+        self.register_buffer("middle", torch.zeros(states))
+        self.register_buffer("variance", torch.zeros(states))
+        self.register_buffer("spread", torch.ones(states))
+        self.register_buffer("count", torch.zeros(()))
+        self.trunk = nn.Sequential(*_layer(3 * maps + states, 4 * width), *_layer(4 * width, 4 * width))
+        self.mean, self.value, self.place = (nn.Linear(4 * width, numbers) for numbers in (recipe.actions, 1, 2))
+        nn.init.orthogonal_(self.mean.weight, 0.01)
+        nn.init.zeros_(self.mean.bias)
+        self.log_sigma = nn.Parameter(torch.full((recipe.actions,), LOG_SIGMA))
+
+    def forward(self, pictures: Tensor, state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """See the class."""
+        maps = self.eye(pictures.float() * (GAIN / self.recipe.high))
+        features = torch.cat([self._places(maps), ((state - self.middle) / self.spread).clamp(-5, 5)], dim=1)
+        known = self.trunk(features)
+        return self.mean(known), self.value(known)[:, 0], self.place(known)
+
+    def scaled(self, place: Tensor) -> Tensor:
+        """(N, 2) places (x, y) [pixels] as the network has them: 0 in the middle, 1 at an edge, SEEN at most."""
+        half = torch.tensor([(size - 1) / 2 for size in self.recipe.shape[::-1]])
+        return (place / half - 1).clamp(-SEEN, SEEN)
+
+    @torch.no_grad()
+    def watch(self, state: Tensor) -> None:
+        """Learn the scale of the state (N, S): mean and spread of the first SCALED, which then stay."""
+        if self.count >= SCALED:
+            return
+        self.count += len(state)
+        share, off = len(state) / self.count, state - self.middle
+        self.middle += share * off.mean(dim=0)
+        self.variance += share * (off.square().mean(dim=0) - self.variance)
+        self.spread.copy_(self.variance.sqrt().clamp(min=LEAST_SPREAD))
+
+    def _places(self, maps: Tensor) -> Tensor:
+        count, channels, rows, columns = maps.shape
+        flat = maps.reshape(count, channels, -1)
+        share = (flat * self.sharpness).softmax(dim=2).reshape(count, channels, rows, columns)
+        x = (share.sum(dim=2) * torch.linspace(-1, 1, columns)).sum(dim=2)
+        y = (share.sum(dim=3) * torch.linspace(-1, 1, rows)).sum(dim=2)
+        level = flat.logsumexp(dim=2) - log(rows * columns)
+        return torch.cat([x, y, level], dim=1)
+
+
+SCALED = 20_000
+"""States of which the scale is made: of the first episodes, those of actions at random."""
+LEAST_SPREAD = 0.01
+"""Of a number of the state that hardly changes."""
+SEEN = 1.5
+"""Farthest place that the network is asked for, where the target is out of the picture [half sides]."""
+GAIN = 2.0
+"""Of pictures, so that the first layer sees values of the order of one where the light is 0.05 to 0.6."""
+SHARPNESS = 4.0
+"""Of the softmax at the start."""
+LOG_SIGMA = -0.5
+"""Of the actions at the start, sigma 0.6: the whole range is tried."""
+
+
+def _layer(inputs: int, outputs: int) -> tuple[nn.Module, nn.Module]:
+    layer = nn.Linear(inputs, outputs)
+    nn.init.orthogonal_(layer.weight, 2**0.5)
+    nn.init.zeros_(layer.bias)
+    return layer, nn.Tanh()

@@ -1,0 +1,130 @@
+"""Proximal policy optimisation, in one file: a policy learns from what many environments give.
+
+    r      = p(action) / p_old(action)
+    A      = sum_k (gamma decay)^k (reward + gamma V' - V)
+    loss   = -E[min(r A, clip(r, 1 - c, 1 + c) A)] + (V - A - V_old)^2 / 2 + w (place - target)^2
+
+The last term asks the policy where the target is, which is known in training alone (`info["target"]`); w = 0 is plain
+PPO.  An episode that ends by its time is worth V beyond its end; a decided one nothing.  Everything is drawn anew from
+(seed, update) when a leg begins: a run that was resumed is the run that was not stopped.  Sources: Schulman et al.,
+arXiv 1707.06347 and 1506.02438; the form of Huang et al., JMLR 23 (2022), "CleanRL".
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium.vector import VectorEnv
+from torch import Tensor
+from torch.distributions import Normal
+from tqdm import tqdm
+
+from denoiser.run import Run
+from spikecam_env.agents.history import History
+from spikecam_env.agents.policy import Policy
+
+Cameras = VectorEnv[Any, Any, Any]
+Ended = tuple[float, ...]  # (return, performance, success) of an episode
+
+
+@dataclass(frozen=True)
+class PPO:
+    """steps: of all environments together; rollout: of each between updates; leg: updates; place: w."""
+
+    steps: int = 98_304
+    rollout: int = 64
+    leg: int = 16
+    epochs: int = 4
+    minibatch: int = 256
+    lr: float = 1e-3
+    gamma: float = 0.98
+    decay: float = 0.95
+    clip: float = 0.2
+    place: float = 1.0
+    most_gradient: float = 0.5
+
+
+def train(envs: Cameras, run: Run, ppo: PPO, seed: int, save: Callable[[], None]) -> None:
+    """Go on learning until `ppo.steps`.  run: of a `Policy`; `save` is called after every leg."""
+    policy, a_rollout = run.network, ppo.rollout * envs.num_envs
+    assert isinstance(policy, Policy)
+    updates = -(-ppo.steps // a_rollout)
+    for first in tqdm(range(run.step // a_rollout, updates, ppo.leg), desc="learning", unit="leg", disable=None):
+        began, last = time.process_time(), min(first + ppo.leg, updates)
+        drawn, *seeds = np.random.SeedSequence([seed, first]).generate_state(envs.num_envs + 1).tolist()
+        torch.manual_seed(drawn)
+        player, ended = _Player(envs, policy, ppo, seeds), list[Ended]()
+        for update in range(first, last):
+            run.set_rate(ppo.lr * (1 - update / updates))
+            batch, episodes = player.roll()
+            ended += episodes
+            _learn(policy, run.optimiser, batch, ppo)
+        run.step, run.seconds = last * a_rollout, run.seconds + time.process_time() - began
+        means = np.mean(ended or [(0.0, 0.0, 0.0)], axis=0).tolist()
+        row = dict(zip(("return", "performance", "success"), means, strict=True))
+        run.curve.append({"steps": run.step, "cpu_s": run.seconds, "episodes": len(ended), **row})
+        save()
+
+
+class _Player:
+    """Plays the policy on and on from where it stands."""
+
+    def __init__(self, envs: Cameras, policy: Policy, ppo: PPO, seeds: Any) -> None:
+        self.envs, self.policy, self.ppo = envs, policy, ppo
+        self.history, self.totals = History(policy.recipe.lags, policy.recipe.pool), np.zeros(envs.num_envs)
+        observation, self.info = envs.reset(seed=seeds)
+        self.over = np.zeros(envs.num_envs, bool)
+        self.seen = self.history.push(observation, self.over)
+
+    @torch.no_grad()
+    def roll(self) -> tuple[dict[str, Tensor], list[Ended]]:
+        """A rollout's samples by name, and the episodes that ended in it."""
+        rows, ended, sigma = [], [], self.policy.log_sigma.exp()
+        for _ in range(self.ppo.rollout):
+            pictures, state = map(torch.from_numpy, self.seen)
+            self.policy.watch(state)
+            mean, value, _ = self.policy(pictures, state)
+            place = self.policy.scaled(torch.from_numpy(np.stack(self.info["target"]).astype(np.float32)))
+            law = Normal(mean, sigma)
+            action = law.sample()
+            observation, reward, terminated, truncated, self.info = self.envs.step(action.clamp(-1, 1).numpy())
+            played, self.over = ~self.over, terminated | truncated  # an episode's last picture is no step of it
+            self.seen = self.history.push(observation, ~played)
+            self.totals = np.where(played, self.totals + reward, 0.0)
+            figures = np.stack([self.totals, self.info["performance"], self.info["is_success"]], axis=1)
+            ended += [tuple(row) for row in figures[self.over].tolist()]
+            flags = (torch.from_numpy(np.array(x, np.float32)) for x in (reward, terminated, self.over, played))
+            rows.append((pictures, state, place, action, law.log_prob(action).sum(1), value, *flags))
+        *samples, value, reward, terminated, over, played = (torch.stack(column) for column in zip(*rows, strict=True))
+        after = torch.cat([value[1:], self.policy(*map(torch.from_numpy, self.seen))[1][None]])
+        gain = _gain(reward + self.ppo.gamma * after * (1 - terminated) - value, over, self.ppo)
+        names = ("pictures", "state", "place", "action", "log_p", "gain", "worth")
+        return {k: x[played > 0] for k, x in zip(names, (*samples, gain, gain + value), strict=True)}, ended
+
+
+def _gain(surprise: Tensor, over: Tensor, ppo: PPO) -> Tensor:
+    """(steps, N): A of the head of this file."""
+    gain, later = torch.zeros_like(surprise), torch.zeros_like(surprise[0])
+    for n in reversed(range(len(surprise))):
+        gain[n] = later = surprise[n] + ppo.gamma * ppo.decay * (1 - over[n]) * later
+    return gain
+
+
+def _learn(policy: Policy, optimiser: torch.optim.Optimizer, batch: dict[str, Tensor], ppo: PPO) -> None:
+    for _ in range(ppo.epochs):
+        for some in torch.randperm(len(batch["gain"])).split(ppo.minibatch):
+            part = {name: column[some] for name, column in batch.items()}
+            mean, value, place = policy(part["pictures"], part["state"])
+            ratio = (Normal(mean, policy.log_sigma.exp()).log_prob(part["action"]).sum(1) - part["log_p"]).exp()
+            gain = (part["gain"] - part["gain"].mean()) / (part["gain"].std() + 1e-8)
+            surrogate = torch.min(ratio * gain, ratio.clamp(1 - ppo.clip, 1 + ppo.clip) * gain).mean()
+            wrong = 0.5 * (value - part["worth"]).square().mean() + ppo.place * (place - part["place"]).square().mean()
+            optimiser.zero_grad()
+            (wrong - surrogate).backward()
+            torch.nn.utils.clip_grad_norm_(policy.parameters(), ppo.most_gradient)
+            optimiser.step()

@@ -1,0 +1,125 @@
+"""From a task's name to a trained agent: what `spikecam train-agent` does.
+
+OUT/last.pt     to go on from (`denoiser.run`)
+OUT/agent.pt    the agent so far (`agents.agent`)
+OUT/curve.json  rows: steps, processor seconds, episodes, their mean return, performance and success
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import torch
+from gymnasium.spaces import Box, Dict
+from gymnasium.vector import VectorEnv
+
+from denoiser.run import Run
+from spikecam_env.agents.agent import Agent
+from spikecam_env.agents.policy import Recipe
+from spikecam_env.agents.ppo import PPO, train
+from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
+from spikecam_env.errors import unknown_name
+from spikecam_env.whole import write_text_whole
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a learner is put before.
+
+    task     an id, e.g. "Catch-v1"
+    sight    a name of SIGHTS
+    options  further keywords of the environments
+    """
+
+    task: str
+    sight: str = "tfp"
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if f"spikecam_env/{self.task}" not in TASK_ENVIRONMENTS:
+            raise unknown_name("task", self.task, (name.split("/")[1] for name in TASK_ENVIRONMENTS))
+        if self.sight not in SIGHTS:
+            raise unknown_name("observation", self.sight, SIGHTS)
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Of an environment."""
+        return {"obs_state": True, **SIGHTS[self.sight], **self.options}
+
+    def make(self, **options: Any) -> gymnasium.Env[Any, Any]:
+        """One environment."""
+        register()
+        return gymnasium.make(f"spikecam_env/{self.task}", **{**self.keywords, **options})
+
+    def make_vec(self, count: int) -> VectorEnv[Any, Any, Any]:
+        """Many."""
+        register()
+        name, mode = f"spikecam_env/{self.task}", "vector_entry_point"
+        return gymnasium.make_vec(name, num_envs=count, vectorization_mode=mode, **self.keywords)
+
+
+SIGHTS: dict[str, dict[str, Any]] = {
+    **{obs: {"obs": obs} for obs in ("tfp", "tfi", "spikes", "rate", "frame30", "frame1000")},
+    "clean": {"obs": "tfp", "model": "ideal"},
+}
+"""What an agent sees, by name: an observation of the noisy camera, or `clean`, the rates of a camera without noise."""
+
+LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4)}
+"""Steps ago of the pictures that a task is learned from; others from (0, 4)."""
+POOL = {"Saccade": 1, "ReadSpin": 1}
+"""Pixels squared that are averaged; others 2.  Spokes are finer than two pixels."""
+STEPS = {"Track": 81_920, "Catch": 98_304, "Saccade": 98_304}
+"""Of training, of a task's shipped agent; others 98 304."""
+
+
+def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
+    """The network for a task."""
+    name, spaces, action = study.task.split("-")[0], envs.single_observation_space, envs.single_action_space
+    assert isinstance(spaces, Dict) and isinstance(action, Box)
+    picture = spaces["picture"]
+    assert isinstance(picture, Box)
+    return Recipe(
+        channels=picture.shape[0],
+        shape=picture.shape[1:],
+        high=int(picture.high.max()),
+        lags=LAGS.get(name, (0, 4)),
+        actions=action.shape[0],
+        pool=POOL.get(name, 2),
+    )
+
+
+def budget(study: Study, steps: int | None = None) -> PPO:
+    """The learner's numbers for a task, with its steps or so many."""
+    return PPO(steps=steps or STEPS.get(study.task.split("-")[0], 98_304))
+
+
+def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16) -> Agent:
+    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `budget(study)`."""
+    ppo = ppo or budget(study)
+    envs, threads = study.make_vec(environments), torch.get_num_threads()
+    torch.set_num_threads(1)  # as many as pay for so small a network
+    try:
+        torch.manual_seed(seed)
+        policy = recipe_of(study, envs).network()
+        run = Run.begin(policy)
+        if (out / "last.pt").exists():
+            run.load(out / "last.pt")
+        record = {"sight": study.sight, "seed": seed, "environments": environments, "ppo": asdict(ppo)}
+
+        def trained() -> Agent:
+            return Agent(study.task, str(SIGHTS[study.sight]["obs"]), policy, record | {"curve": run.curve})
+
+        def save() -> None:
+            run.save(out / "last.pt")
+            trained().save(out / "agent.pt")
+            write_text_whole(out / "curve.json", json.dumps(run.curve, indent=1) + "\n")
+
+        train(envs, run, ppo, seed, save)
+        return trained()
+    finally:
+        torch.set_num_threads(threads)
+        envs.close()

@@ -1,0 +1,73 @@
+"""`spikecam evaluate agents`: how well agents learn the tasks, by what they see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from spikecam_env.checked import checked_count, checked_whole
+from spikecam_env.cli.options import Checked, Count, Workers
+
+MOST_SEEDS = 1000
+MOST_EPISODES = 1000
+"""As many as the test split has."""
+
+
+@dataclass
+class Agents:
+    """Train agents on tasks and print the scores that they reach on test episodes (docs/agents.md).
+
+    A score of 0 is that of doing nothing, of 1 the oracle's.  What is in OUT already is not done again.
+
+    example:  spikecam evaluate agents --tasks Catch-v1 --observations tfp frame30 --seeds 2 --out study
+    """
+
+    out: Path
+    """Folder for record.jsonl, a line a run; agents.txt, the table; curves.png; and every run's agent."""
+    tasks: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ID...")] = ("Track-v1", "Catch-v1", "Saccade-v1")
+    """Ids, with or without `spikecam_env/`."""
+    observations: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...")] = (
+        "tfp",
+        "rate",
+        "clean",
+        "frame30",
+        "frame1000",
+        "tracker",
+    )
+    """What agents see: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30, frame1000; `tracker` is the
+    classical one."""
+    intervals: tuple[float, ...] = ()
+    """Mean intervals [frames] at which LowLight-v1 is learned and played, each a row."""
+    seeds: Annotated[int, Checked(checked_count, most=MOST_SEEDS)] = 5
+    """Trainings of each."""
+    first_seed: Annotated[int, Checked(checked_whole, least=0, most=10**9)] = 0
+    """Of them."""
+    steps: Count | None = None
+    """Of training.  Default: as the shipped agents were trained."""
+    episodes: Annotated[int, Checked(checked_count, most=MOST_EPISODES)] | None = None
+    """Test episodes a score.  Default: 100 of Catch, 50 of Saccade, 10 of Track."""
+    jobs: Workers = 1
+    """Trainings at once, each in a process of its own."""
+    ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    """Train on a Ray cluster: its address, or `local` for one of --jobs workers here."""
+
+    def run(self) -> None:
+        from spikecam_env.agents.report import draw_curves
+        from spikecam_env.agents.study import cases, study, summary
+        from spikecam_env.cli.files import out_folder
+        from spikecam_env.cli.table import table
+        from spikecam_env.whole import write_text_whole
+
+        tasks = [name.removeprefix("spikecam_env/") for name in self.tasks]
+        seeds = range(self.first_seed, self.first_seed + self.seeds)
+        wanted = cases(tasks, self.observations, self.intervals, seeds, self.steps)
+        with out_folder(self.out):
+            results = study(wanted, self.out, jobs=self.jobs, ray=self.ray, episodes=self.episodes)
+            text = table(summary(results))
+            write_text_whole(self.out / "agents.txt", text + "\n")
+            draw_curves(results, self.out / "curves.png")
+        print(text)
+        print(f"wrote record.jsonl, agents.txt and curves.png in {self.out}")

@@ -1,0 +1,47 @@
+"""`spikecam train-agent`: an agent learns a task before a spike camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from spikecam_env.checked import checked_count
+from spikecam_env.cli.options import Checked, Count, Seed
+
+MOST_ENVIRONMENTS = 1024
+"""Cameras stepped together."""
+
+
+@dataclass
+class TrainAgent:
+    """Learn a task by proximal policy optimisation; goes on from its last checkpoint (docs/agents.md).
+
+    example:  spikecam train-agent Catch-v1 --out runs/catch
+    """
+
+    task: tyro.conf.Positional[str]
+    """Id of a task, e.g. Catch-v1."""
+    out: Path
+    """Folder of the run: agent.pt, curve.json, and last.pt to go on from."""
+    obs: str = "tfp"
+    """What the agent sees: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30 or frame1000."""
+    steps: Count | None = None
+    """Steps of all environments together.  Default: as the shipped agent of the task was trained."""
+    seed: Seed = 0
+    """Seed of network, actions, episodes and cameras."""
+    environments: Annotated[int, Checked(checked_count, most=MOST_ENVIRONMENTS)] = 16
+    """Cameras stepped together."""
+
+    def run(self) -> None:
+        from spikecam_env.agents.training import Study, budget, train_agent
+        from spikecam_env.cli.files import out_folder
+        from spikecam_env.cli.table import table
+
+        study = Study(self.task.removeprefix("spikecam_env/"), self.obs)
+        with out_folder(self.out):
+            agent = train_agent(study, self.out, budget(study, self.steps), self.seed, self.environments)
+        print(table(agent.training["curve"][-10:]))
+        print(f"wrote agent.pt, curve.json and last.pt in {self.out}")
