@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any, Union
 
 import tyro
 
 from spikecam_env.cli.bench import Bench
-from spikecam_env.cli.blind_trial import BlindTrial
 from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.campaign import Campaigns
 from spikecam_env.cli.dataset import Dataset
@@ -53,7 +53,6 @@ COMMANDS: dict[str, Any] = {
     "campaign": Campaigns,
     "diagnose": Diagnose,
     "ladder": Ladder,
-    "blind-trial": BlindTrial,
     "effects": Effects,
     "bench": Bench,
 }
@@ -67,15 +66,23 @@ def main(args: list[str] | None = None) -> None:
 
 
 def run(args: list[str] | None = None) -> int:
-    """Parse and run; returns the exit code.  Unusable input and faults of the disk end in one line."""
+    """Parse and run; returns the exit code."""
     union: Any = None
     for name, options in COMMANDS.items():
         command_type: Any = Annotated[options, tyro.conf.subcommand(name)]  # type: ignore[valid-type]
         union = command_type if union is None else Union[union, command_type]  # noqa: UP007
     config = (tyro.conf.OmitArgPrefixes,)
+    return run_parsed(lambda: tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=args, config=config))
+
+
+def run_parsed(parse: Callable[[], Any]) -> int:
+    """Run the command that `parse` returns; returns the exit code.
+
+    Unusable input and faults of the disk end in one line and code 2.
+    """
     try:
         with warnings_as_lines():
-            command = tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=args, config=config)
+            command = parse()
             check_options(command)
             with effects_of(command):
                 command.run()

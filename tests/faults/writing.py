@@ -159,17 +159,9 @@ WRITINGS: dict[str, Writing] = {
     ),
     "diagnose": Writing("diagnose {campaign} --out {out}", "diagnosed", DIAGNOSIS),
     "ladder": Writing("ladder {campaign} --out {out}", "ladder", LADDER),
-    "blind-trial": Writing(
-        "blind-trial --out {out} --limit 1 --only none --diagnose tests.faults.writing:nothing_found", "trial", {}
-    ),
     "effects new": Writing("effects new my_effect --out {out}", "mine", {}),
     "bench": Writing("bench sensor --out {out}", "speed.json", BENCH),
 }
-
-
-def nothing_found(campaign, model, out, seed, exclude, threads) -> dict[str, object]:
-    """A diagnosis for a blind trial that takes no time."""
-    return {"verdict": "none", "effects": [], "gap": None}
 
 
 def inputs_in(folder: Path) -> dict[str, Path]:
