@@ -99,6 +99,7 @@ MODEL = SensorModel.preset("scsim")
 DEMO: Work = {
     "spikecam_env.cli.showcase:stream": _streamed,
     "spikecam_env.cli.showcase:film_frames": _film,
+    "spikecam_env.cli.showcase:last_picture": lambda _: _film()[0],
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
 TRAINING: Work = {"denoiser.simulated:Bank.drawn": _bank}
@@ -134,6 +135,7 @@ WRITINGS: dict[str, Writing] = {
     ),
     "denoise": Writing("denoise {recording} --out {out}", "denoised", {}),
     "demo": Writing("demo --out {out}", "demo", DEMO),
+    "demo --quick": Writing("demo --quick --out {out}", "demo", DEMO),
     "scenes mp4": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.mp4", SCENE),
     "scenes gif": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.gif", SCENE),
     "scenes png": Writing(f"scenes disk --out {{out}} {' '.join(SMALL)}", "disk.png", SCENE),
