@@ -22,6 +22,7 @@ from spikecam_env.cli.options import Count, Workers
 from spikecam_env.errors import InputError
 from spikecam_env.whole import reason
 from tests.hidden_world import record, trial
+from tests.hidden_world.cases import cases
 
 
 @dataclass
@@ -67,7 +68,7 @@ class BlindTrial:
         try:
             picked = trial.chosen(self.set, self.part, self.only, self.limit, self.hiding)
             if self.record:
-                record.unpack(self.record, self.out, {case.id for case in trial.cases(self.set, self.part)})
+                record.unpack(self.record, self.out, {case.id for case in cases(self.set, self.part)})
             steps = trial.run_trial(
                 self.out,
                 self.set,
