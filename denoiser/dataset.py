@@ -19,10 +19,10 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from denoiser.pairs import WARM_UP
+from spikecam_env.checked import checked_shape
 from spikecam_env.datasets import read_window
 from spikecam_env.datasets.manifest import Manifest
 from spikecam_env.errors import InputError
-from spikecam_env.streams.packing import check_shape
 
 
 class Item(TypedDict):
@@ -72,7 +72,7 @@ class SpikeWindows(Dataset[Item]):
         rows, columns = manifest.settings["shape"]
         self.paths = [Path(folder) / file["path"] for file in files]
         self.shape = (int(rows), int(columns))
-        self.crop = self.shape if crop is None else check_shape(crop)
+        self.crop = self.shape if crop is None else checked_shape(crop)
         if not all(n <= full for n, full in zip(self.crop, self.shape, strict=True)):
             raise InputError(f"crop {self.crop}; it must be at most {self.shape}")
         self.reach, self.seed = reach, seed

@@ -27,8 +27,8 @@ from denoiser.recipe import Recipe
 from denoiser.weights import digest, load_weights, pretrained_path
 from denoiser.window import Window, check_like
 from spikecam_env.calibration import Calibration
+from spikecam_env.checked import checked_count
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
-from spikecam_env.sensor.sensor import checked_count
 from spikecam_env.streams.packing import as_spikes
 
 OUTPUTS = ("spikes", "rate", "both")

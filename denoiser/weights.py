@@ -36,7 +36,9 @@ class Described(Protocol):
         """Plain values that say what the network is."""
 
 
-def save_weights(path: str | os.PathLike[str], mode: str, recipe: Recipe, network: nn.Module, training: dict) -> None:
+def save_weights(
+    path: str | os.PathLike[str], mode: str, recipe: Recipe, network: nn.Module, training: dict[str, Any]
+) -> None:
     """Write a checkpoint; the file appears whole."""
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
     data = {"format": FORMAT, "mode": mode, "recipe": recipe.to_dict(), "state_dict": state, "training": training}

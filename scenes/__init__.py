@@ -7,6 +7,9 @@ from scenes.sliding import SlidingTexture
 from scenes.textures import TEXTURES, random_texture
 from scenes.video import VideoScene
 
+DISTRIBUTION = "spikecam-env"
+"""By which `spikecam_env.siblings` knows this package from another of its name."""
+
 __all__ = [
     "TEXTURES",
     "Collage",

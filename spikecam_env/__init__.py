@@ -9,6 +9,9 @@ if stopping.is_command():  # before the imports below, which take a while in whi
     stopping.watch()
 
 from spikecam_env import envs
+from spikecam_env.siblings import check_siblings
 from spikecam_env.version import __version__
+
+check_siblings()
 
 __all__ = ["__version__", "envs"]

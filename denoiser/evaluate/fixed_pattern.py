@@ -123,7 +123,7 @@ def _streams(spikes: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]) -> tup
     return _means(spikes, half), denoised
 
 
-def _means(frames: NDArray, half: int) -> Looks:
+def _means(frames: NDArray[Any], half: int) -> Looks:
     return frames[:half].mean(axis=0, dtype=np.float64), frames[-half:].mean(axis=0, dtype=np.float64)
 
 

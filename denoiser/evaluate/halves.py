@@ -132,7 +132,7 @@ def report(result: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _pictures(part: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]) -> Iterator[tuple[str, NDArray]]:
+def _pictures(part: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]) -> Iterator[tuple[str, NDArray[np.floating]]]:
     """Rows and their pictures [spikes/frame] of a half."""
     for window in WINDOWS:
         yield f"noisy TFP {window}", part[-window:].mean(axis=0)
@@ -143,7 +143,7 @@ def _pictures(part: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]) -> Iter
         yield f"{mode} half", denoised.rates.mean(axis=0, dtype=np.float64)
 
 
-def _judged(picture: NDArray, part: NDArray[np.uint8], seen: Reference) -> dict[str, float]:
+def _judged(picture: NDArray[np.floating], part: NDArray[np.uint8], seen: Reference) -> dict[str, float]:
     wrong = float(np.square(picture - seen.rate)[seen.static].mean()) - seen.noise
     share, error = kept([(picture, part.mean(axis=0), seen.rate)], seen.static)
     bias = float(picture[seen.static].mean() / seen.rate[seen.static].mean()) - 1

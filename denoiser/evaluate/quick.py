@@ -228,7 +228,7 @@ def _score(scene: HeldOut, streams: dict[str, Stream]) -> Iterator[dict[str, Any
                 }
 
 
-def _linear_square(photograph: NDArray, size: int) -> Texture:
+def _linear_square(photograph: NDArray[np.uint8], size: int) -> Texture:
     """Grey, about linear in light (gamma 2.2), the middle square, `size` pixels a side."""
     grey = photograph.astype(np.float32) / 255
     if grey.ndim == 3:

@@ -101,7 +101,9 @@ def report(result: dict[str, Any]) -> str:
     return "\n".join([*lines, f"{clips} clips; +-: spread over them; white is {result['settings']['rate']:g}"]) + "\n"
 
 
-def _pictures(spikes: NDArray[np.uint8], middle: int, online: dict[str, Any]) -> Iterator[tuple[str, NDArray]]:
+def _pictures(
+    spikes: NDArray[np.uint8], middle: int, online: dict[str, Any]
+) -> Iterator[tuple[str, NDArray[np.floating]]]:
     """Rows and their pictures [spikes/frame]."""
     yield "noisy TFP", middleTFP(spikes, middle, 2 * REACH + 1)
     yield "noisy TFI", interval_picture(spikes, middle)

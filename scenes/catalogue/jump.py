@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenes.assembly import Part
 from scenes.catalogue import stage
 from scenes.drawing import Canvas
 from scenes.meshes import assemble, capsule, sheet, sphere
 from scenes.protocol import Scene
-from scenes.renderers.protocol import Renderer
+from scenes.renderers.protocol import Renderer, Surface
 from scenes.textures import Texture
 from scenes.trajectories import Bouncing, Spinning, Still, Swinging
 from scenes.world import Body, World
@@ -41,7 +42,7 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
     )
 
 
-def torso(rng: np.random.Generator):
+def torso(rng: np.random.Generator) -> Surface:
     """Shirt, neck and head, the middle of the hips at the origin."""
     return assemble(
         capsule(0.46, 0.19, shirt(), taper=1.1).scaled((1, 1, 0.7)).moved(Still((0, 0.1, 0))),
@@ -50,7 +51,7 @@ def torso(rng: np.random.Generator):
     )
 
 
-def rope():
+def rope() -> Part:
     """An arc from hand to hand."""
 
     def points(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

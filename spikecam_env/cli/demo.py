@@ -1,13 +1,21 @@
-"""`spikecam demo`: a fast scene through the noisy camera and the online denoiser, as a film."""
+"""`spikecam demo`: a fast scene through the noisy camera and the online denoiser, as a film or a picture."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from spikecam_env.cli.camera import Camera
 from spikecam_env.cli.options import Count, Rpm, Seed, Size
+
+if TYPE_CHECKING:
+    from spikecam_env.cli.showcase import Streamed
+
+FRAMES = 1200
+"""Of the film: one turn of the disk at 2000 rpm."""
+QUICK_FRAMES = 250
+"""Of the picture: it is of frame 187, which the denoiser shows after 31 more, and two cores take some seconds."""
 
 
 @dataclass
@@ -15,16 +23,19 @@ class Demo:
     """Stream a fast scene through the noisy 40 kHz camera, denoise it online, and film both beside the true light.
 
     example:  spikecam demo --rpm 3000 --out demo
+              spikecam demo --quick
     """
 
     out: Path = Path("demo")
     """Folder for demo.mp4, demo.png and demo.json."""
+    quick: bool = False
+    """One picture (demo.png) in place of the film and its table."""
     scene: str = "disk"
     """The rotating disk or another scene of `spikecam scenes`."""
     rpm: Rpm | None = None
     """Speed of the disk; default 2000."""
-    frames: Count = 1200
-    """Spike frames to stream; 1200 are one turn at 2000 rpm."""
+    frames: Count | None = None
+    """Spike frames to stream; default 1200, one turn at 2000 rpm; with --quick 250."""
     mode: Literal["best", "paper"] = "best"
     """Which DnSS denoises the film."""
     camera: Camera = field(default_factory=Camera)
@@ -32,37 +43,64 @@ class Demo:
     """Rows and columns."""
     seed: Seed = 0
     """Seed of the camera unit, its noise, and the scene."""
+    open: bool = True
+    """Show the result in the desktop's viewer, if the command runs in a terminal of a desktop."""
 
     def run(self) -> None:
-        from spikecam_env.cli.files import out_folder, write_json
-        from spikecam_env.cli.panels import write_film, write_picture
-        from spikecam_env.cli.showcase import comparison, film_frames, stream
-        from spikecam_env.cli.table import table
+        from spikecam_env.cli.files import out_folder
+        from spikecam_env.cli.viewer import show_file
 
         with out_folder(self.out) as folder:
-            run = stream(
-                scene=self.scene,
-                rpm=self.rpm,
-                frames=self.frames,
-                mode=self.mode,
-                model=self.camera.load(),
-                shape=self.size,
-                seed=self.seed,
-            )
-            frames, rows = film_frames(run), comparison(run)
-            speed = {
-                "frames": len(run.noisy),
-                "camera's time, ms": 1e3 * len(run.noisy) / run.frame_rate_hz,
-                "scene and camera, s": run.camera_s,
-                "denoiser, s": run.denoiser_s,
-                "x real time": run.times_real,
-                "latency, frames": run.latency,
-            }
-            write_film(folder / "demo.mp4", frames, fps=15.0)
-            write_picture(folder / "demo.png", frames[len(frames) // 2])
-            options = {**asdict(self), "out": str(self.out)}
-            write_json(folder / "demo.json", {"options": options, "speed": speed, "table": rows})
-            print(table(rows))
-            print()
-            print(table([speed]))
-            print(f"wrote demo.mp4, demo.png and demo.json in {folder}")
+            shown = self._picture(folder) if self.quick else self._film(folder)
+        if self.open and show_file(shown):
+            print(f"opened {shown}")
+
+    def _streamed(self, frames: int, least: int) -> Streamed:
+        from spikecam_env.cli.showcase import stream
+
+        return stream(
+            scene=self.scene,
+            rpm=self.rpm,
+            frames=frames if self.frames is None else self.frames,
+            mode=self.mode,
+            model=self.camera.load(),
+            shape=self.size,
+            seed=self.seed,
+            least=least,
+        )
+
+    def _picture(self, folder: Path) -> Path:
+        from spikecam_env.cli.panels import write_picture
+        from spikecam_env.cli.showcase import PICTURE_FRAMES, last_picture
+
+        picture = folder / "demo.png"
+        write_picture(picture, last_picture(self._streamed(QUICK_FRAMES, PICTURE_FRAMES)))
+        print(f"wrote {picture}: noisy spikes, denoised, true light; `spikecam demo` makes a film of them")
+        return picture
+
+    def _film(self, folder: Path) -> Path:
+        from spikecam_env.cli.files import write_json
+        from spikecam_env.cli.panels import write_film, write_picture
+        from spikecam_env.cli.showcase import FILM_FRAMES, comparison, film_frames
+        from spikecam_env.cli.table import table
+
+        film = folder / "demo.mp4"
+        run = self._streamed(FRAMES, FILM_FRAMES)
+        frames, rows = film_frames(run), comparison(run)
+        speed: dict[str, Any] = {
+            "frames": len(run.noisy),
+            "camera's time, ms": 1e3 * len(run.noisy) / run.frame_rate_hz,
+            "scene and camera, s": run.camera_s,
+            "denoiser, s": run.denoiser_s,
+            "x real time": run.times_real,
+            "latency, frames": run.latency,
+        }
+        write_film(film, frames, fps=15.0)
+        write_picture(folder / "demo.png", frames[len(frames) // 2])
+        options = {**asdict(self), "out": str(self.out)}
+        write_json(folder / "demo.json", {"options": options, "speed": speed, "table": rows})
+        print(table(rows))
+        print()
+        print(table([speed]))
+        print(f"wrote {film}, and demo.png and demo.json beside it")
+        return film

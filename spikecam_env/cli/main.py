@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from typing import Annotated, Any, Union
 
 import tyro
 
 from spikecam_env.cli.bench import Bench
-from spikecam_env.cli.blind_trial import BlindTrial
 from spikecam_env.cli.calibrate import Calibrate
 from spikecam_env.cli.campaign import Campaigns
 from spikecam_env.cli.dataset import Dataset
@@ -20,6 +21,7 @@ from spikecam_env.cli.entry import say
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.export import Export
 from spikecam_env.cli.film_to_spikes import FilmToSpikes
+from spikecam_env.cli.first_words import START, check_words
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.options import check_options
 from spikecam_env.cli.record import Record
@@ -55,7 +57,6 @@ COMMANDS: dict[str, Any] = {
     "campaign": Campaigns,
     "diagnose": Diagnose,
     "ladder": Ladder,
-    "blind-trial": BlindTrial,
     "effects": Effects,
     "bench": Bench,
 }
@@ -69,15 +70,31 @@ def main(args: list[str] | None = None) -> None:
 
 
 def run(args: list[str] | None = None) -> int:
-    """Parse and run; returns the exit code.  Unusable input and faults of the disk end in one line."""
+    """Parse and run; returns the exit code.  Without a word it prints what to begin with."""
+    words = sys.argv[1:] if args is None else args
+    if not words:
+        print(START)
+        return 0
+    return run_parsed(lambda: _parsed(words))
+
+
+def _parsed(words: list[str]) -> Any:
+    check_words(words, COMMANDS)
     union: Any = None
     for name, options in COMMANDS.items():
-        command_type: Any = Annotated[options, tyro.conf.subcommand(name)]  # type: ignore[valid-type]
+        command_type: Any = Annotated[options, tyro.conf.subcommand(name)]
         union = command_type if union is None else Union[union, command_type]  # noqa: UP007
-    config = (tyro.conf.OmitArgPrefixes,)
+    return tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=words, config=(tyro.conf.OmitArgPrefixes,))
+
+
+def run_parsed(parse: Callable[[], Any]) -> int:
+    """Run the command that `parse` returns; returns the exit code.
+
+    Unusable input and faults of the disk end in one line and code 2.
+    """
     try:
         with warnings_as_lines():
-            command = tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=args, config=config)
+            command = parse()
             check_options(command)
             with effects_of(command):
                 command.run()

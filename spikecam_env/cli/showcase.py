@@ -26,6 +26,10 @@ FIRST_SHOWN = 4
 """Blocks left out at the start: noisy and clean twins need 60 frames to forget their common phase."""
 LAST_SHOWN = 2
 """Blocks left out at the end, where TFP windows are cut."""
+PICTURE_FRAMES = BLOCK * (FIRST_SHOWN + 1 + LAST_SHOWN)
+"""Fewest frames that have a block to show."""
+FILM_FRAMES = 500
+"""Fewest frames of a film: two thirds of its blocks are shown, and TABLE_FRAMES of them are of settled twins."""
 TABLE_FRAMES = 250
 """Stretch that the table is of: the paper's network takes 20 times as long as `best`, so it sees no more."""
 
@@ -69,14 +73,16 @@ def stream(
     model: SensorModel | str,
     shape: tuple[int, int],
     seed: int,
+    least: int = FILM_FRAMES,
 ) -> Streamed:
     """Stream a scene through environment and denoiser.
 
     scene: "disk" (at a speed of rpm, default 2000), or another name of the catalogue.
-    Errors: InputError for fewer than 500 frames, an unknown scene, and rpm with another scene than the disk.
+    least: frames that are needed for what is to be shown: FILM_FRAMES or PICTURE_FRAMES.
+    Errors: InputError for fewer frames, an unknown scene, and rpm with another scene than the disk.
     """
-    if frames < 500:
-        raise InputError(f"{frames} frames are too few to show; ask for 500 or more (1200 are a turn at 2000 rpm)")
+    if frames < least:
+        raise InputError(f"{frames} frames are too few to show; ask for {least} or more (1200 are a turn at 2000 rpm)")
     checked_memory(4 * frames * shape[0] * shape[1], f"a film of {frames} frames of {shape[0]} x {shape[1]} pixels")
     env, start = _camera(scene, rpm, shape, seed, model=model, frames_per_step=BLOCK, max_episode_steps=frames)
     camera: Any = env.unwrapped
@@ -143,6 +149,12 @@ def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:
     white = float(np.percentile(run.truths[0], 99.8))
     corner = f"denoised online at {run.times_real:.3f} x real time"
     return [compose(_panels(run, b), white, corner) for b in run.shown]
+
+
+def last_picture(run: Streamed) -> NDArray[np.uint8]:
+    """The last block that is shown, as `film_frames` has it: the denoiser has seen most before it."""
+    white = float(np.percentile(run.truths[0], 99.8))
+    return compose(_panels(run, run.shown[-1]), white)
 
 
 def _panels(run: Streamed, block: int) -> list[Panel]:

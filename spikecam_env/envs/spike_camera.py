@@ -16,12 +16,11 @@ from scenes.exposure import lit
 from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
-from spikecam_env.checked import checked_number
+from spikecam_env.checked import checked_number, checked_shape
 from spikecam_env.envs.motor import cut
 from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
-from spikecam_env.streams.packing import check_shape
 
 MakeScene = Callable[[np.random.Generator, dict[str, Any]], Scene]
 """(generator, options of reset) -> the scene of one episode."""
@@ -96,7 +95,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         threads: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self.shape = check_shape(shape)
+        self.shape = checked_shape(shape)
         if frames_per_step < 1 or frames_per_step != int(frames_per_step):
             raise InputError(f"frames_per_step is {frames_per_step}; it must be a whole number, 1 or more")
         if render_mode not in (None, *self.metadata["render_modes"]):

@@ -9,8 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.checked import shown
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, shown
 from spikecam_env.streams.hdf5 import check_stored
 from spikecam_env.streams.stored import Choice, one_stream, stream_key
 from spikecam_env.untrusted import hdf5_item, hdf5_values, open_hdf5

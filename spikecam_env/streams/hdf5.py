@@ -30,10 +30,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict
 
-from spikecam_env.checked import checked_number, shown
-from spikecam_env.errors import InputError, NotReadyError, unknown_name
+from spikecam_env.checked import checked_number, checked_shape
+from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.streams.files import check_range
-from spikecam_env.streams.packing import as_spikes, check_shape, pack_checked, packed_bytes, unpack_frames
+from spikecam_env.streams.packing import as_spikes, pack_checked, packed_bytes, unpack_frames
 from spikecam_env.streams.whole_hdf5 import WholeHDF5
 from spikecam_env.untrusted import (
     Count,
@@ -79,7 +79,7 @@ class SpikeWriter:
         **attributes: object,
     ) -> None:
         self.path = Path(path)
-        self.shape = check_shape(shape)
+        self.shape = checked_shape(shape)
         check_file(self.path)
         self._attributes = _file_attributes(self.shape, frame_rate_hz, attributes)
         self._whole = WholeHDF5(self.path, libver=LIBRARY_VERSIONS, rdcc_nbytes=CACHE_BYTES)
@@ -256,7 +256,7 @@ def _opened(file: h5py.File, path: Path) -> OpenRecording:
     if not isinstance(found, str) or found != FORMAT:
         raise InputError(f"{where} is not a recording of this package: found {shown(found)}, need {FORMAT!r}")
     header = declared(_Header, attributes, where)
-    shape = check_shape((header.height, header.width), f"{where}: (height, width)")
+    shape = checked_shape((header.height, header.width), f"{where}: (height, width)")
     held = [name for name in ("spikes", "clean") if name == "spikes" or name in file.keys()]  # noqa: SIM118
     return OpenRecording(file, path, shape, attributes, {name: _stream(file, name, shape, where) for name in held})
 

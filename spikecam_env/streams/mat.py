@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import io
 
-from spikecam_env.checked import checked_memory, shown
-from spikecam_env.errors import InputError
+from spikecam_env.checked import checked_memory
+from spikecam_env.errors import InputError, shown
 from spikecam_env.streams.foreign_hdf5 import array_of, named_arrays
 from spikecam_env.streams.stored import Choice, one_stream, stream_key
 from spikecam_env.untrusted import existing_file, open_hdf5

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.checked import checked_memory, shown
-from spikecam_env.errors import InputError
+from spikecam_env.checked import checked_memory
+from spikecam_env.errors import InputError, shown
 from spikecam_env.streams.packing import BitOrder, as_spikes, check_bit_order
 from spikecam_env.streams.stored import Choice, as_bytes, coincidence, one_stream, ordered, stream_key
 from spikecam_env.untrusted import existing_file, number, read_arrays

@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.checked import checked_whole, shown
-from spikecam_env.errors import InputError
+from spikecam_env.checked import checked_whole
+from spikecam_env.errors import InputError, shown
 from spikecam_env.streams.files import check_range
 from spikecam_env.streams.geometry import KNOWN_SHAPES
 

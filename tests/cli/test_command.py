@@ -70,6 +70,17 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
     film = imageio.get_reader(tmp_path / "demo.mp4")
     assert film.count_frames() == 500 // 25 - 6
     assert imageio.imread(tmp_path / "demo.png").shape[2] == 3
+    assert f"wrote {tmp_path / 'demo.mp4'}" in printed
+
+
+def test_a_quick_demo_makes_a_picture_alone(tmp_path: Path, capsys) -> None:
+    assert spikecam("demo", "--quick", "--out", tmp_path, *SMALL) == 0
+    assert f"wrote {tmp_path / 'demo.png'}" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["demo.png"]
+    noisy, denoised, truth = np.array_split(imageio.imread(tmp_path / "demo.png")[20:160, :, 0].astype(float), 3, 1)
+    errors = [float(np.mean(np.abs(picture[:, 20:280] - truth[:, 20:280]))) for picture in (noisy, denoised)]
+    print(f"mean difference from the true light: noisy {errors[0]:.1f}, denoised {errors[1]:.1f} of 255")
+    assert errors[1] < 0.8 * errors[0]
 
 
 @pytest.mark.parametrize(
@@ -84,7 +95,8 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
         (("record", "--out", "x.h5", "--model", "no.toml"), "cannot read model file no.toml"),
         (("record", "--out", "x.h5", "--frames", "0"), "--frames 0"),
         (("record", "--out", "x.h5", "--size", "0", "400"), "--size 0 400"),
-        (("demo", "--frames", "10"), "10 frames are too few"),
+        (("demo", "--frames", "10"), "10 frames are too few to show; ask for 500 or more"),
+        (("demo", "--quick", "--frames", "10"), "10 frames are too few to show; ask for 175 or more"),
         (("demo", "--model", "scs"), "unknown preset 'scs'"),
         (("demo", "--rpm", "nan"), "rpm"),
         (("denoise", "absent.dat"), "absent.dat"),
@@ -123,8 +135,8 @@ def test_what_is_wrong_ends_in_one_line_and_code_2(args, message: str, tmp_path:
     assert not any((tmp_path / name).is_file() or list((tmp_path / name).iterdir()) for name in left), left
 
 
-def test_unknown_options_end_with_code_2() -> None:
-    for args in (["demo", "--modes", "best"], ["bench", "everything"], ["fly"], []):
+def test_a_word_that_is_no_choice_ends_with_code_2() -> None:
+    for args in (["bench", "everything"], ["demo", "--mode", "bst"], ["demo", "more"]):
         with pytest.raises(SystemExit) as end:
             spikecam(*args)
         assert end.value.code == 2

@@ -16,8 +16,6 @@ from tests.faults.writing import WRITINGS, said, tree
 PAGE = 4096
 SHARES = (0.0, 0.6)
 """Of what a command writes, how much there is room for."""
-LONG_WORK = ("blind-trial",)
-"""Commands that write over minutes: tried with no room."""
 
 
 @pytest.mark.parametrize("command", WRITINGS)
@@ -30,15 +28,13 @@ def test_a_disk_that_fills_up_ends_every_command_in_a_line(
     capsys,
 ) -> None:
     writing = WRITINGS[command]
-    sizes = [PAGE]
-    if command not in LONG_WORK:
-        assert writing.run(tmp_path / writing.out, inputs, monkeypatch) == 0
-        pages = sum(
-            -(-path.stat().st_size // PAGE)
-            for path in (tmp_path / writing.out, *(tmp_path / writing.out).rglob("*"))
-            if path.is_file()
-        )
-        sizes = sorted({PAGE * max(1, int(share * pages)) for share in SHARES})
+    assert writing.run(tmp_path / writing.out, inputs, monkeypatch) == 0
+    pages = sum(
+        -(-path.stat().st_size // PAGE)
+        for path in (tmp_path / writing.out, *(tmp_path / writing.out).rglob("*"))
+        if path.is_file()
+    )
+    sizes = sorted({PAGE * max(1, int(share * pages)) for share in SHARES})
     roomy = SimpleNamespace(free=1 << 40)  # as if others fill it up meanwhile: nothing is refused beforehand
     monkeypatch.setattr("shutil.disk_usage", lambda _: roomy)
     for size in sizes:
@@ -66,7 +62,7 @@ def test_what_a_disk_has_no_room_for_is_refused_before_the_work(
     assert not tree(tmp_path)
 
 
-@pytest.mark.parametrize("command", [name for name in WRITINGS if name not in LONG_WORK])
+@pytest.mark.parametrize("command", WRITINGS)
 def test_a_limit_on_the_size_of_files_ends_every_command_in_a_line(
     command: str, tmp_path: Path, inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:

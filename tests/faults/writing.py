@@ -99,6 +99,7 @@ MODEL = SensorModel.preset("scsim")
 DEMO: Work = {
     "spikecam_env.cli.showcase:stream": _streamed,
     "spikecam_env.cli.showcase:film_frames": _film,
+    "spikecam_env.cli.showcase:last_picture": lambda _: _film()[0],
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
 TRAINING: Work = {"denoiser.simulated:Bank.drawn": _bank}
@@ -134,6 +135,7 @@ WRITINGS: dict[str, Writing] = {
     ),
     "denoise": Writing("denoise {recording} --out {out}", "denoised", {}),
     "demo": Writing("demo --out {out}", "demo", DEMO),
+    "demo --quick": Writing("demo --quick --out {out}", "demo", DEMO),
     "scenes mp4": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.mp4", SCENE),
     "scenes gif": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.gif", SCENE),
     "scenes png": Writing(f"scenes disk --out {{out}} {' '.join(SMALL)}", "disk.png", SCENE),
@@ -163,17 +165,9 @@ WRITINGS: dict[str, Writing] = {
     ),
     "diagnose": Writing("diagnose {campaign} --out {out}", "diagnosed", DIAGNOSIS),
     "ladder": Writing("ladder {campaign} --out {out}", "ladder", LADDER),
-    "blind-trial": Writing(
-        "blind-trial --out {out} --limit 1 --only none --diagnose tests.faults.writing:nothing_found", "trial", {}
-    ),
     "effects new": Writing("effects new my_effect --out {out}", "mine", {}),
     "bench": Writing("bench sensor --out {out}", "speed.json", BENCH),
 }
-
-
-def nothing_found(campaign, model, out, seed, exclude, threads) -> dict[str, object]:
-    """A diagnosis for a blind trial that takes no time."""
-    return {"verdict": "none", "effects": [], "gap": None}
 
 
 def inputs_in(folder: Path) -> dict[str, Path]:

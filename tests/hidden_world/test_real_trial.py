@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from spikecam_env.cli.blind_trial import BlindTrial, hidden_world
+from benchmarks.blind_trial import BlindTrial
+from tests.hidden_world import trial
 from tests.hidden_world.trial import chosen
 
 SHAPE, FRAMES = (16, 16), 1000
@@ -17,7 +17,6 @@ SHAPE, FRAMES = (16, 16), 1000
 @pytest.mark.slow
 def test_trial_runs_the_real_diagnosis_and_scores_it(tmp_path, monkeypatch, capsys):
     """A camera with nothing hidden and a strong effect; what is checked is that it works, not how well."""
-    trial = hidden_world(Path(__file__).parent)
 
     def tiny(*options):
         return [replace(c, recipe=replace(c.recipe, shape=SHAPE, frames=FRAMES)) for c in chosen(*options)]

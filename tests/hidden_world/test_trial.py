@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from spikecam_env.cli.blind_trial import BlindTrial, hidden_world
-from spikecam_env.cli.main import run
+from benchmarks.blind_trial import BlindTrial, run
 from spikecam_env.errors import InputError
+from tests.hidden_world import trial
 from tests.hidden_world.cases import PARTS, Case, cases
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 from tests.hidden_world.keys import BrokenSealError, key_text, open_key, seal
@@ -284,11 +283,11 @@ def test_a_run_goes_on_where_it_stopped(tmp_path):
     assert sorted(line.split()[0] for line in asked) == sorted(c.id for c in picked)
     assert all(line.split()[3:] == [".dat", ".json", ".npz"] for line in asked)
     assert not any((tmp_path / "campaigns").iterdir())
-    trial = score_trial(tmp_path, picked)
-    assert trial["cases"] == 4 and trial["errors"] == 0
-    assert trial["confusion"]["nothing"] == {"dead_time": 2}
+    scored = score_trial(tmp_path, picked)
+    assert scored["cases"] == 4 and scored["errors"] == 0
+    assert scored["confusion"]["nothing"] == {"dead_time": 2}
     page = (tmp_path / "trial.md").read_text()
-    assert page == as_text(trial) and "false alarms, nothing hidden | 100 % | 22 - 100 %" in page
+    assert page == as_text(scored) and "false alarms, nothing hidden | 100 % | 22 - 100 %" in page
 
 
 def test_a_diagnosis_that_breaks_is_counted_and_tried_again(tmp_path):
@@ -310,9 +309,9 @@ def test_a_record_holds_a_trial_to_be_scored_and_gone_on_with(tmp_path):
     assert unpack(record, second, ids) == 1 and unpack(record, second, ids) == 0
     assert list(run_trial(second, "full", "tune", said, picked=picked)) == [(1, 2), (2, 2)]
     assert pack(second, record) == 2
-    trial = score_trial(second, picked)
-    assert trial["code"] == {code() or "unknown code": 2} and trial["cases"] == 2
-    assert trial["scored"][0] == score_trial(first, picked[:1])["scored"][0]
+    scored = score_trial(second, picked)
+    assert scored["code"] == {code() or "unknown code": 2} and scored["cases"] == 2
+    assert scored["scored"][0] == score_trial(first, picked[:1])["scored"][0]
     line = json.loads(record.read_text().splitlines()[0])
     assert {"id", "code", "threads", "seconds", "diagnosis"} < set(line) and "statistics" not in line["diagnosis"]
 
@@ -339,18 +338,25 @@ def test_what_is_not_scored_is_not_recorded():
     )
 
 
-def test_command_says_where_the_world_is_not(tmp_path, capsys):
-    with pytest.raises(InputError, match="no hidden world"):
-        hidden_world(tmp_path)
-    for option in ("jobs", "threads"):
-        assert run(["blind-trial", "--out", str(tmp_path), f"--{option}", "0"]) == 2
-        assert f"--{option} 0; it must be" in capsys.readouterr().err
-    with pytest.raises(InputError, match="no group"):
-        BlindTrial(tmp_path, only=["all"]).run()
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--jobs", "0"), "--jobs 0; it must be"),
+        (("--threads", "0"), "--threads 0; it must be"),
+        (("--limit", "-3"), "--limit -3; it must be"),
+        (("--only", "all"), "there is no group 'all'"),
+        (("--hiding", "nothing_known"), "no case hides 'nothing_known'"),
+        (("--out", __file__), "test_trial.py"),
+    ],
+)
+def test_unusable_options_end_in_one_line_and_code_2(words, said, tmp_path, capsys):
+    assert run(["--out", str(tmp_path / "trial"), *words]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("spikecam: ") and error.count("\n") == 1 and said in error
+    assert not (tmp_path / "trial").exists()
 
 
 def test_command_prints_the_figures(tmp_path, monkeypatch, capsys):
-    trial = hidden_world(Path(__file__).parent)
     monkeypatch.setattr(trial, "chosen", lambda *a: [small(c) for c in chosen(*a)])
     said = "tests.hidden_world.bench:says_dead_time"
     BlindTrial(tmp_path, set="quick", part="report", only=["weak"], limit=2, diagnose=said).run()

@@ -300,10 +300,6 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--out": ("{here}/none/x", "{here}/a.dat"),
         },
     ),
-    "blind-trial": (
-        ("blind-trial", "--out", "{out}"),
-        {"--jobs": WORKERS, "--threads": WORKERS, "--limit": COUNTS, "--world": ("{here}",), "--only": ("easy",)},
-    ),
     "effects show": (("effects", "show"), {"": ("dead_tim", "..", "\x00", "x" * 1000)}),
     "effects list": (("effects", "list"), {"--effect-file": EFFECT_FILES}),
     "effects new": (

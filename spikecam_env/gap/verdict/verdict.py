@@ -17,7 +17,8 @@ from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.result import Conclusion, NamedEffect, Statistic
-from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND, Round
+from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
+from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of, usable_floor

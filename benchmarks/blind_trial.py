@@ -1,22 +1,28 @@
-"""`spikecam blind-trial`: how often a diagnosis is right, on campaigns whose effects it cannot know."""
+"""How often a diagnosis is right, on campaigns whose effects it cannot know (docs/blind_trial.md).
+
+    python -m benchmarks.blind_trial --set quick --part tune --jobs 2 --out trial
+
+It runs in a checkout: what hides the effects is in `tests/hidden_world`, which is not installed.
+"""
 
 from __future__ import annotations
 
-import importlib
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-import spikecam_env
+import tyro
+
+from spikecam_env import stopping
+from spikecam_env.cli.files import out_folder
+from spikecam_env.cli.main import run_parsed
 from spikecam_env.cli.options import Count, Workers
 from spikecam_env.errors import InputError
-from spikecam_env.stopping import without_interrupts
 from spikecam_env.whole import reason
-
-WORLD = Path(spikecam_env.__file__).resolve().parents[1] / "tests" / "hidden_world"
+from tests.hidden_world import record, trial
+from tests.hidden_world.cases import cases
 
 
 @dataclass
@@ -26,7 +32,7 @@ class BlindTrial:
     What is done already in OUT is not done again; trial.md has the figures so far at any time, of cases in the order
     of their opaque ids, a fair sample.  The part `report` is for figures: do not tune on it.
 
-    example:  spikecam blind-trial --set quick --part tune --jobs 2 --out trial
+    example:  python -m benchmarks.blind_trial --set quick --part tune --jobs 2 --out trial
     """
 
     out: Path
@@ -49,26 +55,20 @@ class BlindTrial:
     """File that holds all results, a line each: what it has is not done again, and what is done is written to it."""
     keep: bool = False
     """Keep the campaigns' data (some 100 MB each)."""
-    world: Path = WORLD
-    """Folder of the hidden world, in the package's checkout."""
-    diagnose: str = "spikecam_env.cli.blind_trial:diagnosed"
+    diagnose: str = "benchmarks.blind_trial:diagnosed"
     """module:function that is tried: (campaign, model, out, seed, exclude, threads) -> what diagnosis.json holds."""
 
     def run(self) -> None:
-        from spikecam_env.cli.files import out_folder
-
         with out_folder(self.out):
             self._go_on()
 
     def _go_on(self) -> None:
         from tqdm import tqdm
 
-        trial = hidden_world(self.world)
-        record = importlib.import_module("tests.hidden_world.record")
         try:
             picked = trial.chosen(self.set, self.part, self.only, self.limit, self.hiding)
             if self.record:
-                record.unpack(self.record, self.out, {case.id for case in trial.cases(self.set, self.part)})
+                record.unpack(self.record, self.out, {case.id for case in cases(self.set, self.part)})
             steps = trial.run_trial(
                 self.out,
                 self.set,
@@ -78,7 +78,7 @@ class BlindTrial:
                 jobs=self.jobs,
                 threads=self.threads,
                 keep=self.keep,
-                starting=without_interrupts,
+                starting=stopping.without_interrupts,
             )
             with tqdm(total=len(picked), unit="case") as bar:
                 for done, _ in steps:
@@ -107,14 +107,18 @@ def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequenc
     return json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
 
 
-def hidden_world(folder: Path) -> Any:
-    """Its module `trial`; raises InputError where the folder is not the hidden world."""
-    if not (folder / "trial.py").is_file():
-        raise InputError(
-            f"there is no hidden world at {folder}; it comes with the source checkout, not with the installed "
-            "package: clone the repository and give its tests/hidden_world as --world"
-        )
-    root = str(folder.resolve().parents[1])
-    if root not in sys.path:
-        sys.path.insert(0, root)
-    return importlib.import_module("tests.hidden_world.trial")
+def run(args: list[str] | None = None) -> int:
+    """Parse and run; returns the exit code."""
+    options: Any = (tyro.conf.OmitArgPrefixes,)
+    return run_parsed(lambda: tyro.cli(BlindTrial, prog="python -m benchmarks.blind_trial", args=args, config=options))
+
+
+def main() -> None:
+    """The program, which a signal stops as it stops the `spikecam` command."""
+    with stopping.watched():
+        code = run()
+    stopping.finish(code)
+
+
+if __name__ == "__main__":
+    main()
