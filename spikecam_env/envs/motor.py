@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.protocol import Gaze
 from spikecam_env.checked import checked_number
 
 
@@ -35,3 +36,10 @@ class Motor:
         change = self.most_change_px_s(seconds)
         wanted = np.clip(wanted, -self.top_px_s, self.top_px_s)
         return rate + np.clip(wanted - rate, -change, change)
+
+
+def turned(start: tuple[float, float], rate: NDArray[np.float64], top: float, frames: tuple[int, int]) -> Gaze:
+    """The path of a gaze.  rate: (2,) in units of `top` [pixels/frame], cut to [-1, 1] as a motor saturates."""
+    pan, tilt = np.clip(rate, -1.0, 1.0) * top
+    count = frames[1] - frames[0]
+    return Gaze(start, (start[0] + float(pan) * count, start[1] + float(tilt) * count), frames)

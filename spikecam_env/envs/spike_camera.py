@@ -15,6 +15,7 @@ from scenes.exposure import lit
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
 from spikecam_env.checked import checked_number
+from spikecam_env.envs.motor import turned
 from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.sensor import SensorModel, SpikeSensor
@@ -122,16 +123,16 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._seen = self.observation.start(self.view, 1)
         self._position = (0.0, 0.0)
         self._recent = []
-        observation, info, _ = self._expose((0.0, 0.0))
-        return observation, info
+        return self._expose(Gaze((0.0, 0.0), (0.0, 0.0), (0, self.frames_per_step)))
 
     def step(self, action: ArrayLike) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Turn the camera at the action's rate for K frames.  Never truncates: that is `TimeLimit`'s."""
         rate = np.asarray(action, np.float64)
         if rate.shape != (2,) or not np.isfinite(rate).all():
             raise InputError(f"action is {action!r}; it must be two finite numbers in [-1, 1], (pan, tilt)")
-        pan, tilt = np.clip(rate, -1.0, 1.0) * (self.max_gaze_rate_px_s / self.model.frame_rate_hz)
-        observation, info, gaze = self._expose((float(pan), float(tilt)))
+        frames = self.sensor.frame, self.sensor.frame + self.frames_per_step
+        gaze = turned(self._position, rate, self.max_gaze_rate_px_s / self.model.frame_rate_hz, frames)
+        observation, info = self._expose(gaze)
         reward, terminated = self._judge(self._drawn, self.sensor.frame, gaze)
         return observation, float(reward), bool(terminated), False, info
 
@@ -199,14 +200,10 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             return NotReadyError("the environment is closed; make a new one")
         return NotReadyError("the environment has no scene yet; call reset first")
 
-    def _expose(self, rate: tuple[float, float]) -> tuple[Any, dict[str, Any], Gaze]:
-        """The next K frames while the gaze moves at `rate` [pixels/frame]: (observation, info, the gaze's path)."""
-        scene = self.scene
-        first, stop = self.sensor.frame, self.sensor.frame + self.frames_per_step
-        pan, tilt = self._position
-        self._position = pan + rate[0] * self.frames_per_step, tilt + rate[1] * self.frames_per_step
-        gaze = Gaze((pan, tilt), self._position, (first, stop))
-        light = scene.radiance(first, stop, gaze)
+    def _expose(self, gaze: Gaze) -> tuple[Any, dict[str, Any]]:
+        """The next K frames while the gaze moves so: (observation, info)."""
+        self._position = gaze.stop
+        light = self.scene.radiance(self.sensor.frame, self.sensor.frame + self.frames_per_step, gaze)
         spikes = self.sensor.step(light, frames=self.frames_per_step)
         self._blocks = Blocks(spikes[None], (light,), self.model.frame_rate_hz)
         if self.render_mode is not None:
@@ -216,8 +213,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         age = np.broadcast_to(self.observation.age(self._seen), (1,))
         info = self._info(self._drawn, gaze) | {"age": float(age[0])}
         if not self.obs_state:
-            return picture[0], info, gaze
-        return {name: array[0] for name, array in with_state(picture, gaze.stop, age).items()}, info, gaze
+            return picture[0], info
+        return {name: array[0] for name, array in with_state(picture, gaze.stop, age).items()}, info
 
     def _info(self, scene: Scene, gaze: Gaze) -> dict[str, Any]:
         first, stop = gaze.frames

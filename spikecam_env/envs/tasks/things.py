@@ -6,7 +6,7 @@ A texture has a number; its light follows from the number, so that train and tes
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import cv2
 import numpy as np
@@ -17,6 +17,7 @@ from scenes.drawing import Canvas
 from scenes.painted_disk import Texels, prefiltered
 from scenes.textures import Texture, blobs, fractal_noise
 from spikecam_env.envs.tasks.base import View
+from spikecam_env.envs.tasks.digits import DIGITS, digit
 
 DARK, BRIGHT = 0.05, 0.6
 """Radiance of texture values 0 and 1, as of the rotating disk: mean intervals of 20 and 1.7 frames."""
@@ -121,4 +122,4 @@ TEXTURES: dict[str, Callable[[np.random.Generator], Texture]] = {
     "halves": halves,
     "islands": islands,
     "plain": plain,
-}
+} | {name: partial(digit, name, TEXTURE_SIZE) for name in DIGITS}

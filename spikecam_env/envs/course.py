@@ -1,0 +1,116 @@
+"""An episode without its pictures: where the camera looks, how fast it turns, and how the episode stands.
+
+A course is a value; `after(action)` is the next one, a step later.  The environment (`envs.aiming`) plays courses and
+shows what is seen on the way.  `steps_of` plays them alone: for the oracle, who looks at places only, and for tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.protocol import Gaze
+from spikecam_env.envs.episode import Episode, Standing
+from spikecam_env.envs.motor import Motor, turned
+from spikecam_env.envs.task import distance_from_middle
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What turns the camera, and when.
+
+    motor            of every axis
+    axes             2, or 1 for a camera that only pans
+    frames_per_step  frames from action to action
+    frame_rate_hz    frames a second
+    """
+
+    motor: Motor
+    axes: int
+    frames_per_step: int
+    frame_rate_hz: float
+
+    @property
+    def step_s(self) -> float:
+        """Time of a step [s]."""
+        return self.frames_per_step / self.frame_rate_hz
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """The end of a step, or of the block that reset exposes.
+
+    drive      of the camera
+    episode    that is played
+    gaze       the camera's path in the step [pixels]
+    rate_px_s  (2,) of the gaze in the step, pan and tilt
+    standing   of the episode
+    """
+
+    drive: Drive
+    episode: Episode
+    gaze: Gaze
+    rate_px_s: NDArray[np.float64]
+    standing: Standing
+
+    @classmethod
+    def begin(cls, drive: Drive, episode: Episode) -> Course:
+        """After the first block, in which the camera is at rest."""
+        gaze = Gaze((0.0, 0.0), (0.0, 0.0), (0, drive.frames_per_step))
+        return cls(drive, episode, gaze, np.zeros(2), _standing(episode, gaze, None))
+
+    def after(self, action: NDArray[np.float64]) -> Course:
+        """A step later.  action: (axes + further numbers,), in [-1, 1]."""
+        drive, motor, first = self.drive, self.drive.motor, self.standing.frame
+        stop = first + drive.frames_per_step
+        episode = self.episode.acted(tuple(float(number) for number in action[drive.axes :]), first, stop)
+        wanted = np.zeros(2)
+        wanted[: drive.axes] = action[: drive.axes] * motor.top_px_s
+        rate = motor.after(self.rate_px_s, wanted, drive.step_s)
+        gaze = turned(self.gaze.stop, rate / motor.top_px_s, motor.top_px_s / drive.frame_rate_hz, (first, stop))
+        return Course(drive, episode, gaze, rate, _standing(episode, gaze, self.standing))
+
+    @property
+    def end(self) -> bool | None:
+        """See `Episode.end`."""
+        return self.episode.end(self.standing)
+
+    @property
+    def terminated(self) -> bool:
+        """The episode is decided."""
+        return self.end is not None
+
+    @property
+    def truncated(self) -> bool:
+        """Its last step is over, and it is not decided."""
+        return self.end is None and self.standing.step >= self.episode.steps
+
+    @property
+    def is_success(self) -> bool:
+        """See `Episode.is_success`."""
+        return bool(self.episode.is_success(self.standing))
+
+    @property
+    def performance(self) -> float:
+        """See `Episode.performance`."""
+        return float(self.episode.performance(self.standing))
+
+
+def steps_of(course: Course, act: Callable[[Course], NDArray[np.float32]]) -> Iterator[Course]:
+    """The courses after each step, up to the one that is over.  act: the next action."""
+    while not (course.terminated or course.truncated):
+        course = course.after(np.clip(act(course), -1.0, 1.0).astype(np.float64))
+        yield course
+
+
+def _standing(episode: Episode, gaze: Gaze, last: Standing | None) -> Standing:
+    stop = int(gaze.frames[1])
+    place = episode.aim(stop, gaze)
+    distance = distance_from_middle(place, episode.scene.shape)
+    on = episode.is_on(stop, distance)
+    if last is None:
+        return Standing(stop, 0, place, distance, on, 0, 0)
+    return Standing(stop, last.step + 1, place, distance, on, last.steps_on + on, (last.held + 1) * on)
