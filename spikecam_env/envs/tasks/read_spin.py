@@ -13,8 +13,8 @@ from spikecam_env.envs.tasks.base import Task, View
 from spikecam_env.envs.tasks.things import background, disc_of, number_of, wander
 
 RPM = (1000.0, 2000.0, 4000.0, 8000.0)
-"""The speeds to tell apart [turns a minute]: 15 to 2 periods in a quarter of a second and less; the fastest turns by
-48 degrees in a step of 40 frames at 40 kHz."""
+"""The speeds to tell apart [turns a minute]: 4 to 33 turns in an episode of a quarter of a second; the fastest turns by
+48 degrees in a step of 40 frames at 40 kHz, about half of its bright sector."""
 SAID = 0.5
 """The largest of the action's numbers after the gaze is the answer if it is above this; else nothing is said."""
 
