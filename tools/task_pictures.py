@@ -55,7 +55,7 @@ LEGEND = (
 
 @dataclass(frozen=True)
 class Moment:
-    """seen: (H, W) uint8, the observation; target: (x, y) [pixels]; radius: of it [pixels]; near: how near to the middle
+    """seen: (H, W) uint8, the observation; target: (x, y) [pixels]; radius: of it [pixels]; near: to the middle, where
     it counts as looked at [pixels]; axes: that the camera turns about; line: what is said below."""
 
     seen: NDArray[np.uint8]

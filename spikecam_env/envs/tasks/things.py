@@ -126,4 +126,5 @@ TEXTURES: dict[str, Callable[[np.random.Generator], Texture]] = {
     "halves": halves,
     "islands": islands,
     "plain": plain,
-} | {name: partial(digit, name, TEXTURE_SIZE) for name in DIGITS}
+    **{name: partial(digit, name, TEXTURE_SIZE) for name in DIGITS},
+}
