@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,7 +41,7 @@ class Camera:
 
     def pose(self, time_s: ArrayLike) -> Pose:
         """Camera to world (..., 4, 4); it looks along its -z, y up."""
-        return self.rest() @ self.shake.pose(time_s)
+        return self._rest @ self.shake.pose(time_s)
 
     def focal(self, rows: int) -> float:
         """[pixels] for a picture of so many rows."""
@@ -48,6 +49,10 @@ class Camera:
 
     def rest(self) -> NDArray[np.float64]:
         """Camera to world (4, 4), without shake."""
+        return self._rest.copy()
+
+    @cached_property
+    def _rest(self) -> NDArray[np.float64]:
         back = np.subtract(self.position, self.target)
         back = back / np.linalg.norm(back)
         right = np.cross(self.up, back)

@@ -10,6 +10,7 @@ frame rate; lengths are in the world's unit (metres in the catalogue); y is up.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -67,8 +68,11 @@ class Still(Motion):
     turn: Vector = (0.0, 0.0, 0.0)
 
     def pose(self, time_s: ArrayLike) -> Pose:
-        rotation = Rotation.from_rotvec(np.radians(self.turn)).as_matrix()
-        return _pose(np.shape(time_s), rotation, self.position)
+        return _pose(np.shape(time_s), self._rotation, self.position)
+
+    @cached_property
+    def _rotation(self) -> NDArray[np.float64]:
+        return Rotation.from_rotvec(np.radians(self.turn)).as_matrix()
 
 
 @dataclass(frozen=True)
@@ -172,8 +176,11 @@ class Path(Motion):
         t = np.asarray(time_s, np.float64)
         first, last = self.time_s[0], self.time_s[-1]
         inside = first + (t - first) % (last - first) if self.closed else np.clip(t, first, last)
-        curve = CubicSpline(self.time_s, self.positions, bc_type="periodic" if self.closed else "natural")
-        return _pose(t.shape, np.eye(3), curve(inside))
+        return _pose(t.shape, np.eye(3), self._curve(inside))
+
+    @cached_property
+    def _curve(self) -> CubicSpline:
+        return CubicSpline(self.time_s, self.positions, bc_type="periodic" if self.closed else "natural")
 
 
 @dataclass(frozen=True)

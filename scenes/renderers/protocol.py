@@ -12,6 +12,7 @@ in camera coordinates, Z < 0, is seen at
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,6 +35,11 @@ class Surface:
     mesh: trimesh.Trimesh
     albedo: float | Array = 0.8
     emission: float = 0.0
+
+    @cached_property
+    def middle(self) -> NDArray[np.float64]:
+        """(3,) of the box about the mesh."""
+        return np.asarray(self.mesh.bounds.mean(axis=0))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Surface:
         """Itself: nothing changes a surface, and trimesh loses a mesh's given normals when it copies it."""

@@ -65,7 +65,7 @@ def places_at(spec: WorldSpec, frame: float, gaze: Gaze | None) -> dict[str, tup
     places = {}
     for number, body in enumerate(spec.bodies):
         if not (body.backdrop or isinstance(body.trajectory, Still)):
-            middle = np.append(body.surface.mesh.bounds.mean(axis=0), 1.0)
+            middle = np.append(body.surface.middle, 1.0)
             right, up, back, _ = to_camera @ spec.pose(number, float(frame)) @ middle
             away = max(-back, 1e-6)
             places[body.name] = (

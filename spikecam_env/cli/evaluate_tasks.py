@@ -18,28 +18,29 @@ MOST_EPISODES = 1000
 
 @dataclass
 class Tasks:
-    """Play the oracle, nothing and random actions at every task (docs/environments.md).
+    """Print how well an oracle, doing nothing and random actions do at every task (docs/environments.md).
 
-    Performance is 0 to 1: the share of the time on the target, or success.  A score of 0 is that of doing nothing,
-    of 1 the oracle's.  Tasks of version 1 are played on their test episodes.
+    The oracle knows where the target is, and turns the same motor.  Performance is 0 to 1: the share of the time on the
+    target, or of the episodes that succeed.  A score is 0 for doing nothing, 1 for the oracle.  Tasks of version 1 are
+    played on their test episodes.
 
     example:  spikecam evaluate tasks --tasks Track-v1 Catch-v1 --episodes 10
     """
 
     tasks: Annotated[
-        tuple[str, ...], tyro.conf.arg(metavar="ID...", help_behavior_hint="(default: all small ones)")
+        tuple[str, ...], tyro.conf.arg(metavar="ID...", help_behavior_hint="(default: every task at 64 x 64)")
     ] = ()
-    """Ids, with or without `spikecam_env/`; by default the tasks of version 1 at 64 x 64."""
+    """Which tasks or scenes to play, e.g. Track-v1 or Fan-v0."""
     scenes: bool = False
-    """Play the scenes of the catalogue too, at 64 x 64; those in space take 15 to 100 ms a step."""
+    """Play every scene of the catalogue too, at 64 x 64; a 3-D scene takes 15 to 100 ms a step."""
     episodes: Annotated[int, Checked(checked_count, most=MOST_EPISODES)] = 20
-    """Episodes of each policy."""
+    """Episodes that each policy plays; the table has their mean."""
     seed: Seed = 0
-    """Of the first episode; the next has the next."""
+    """Seed of the first episode; each further episode has the next number."""
     size: Size | None = None
-    """Rows and columns, instead of each task's."""
+    """Rows and columns of the camera; by default each task's own."""
     json: Path | None = None
-    """File for the table as JSON."""
+    """Write the table to this file too."""
 
     def run(self) -> None:
         from spikecam_env.cli.files import write_json
@@ -49,15 +50,16 @@ class Tasks:
         from spikecam_env.whole import check_file
 
         known = (*TASK_ENVIRONMENTS, *ENVIRONMENTS)
-        asked = tuple(name if "/" in name else f"spikecam_env/{name}" for name in self.tasks)
+        asked = [name if "/" in name else f"spikecam_env/{name}" for name in self.tasks] or list(SMALL_TASKS)
         for name in asked:
             if name not in known:
                 raise unknown_name("task", name.removeprefix("spikecam_env/"), (k.split("/")[1] for k in known))
         if self.json is not None:
             check_file(self.json)
-        rows = evaluate(asked or SMALL_TASKS, self.episodes, self.seed, True, **self._shape(()))
-        if self.scenes:
-            rows += evaluate(tuple(ENVIRONMENTS), self.episodes, self.seed, True, **self._shape((64, 64)))
+        scenes = tuple(ENVIRONMENTS) if self.scenes else ()
+        asked = [name for name in dict.fromkeys(asked) if name not in scenes]
+        rows = evaluate(asked, self.episodes, self.seed, True, **self._shape(()))
+        rows += evaluate(scenes, self.episodes, self.seed, self.scenes, **self._shape((64, 64)))
         print(table(rows))
         if self.json is not None:
             write_json(self.json, {"episodes": self.episodes, "seed": self.seed, "rows": rows})

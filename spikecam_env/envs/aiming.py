@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils.seeding import np_random
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.protocol import Gaze, Scene
+from spikecam_env.envs.course import Course, Drive
 from spikecam_env.envs.episode import Episode, Standing
 from spikecam_env.envs.motor import Motor, cut
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
-from spikecam_env.envs.task import REWARDS, distance_from_middle
-from spikecam_env.errors import InputError, NotReadyError, unknown_name
+from spikecam_env.envs.task import REWARDS
+from spikecam_env.errors import InputError, unknown_name
 
 OUTCOME = 10.0
 """Reward, beside the other, of a success that ends an episode; a failure that ends one takes nothing."""
@@ -65,10 +67,9 @@ class AimingEnv(SpikeCameraEnv):
         self.set_top_rate(self.max_gaze_rate_px_s)
         self.action_space = spaces.Box(-1.0, 1.0, (axes + further,), np.float32)
         self._draw_episode = draw
-        self._episode: Episode | None = None
-        self._standing: Standing | None = None
+        self._course: Course | None = None
+        self._before: Any = None  # the course as it was a step ago
         self._bare: Any = None  # the scene as it is, without what an action puts before the camera
-        self._rate = (0.0, 0.0)
 
     def set_top_rate(self, px_s: float) -> None:
         """Of the gaze [pixels/s]."""
@@ -76,23 +77,26 @@ class AimingEnv(SpikeCameraEnv):
         self.max_gaze_rate_px_s = px_s
 
     @property
+    def course(self) -> Course:
+        """Where the camera and its episode are; NotReadyError before the first reset."""
+        if self._course is None:
+            raise self._not_ready()
+        return self._course
+
+    @property
     def episode(self) -> Episode:
         """That is played; NotReadyError before the first reset."""
-        if self._episode is None:
-            raise self._not_ready()
-        return self._episode
+        return self.course.episode
 
     @property
     def standing(self) -> Standing:
         """Where the episode stands; NotReadyError before the first reset."""
-        if self._standing is None:
-            raise NotReadyError("the environment has no episode yet; call reset first")
-        return self._standing
+        return self.course.standing
 
     @property
     def step_s(self) -> float:
         """Time of a step [s]."""
-        return self.frames_per_step / self.model.frame_rate_hz
+        return self._drive.step_s
 
     @property
     def gaze(self) -> tuple[float, float]:
@@ -102,76 +106,67 @@ class AimingEnv(SpikeCameraEnv):
     @property
     def gaze_rate_px_s(self) -> NDArray[np.float64]:
         """(2,) of the last step [pixels/s]."""
-        return np.array(self._rate)
+        return np.array(self.course.rate_px_s)
+
+    def opening(self, seed: int, options: dict[str, Any] | None = None) -> Course:
+        """The beginning of the episode that `reset(seed=seed, options=options)` plays; nothing is exposed.
+
+        options: those of the task, without `model` and `light`
+        """
+        return Course.begin(self._drive, self._draw_episode(np_random(seed)[0], options or {}))
 
     def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """A new episode, with the camera at rest; see the class for the options."""
-        self._rate, self._standing = (0.0, 0.0), None
         super().begin(seed=seed, options=options)
         self._bare = self.scene
 
     def begun(self) -> tuple[NDArray[Any], dict[str, Any]]:
         """See `SpikeCameraEnv.begun`."""
         observation, info = super().begun()
-        self._standing = self._stands(None)
         return observation, info | self._of_standing()
 
     def turn(self, action: ArrayLike) -> None:
         """The motor does what it can; the other numbers go to the episode."""
-        super().turn(self._command(action))
+        self._before = self.course
+        self._course = self.course.after(self._checked_action(action))
+        self._scene, self._gaze = self.episode.through(self._bare), self.course.gaze
 
     def outcome(self) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """See the class."""
-        observation, _, _, _, info = super().outcome()
-        reward, terminated, truncated = self._assess()
-        return observation, reward, terminated, truncated, info | self._of_standing()
+        observation, info = self._shown()
+        now = self.course
+        worth = (course.episode.worth(course.standing) for course in (self._before, now))
+        reward = REWARDS[self.reward](*worth) + OUTCOME * (now.end is True)
+        return observation, reward, now.terminated, now.truncated, info | self._of_standing()
 
     def close(self) -> None:
         """See `SpikeCameraEnv.close`."""
-        self._episode = self._standing = self._bare = None
+        self._course = self._before = self._bare = None
         super().close()
 
-    def _begin(self, rng: np.random.Generator, options: dict[str, Any]) -> Scene:
-        self._episode = self._draw_episode(rng, options)
-        return self._episode.scene
+    @property
+    def _drive(self) -> Drive:
+        return Drive(self.motor, self.axes, self.frames_per_step, self.model.frame_rate_hz)
 
-    def _command(self, action: ArrayLike) -> tuple[float, float]:
-        """The rate that the motor reaches, in units of its top rate; the other numbers go to the episode."""
+    def _begin(self, rng: np.random.Generator, options: dict[str, Any]) -> Scene:
+        self._course = Course.begin(self._drive, self._draw_episode(rng, options))
+        return self.episode.scene
+
+    def _checked_action(self, action: ArrayLike) -> list[float]:
+        """In [-1, 1]: values beyond are cut."""
         given = np.asarray(action, np.float64)
-        numbers = [cut(number, 1.0) for number in given.reshape(-1).tolist()]
+        numbers = given.reshape(-1).tolist()
         if given.shape != self.action_space.shape or not all(map(isfinite, numbers)):
             raise InputError(f"action is {action!r}; it must be {_numbers(self.action_space.shape)} in [-1, 1]")
-        first, top = self.sensor.frame, self.motor.top_px_s
-        self._episode = self.episode.acted(tuple(numbers[self.axes :]), first, first + self.frames_per_step)
-        self._scene = self._episode.through(self._bare)
-        wanted = [number * top for number in numbers[: self.axes]] + [0.0] * (2 - self.axes)
-        pan, tilt = self._rate = self.motor.after(self._rate, wanted, self.step_s)
-        return pan / top, tilt / top
-
-    def _assess(self) -> tuple[float, bool, bool]:
-        """(reward, terminated, truncated) of a step."""
-        last = self.standing
-        self._standing = now = self._stands(last)
-        end = self.episode.end(now)
-        reward = REWARDS[self.reward](self.episode.worth(last), self.episode.worth(now))
-        return reward + OUTCOME * (end is True), end is not None, end is None and now.step >= self.episode.steps
-
-    def _stands(self, last: Standing | None) -> Standing:
-        stop = self.sensor.frame
-        place = self.episode.aim(stop, self._gaze)
-        distance = distance_from_middle(place, self.shape)
-        on = self.episode.is_on(stop, distance)
-        if last is None:
-            return Standing(stop, 0, place, distance, on, 0, 0)
-        return Standing(stop, last.step + 1, place, distance, on, last.steps_on + on, (last.held + 1) * on)
+        return [cut(number, 1.0) for number in numbers]
 
     def _of_standing(self) -> dict[str, Any]:
-        standing, episode = self.standing, self.episode
+        course = self.course
         return {
-            "target": np.array(standing.place),
-            "distance_px": float(standing.distance_px),
-            "is_success": bool(episode.is_success(standing)),
-            "performance": float(episode.performance(standing)),
+            "target": np.array(course.standing.place),
+            "distance_px": float(course.standing.distance_px),
+            "is_success": course.is_success,
+            "performance": course.performance,
             "gaze_rate": self.gaze_rate_px_s,
         }
 

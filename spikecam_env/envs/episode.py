@@ -37,12 +37,14 @@ class Standing:
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """scene; target: its name in `places`; success_px: how near is on it [pixels]; steps: the most there are."""
+    """scene; target: its name in `places`; success_px: how near is on it [pixels]; steps: the most there are; number:
+    of the episode, where a task numbers them."""
 
     scene: Placed
     target: str
     success_px: float
     steps: int
+    number: int = 0
 
     def aim(self, frame: float, gaze: Gaze) -> tuple[float, float]:
         """Where the target is seen, (x, y) [pixels]."""

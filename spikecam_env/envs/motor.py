@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from scenes.protocol import Gaze
 from spikecam_env.checked import checked_number
 
 
@@ -38,3 +39,10 @@ class Motor:
 def cut(value: float, most: float) -> float:
     """The value, no further from 0 than this; NaN stays."""
     return most if value > most else -most if value < -most else value
+
+
+def turned(start: tuple[float, float], rates: Sequence[float], top: float, frames: tuple[int, int]) -> Gaze:
+    """The path of a gaze.  rates: (pan, tilt) in units of `top` [pixels/frame], cut to [-1, 1] as a motor saturates."""
+    count = frames[1] - frames[0]
+    pan, tilt = (place + cut(rate, 1.0) * top * count for place, rate in zip(start, rates, strict=True))
+    return Gaze(start, (pan, tilt), (float(frames[0]), float(frames[1])))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.protocol import Gaze
-from spikecam_env.envs.aiming import AimingEnv
+from spikecam_env.envs.course import Course
 
 
 def approach(error: NDArray[np.float64], most_change: float) -> NDArray[np.float64]:
@@ -24,15 +24,14 @@ def approach(error: NDArray[np.float64], most_change: float) -> NDArray[np.float
     return np.sign(error) * np.minimum(size, 4 * size / (1 + np.sqrt(1 + 8 * size / most_change)))
 
 
-def oracle(env: AimingEnv) -> NDArray[np.float32]:
+def oracle(course: Course) -> NDArray[np.float32]:
     """The action of the next step."""
-    first, stop = env.sensor.frame, env.sensor.frame + env.frames_per_step
-    rows, columns = env.shape
-    at_rest = Gaze.fixed(*env.gaze)
-    now, then = (np.array(env.episode.aim(frame, at_rest)) for frame in (first, stop))
-    change = env.motor.most_change_px_s(env.step_s) * env.step_s
+    drive, episode, first = course.drive, course.episode, course.standing.frame
+    stop, top = first + drive.frames_per_step, drive.motor.top_px_s * drive.step_s
+    rows, columns = episode.scene.shape
+    now = np.array(course.standing.place)
+    then = np.array(episode.aim(stop, Gaze.fixed(*course.gaze.stop)))
+    change = drive.motor.most_change_px_s(drive.step_s) * drive.step_s
     move = then - now + approach(now - [(columns - 1) / 2, (rows - 1) / 2], change)
-    action = np.concatenate(
-        [(move / (env.motor.top_px_s * env.step_s))[: env.axes], env.episode.rest(env.standing, first, stop)]
-    )
+    action = np.concatenate([(move / top)[: drive.axes], episode.rest(course.standing, first, stop)])
     return np.clip(action, -1.0, 1.0).astype(np.float32)

@@ -18,9 +18,6 @@ EVERY_S = 0.005
 """From look to look [s].  What vibrates at 40 Hz and 80 shorter sides a second, the fastest of random worlds, leaves a
 straight line by a quarter of a side in it; a scene that starts over leaps by more than one."""
 
-TOP_QUANTILE = 0.99
-"""Of the target's speeds: its top speed without the instants in which a scene starts over."""
-
 
 @dataclass(frozen=True)
 class Passes:
@@ -50,7 +47,13 @@ def passes(scene: Placed, target: str, last: int) -> Passes:
         if frame and not is_inside((place[0], place[1]), scene.shape):
             cuts.append(frame - every)
         gaze = gaze + place - middle
-        velocity = seen(frame + 1, gaze) - middle
+        velocity = _slower(seen(frame + 0.5, gaze) - middle, seen(frame + 1, gaze) - middle)
         speeds.append(float(np.hypot(*velocity)))
         gaze = gaze + every * velocity
-    return Passes(float(np.quantile(speeds, TOP_QUANTILE)) * scene.frame_rate_hz, np.array(cuts, np.int64))
+    return Passes(max(speeds) * scene.frame_rate_hz, np.array(cuts, np.int64))
+
+
+def _slower(half: NDArray[np.float64], whole: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Velocity [pixels/frame] from the ways in half a frame and in a whole one; where a scene starts over within the
+    frame, one of its halves is free of the leap."""
+    return 2 * min(half, whole - half, key=lambda way: float(np.hypot(*way)))

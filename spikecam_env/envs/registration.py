@@ -41,7 +41,7 @@ ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
 MAX_EPISODE_STEPS = 500
 """Half a second at 40 frames a step and 40 kHz."""
 
-TASK_NAMES = ("Track", "Saccade", "Catch", "ReadSpin", "LowLight", "Exposure")
+TASK_NAMES = ("Track", "Saccade", "Catch", "ReadSpin", "ReadDigit", "LowLight", "Exposure")
 """As of `envs.tasks.TASKS`, which is not imported here: `import spikecam_env` registers, and imports nothing else."""
 
 FULL_SHAPE = (250, 400)

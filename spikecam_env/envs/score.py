@@ -27,7 +27,7 @@ Policy = Callable[[Any, AimingEnv], ArrayLike]
 
 def act_oracle(observation: Any, env: AimingEnv) -> ArrayLike:
     """See `envs.oracle`."""
-    return oracle(env)
+    return oracle(env.course)
 
 
 def act_nothing(observation: Any, env: AimingEnv) -> ArrayLike:

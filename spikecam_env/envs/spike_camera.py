@@ -17,7 +17,7 @@ from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
 from spikecam_env.checked import checked_number, checked_shape
-from spikecam_env.envs.motor import cut
+from spikecam_env.envs.motor import turned
 from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
@@ -157,13 +157,11 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def turn(self, action: ArrayLike) -> None:
         """What `step` does before the block is exposed: the camera's path is set."""
         given = np.asarray(action, np.float64)
-        rates = [cut(rate, 1.0) for rate in given.reshape(-1).tolist()]
+        rates = given.reshape(-1).tolist()
         if given.shape != (2,) or not all(map(isfinite, rates)):
             raise InputError(f"action is {action!r}; it must be two finite numbers in [-1, 1], (pan, tilt)")
-        top, frames = self.max_gaze_rate_px_s / self.model.frame_rate_hz, self.frames_per_step
-        pan, tilt = (place + rate * top * frames for place, rate in zip(self._position, rates, strict=True))
-        first = float(self.sensor.frame)
-        self._gaze = Gaze(self._position, (pan, tilt), (first, first + frames))
+        frames = self.sensor.frame, self.sensor.frame + self.frames_per_step
+        self._gaze = turned(self._position, rates, self.max_gaze_rate_px_s / self.model.frame_rate_hz, frames)
 
     def outcome(self) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """What `step` returns, once the block is exposed."""

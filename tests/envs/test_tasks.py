@@ -12,10 +12,13 @@ import pytest
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import spikecam_env.envs  # noqa: F401
-from spikecam_env.envs.oracle import approach
+from spikecam_env.envs.course import steps_of
+from spikecam_env.envs.oracle import approach, oracle
 from spikecam_env.envs.registration import SMALL_TASKS, TASK_ENVIRONMENTS, TASK_NAMES
 from spikecam_env.envs.score import BASELINES, play, score
 from spikecam_env.envs.tasks import TASKS
+from spikecam_env.envs.tasks.digits import digit
+from spikecam_env.envs.tasks.things import TEST_PICTURES, TRAIN_PICTURES
 from spikecam_env.errors import InputError
 
 
@@ -80,3 +83,31 @@ def test_approach_stops_on_the_target() -> None:
 
 def test_score_is_zero_for_nothing_and_one_for_the_oracle() -> None:
     assert score(0.2, 0.2, 0.9) == 0.0 and score(0.9, 0.2, 0.9) == 1.0 and np.isnan(score(0.5, 0.5, 0.5))
+
+
+def test_a_digit_is_told_from_its_head_stand_and_test_digits_are_new() -> None:
+    """6 and 9 differ however they are turned: the bar is below.  No test picture is one of training."""
+
+    def picture(name: str, number: int) -> Any:
+        return digit(name, 64, np.random.default_rng([number, 2]))
+
+    for number in (0, 70):
+        assert np.abs(picture("6", number) - picture("9", number)[::-1, ::-1]).mean() > 0.05
+    trained = np.stack([picture("3", number) for number in TRAIN_PICTURES])
+    unlike = [np.abs(trained - picture("3", number)).mean(axis=(1, 2)).min() for number in TEST_PICTURES]
+    print(f"least mean difference {min(unlike):.4f}")
+    assert min(unlike) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["ReadSpin", "ReadDigit"])
+def test_an_answer_ends_the_episode_and_is_right_only_while_the_disc_is_looked_at(name: str) -> None:
+    env: Any = gymnasium.make(f"spikecam_env/{name}-v1").unwrapped
+    begun = env.opening(0)
+    right = np.zeros(env.action_space.shape)
+    right[2 + begun.episode.truth] = 1.0
+    early = begun.after(right)
+    assert early.terminated and not early.is_success
+    *before, end = steps_of(begun, oracle)
+    assert end.is_success and end.performance == 1 - end.standing.step / end.episode.steps
+    wrong = before[-1].after(np.roll(right, 1) if begun.episode.truth < env.task.further - 1 else np.roll(right, -1))
+    assert wrong.standing.on_target and wrong.terminated and not wrong.is_success

@@ -9,6 +9,7 @@ from spikecam_env.envs.tasks.base import Task
 from spikecam_env.envs.tasks.catch import Catch
 from spikecam_env.envs.tasks.exposure import Exposure
 from spikecam_env.envs.tasks.low_light import LowLight
+from spikecam_env.envs.tasks.read_digit import ReadDigit
 from spikecam_env.envs.tasks.read_spin import ReadSpin
 from spikecam_env.envs.tasks.saccade import Saccade
 from spikecam_env.envs.tasks.track import Track
@@ -18,6 +19,7 @@ TASKS: dict[str, type[Task]] = {
     "Saccade": Saccade,
     "Catch": Catch,
     "ReadSpin": ReadSpin,
+    "ReadDigit": ReadDigit,
     "LowLight": LowLight,
     "Exposure": Exposure,
 }

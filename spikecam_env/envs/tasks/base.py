@@ -59,6 +59,12 @@ class Task:
     rise_s        of the motor, from rest to it [s]
     duration_s    of an episode at most [s]
     success_side  how near to the middle the target counts as looked at [shorter sides]
+
+    frames_per_step  from action to action
+    axes             that the camera turns about: pan and tilt, or pan alone
+    further          numbers of the action after those
+    stream           of random numbers: tasks that begin their draws with the same thing have different ones, so that
+                     none is tested on what another is trained on
     """
 
     top_sides_s: float = 10.0
@@ -69,6 +75,7 @@ class Task:
     frames_per_step: ClassVar[int] = 40
     axes: ClassVar[int] = 2
     further: ClassVar[int] = 0
+    stream: ClassVar[int] = 0
 
     def draw(self, rng: np.random.Generator, view: View) -> Episode:
         """An episode; everything in it follows from the generator."""

@@ -20,9 +20,10 @@ from spikecam_env.envs.tasks.things import BRIGHT, background, disc_of, number_o
 
 @dataclass(frozen=True)
 class Catch(Task):
-    """crossing_s: earliest and latest [s]; paddle: half its width [shorter sides], `success_side`; away: nearest that
-    the ball crosses from where the paddle begins, and farthest, which is less where the motor cannot be in time;
-    start, line: rows where the ball is first seen and where the line is; radius [shorter sides]."""
+    """crossing_s: earliest and latest [s]; paddle: half its width, `success_side`; away: nearest that the ball crosses
+    from where the paddle begins, and farthest, which is less where the motor cannot be in time; radius: of the ball;
+    start, line: rows where it is first seen and where the line is; spread: most that it is first seen beside the
+    middle.  All but the first in shorter sides."""
 
     top_sides_s: float = 100.0
     rise_s: float = 0.002
@@ -33,6 +34,7 @@ class Catch(Task):
     radius: float = 1 / 16
     start: float = 0.1
     line: float = 0.85
+    spread: float = 0.2
 
     frames_per_step: ClassVar[int] = 20
     axes: ClassVar[int] = 1
@@ -42,14 +44,14 @@ class Catch(Task):
         seconds = rng.uniform(*self.crossing_s)
         away = min(self.away[1], self.reach(seconds - REACTION_S))
         to = view.middle[0] + rng.choice([-1.0, 1.0]) * view.side * rng.uniform(self.away[0], max(away, self.away[0]))
-        begin = np.array([view.middle[0] + view.side * rng.uniform(-0.2, 0.2), self.start * view.side])
+        begin = np.array([view.middle[0] + view.side * rng.uniform(-self.spread, self.spread), self.start * view.side])
         crossing = np.array([to, self.line * view.side])
         frames = view.frames(seconds) + view.frames_per_step  # the first block is reset's
         path = Path.straight((float(begin[0]), float(begin[1])), tuple((crossing - begin) / frames), 2 * frames)
         ball = disc_of("plain", number_of(rng, view), self.radius * view.side, path)
         tile = background(number_of(rng, view), view.shape).copy()
-        row, width = int(self.line * view.side), max(1, int(view.side / 64))
-        tile[row : row + width] = BRIGHT
+        row = int(self.line * view.side)
+        tile[row : row + max(1, int(LINE_SIDES * view.side))] = BRIGHT
         scene = Discs(view.shape, view.frame_rate_hz, tile, {"ball": ball})
         return Meeting(scene, "ball", **self.common(view), crossing=(float(crossing[0]), frames))
 
@@ -60,7 +62,10 @@ class Catch(Task):
 
 
 REACTION_S = 0.0025
-"""Time that an agent has to see where the ball goes, at least [s]: five steps."""
+"""Time that an agent has to see where the ball goes, at least [s]: five steps, in which the slowest ball moves by one
+to two of its radii."""
+LINE_SIDES = 1 / 64
+"""Thickness of the line [shorter sides]: a row of 64 x 64 pixels."""
 
 
 @dataclass(frozen=True, eq=False)

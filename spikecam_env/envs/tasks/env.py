@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -61,7 +62,6 @@ class TaskEnv(AimingEnv):
             max_gaze_rate_px_s=top if max_gaze_rate_px_s is None else max_gaze_rate_px_s,
             **camera,
         )
-        self._number = 0
 
     def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Episode:
         for name in options:
@@ -69,14 +69,15 @@ class TaskEnv(AimingEnv):
                 raise unknown_name("option of reset", name, ("split", "episode"))
         numbers, pictures = SPLITS[_split(options.get("split", self.split))]
         drawn = int(rng.integers(numbers.start, numbers.stop))
-        self._number = checked_whole(options.get("episode", drawn), "episode", 0, SPLITS["test"][0].stop - 1)
+        number = checked_whole(options.get("episode", drawn), "episode", 0, SPLITS["test"][0].stop - 1)
         if "episode" in options:
-            pictures = next(pictures for numbers, pictures in SPLITS.values() if self._number in numbers)
+            pictures = next(pictures for numbers, pictures in SPLITS.values() if number in numbers)
         view = View(self.shape, self.model.frame_rate_hz, self.frames_per_step, pictures)
-        return self.task.draw(np.random.default_rng(self._number), view)
+        episode = self.task.draw(np.random.default_rng([number, self.task.stream]), view)
+        return replace(episode, number=number)
 
     def _of_standing(self) -> dict[str, Any]:
-        return super()._of_standing() | {"episode": self._number}
+        return super()._of_standing() | {"episode": self.episode.number}
 
 
 def _task(task: str | Task) -> Task:

@@ -32,6 +32,7 @@ class Exposure(Track):
     tolerance: float = 2.0
 
     further: ClassVar[int] = 1
+    stream: ClassVar[int] = 2
 
     def draw(self, rng: np.random.Generator, view: View) -> Episode:
         """See `Task.draw`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,6 +19,8 @@ class LowLight(Track):
     """mean_interval: shortest and longest of an episode [frames]; drawn evenly in its logarithm."""
 
     mean_interval: tuple[float, float] = (20.0, 200.0)
+
+    stream: ClassVar[int] = 1
 
     def draw(self, rng: np.random.Generator, view: View) -> Episode:
         """See `Task.draw`."""

@@ -13,8 +13,8 @@ from spikecam_env.envs.tasks.base import Task, View
 from spikecam_env.envs.tasks.things import background, disc_of, number_of, wander
 
 RPM = (1000.0, 2000.0, 4000.0, 8000.0)
-"""The speeds to tell apart [turns a minute]: 15 to 2 periods in a quarter of a second and less; the fastest turns by
-48 degrees in a step of 40 frames at 40 kHz."""
+"""The speeds to tell apart [turns a minute]: 4 to 33 turns in an episode of a quarter of a second; the fastest turns by
+48 degrees in a step of 40 frames at 40 kHz, about half of its bright sector."""
 SAID = 0.5
 """The largest of the action's numbers after the gaze is the answer if it is above this; else nothing is said."""
 
@@ -30,22 +30,30 @@ class ReadSpin(Task):
     room: float = 0.6
 
     further: ClassVar[int] = len(RPM)
+    stream: ClassVar[int] = 3
 
     def draw(self, rng: np.random.Generator, view: View) -> Episode:
         """See `Task.draw`."""
         speed = self.top_sides_s * rng.uniform(*self.speed)
         path = wander(rng, view, view.beside_middle(rng, *self.start), speed, self.duration_s, self.room)
-        truth, angle = int(rng.integers(len(RPM))), float(rng.uniform(0, 2 * np.pi))
-        disc = disc_of("sectors", number_of(rng, view), self.radius * view.side, path, RPM[truth], angle)
+        truth, angle = int(rng.integers(self.further)), float(rng.uniform(0, 2 * np.pi))
+        texture, rpm = self.shown(rng, truth)
+        disc = disc_of(texture, number_of(rng, view), self.radius * view.side, path, rpm, angle)
         scene = Discs(view.shape, view.frame_rate_hz, background(number_of(rng, view), view.shape), {"disc": disc})
-        return Reading(scene, "disc", **self.common(view), truth=truth)
+        return Reading(scene, "disc", **self.common(view), truth=truth, answers=self.further)
+
+    def shown(self, rng: np.random.Generator, truth: int) -> tuple[str, float]:
+        """(texture, turns a minute) of the disc whose answer is number `truth`."""
+        return "sectors", RPM[truth]
 
 
 @dataclass(frozen=True, eq=False)
 class Reading(Episode):
-    """truth: number of its speed in RPM; answer: the agent's, None as long as it says nothing."""
+    """truth: number of the right answer; answers: how many there are; answer: the agent's, None as long as it says
+    nothing."""
 
     truth: int = 0
+    answers: int = len(RPM)
     answer: int | None = None
 
     def acted(self, rest: tuple[float, ...], first: int, stop: int) -> Reading:
@@ -55,7 +63,7 @@ class Reading(Episode):
 
     def rest(self, standing: Standing, first: int, stop: int) -> tuple[float, ...]:
         """The right answer, when the disc is looked at; silence before."""
-        return tuple(float(standing.on_target and number == self.truth) for number in range(len(RPM)))
+        return tuple(float(standing.on_target and number == self.truth) for number in range(self.answers))
 
     def end(self, standing: Standing) -> bool | None:
         """An answer ends it; it is right only while the disc is looked at."""

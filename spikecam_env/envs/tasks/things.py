@@ -6,7 +6,7 @@ A texture has a number; its light follows from the number, so that train and tes
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import cv2
 import numpy as np
@@ -17,12 +17,17 @@ from scenes.drawing import Canvas
 from scenes.painted_disk import Texels, prefiltered
 from scenes.textures import Texture, blobs, fractal_noise
 from spikecam_env.envs.tasks.base import View
+from spikecam_env.envs.tasks.digits import DIGITS, digit
 
 DARK, BRIGHT = 0.05, 0.6
 """Radiance of texture values 0 and 1, as of the rotating disk: mean intervals of 20 and 1.7 frames."""
 BACKGROUND = (0.05, 0.2)
 """Radiance of the background: darker than the discs, whose texture is half bright."""
 TEXTURE_SIZE = 128
+"""Texels of a texture's side: one a pixel, on the largest disc (`ReadDigit`) at 250 x 400."""
+BLUR_PX = 1.5
+"""Standard deviation of the blur of the background [pixels]: what is left is wider than a pixel, so that it moves
+smoothly."""
 TRAIN_PICTURES, TEST_PICTURES = range(64), range(64, 128)
 """Numbers of textures: no texture of a test is seen in training."""
 
@@ -41,7 +46,7 @@ def number_of(rng: np.random.Generator, view: View) -> int:
 def background(number: int, shape: tuple[int, int]) -> NDArray[np.float32]:
     """A tile of soft noise, larger than the picture on each side."""
     rng = np.random.default_rng([number, 1])
-    noise = cv2.GaussianBlur(fractal_noise(rng, 2 * (max(shape) // 2) + 64), (0, 0), 1.5)
+    noise = cv2.GaussianBlur(fractal_noise(rng, 2 * (max(shape) // 2) + 64), (0, 0), BLUR_PX)
     return np.asarray(BACKGROUND[0] + (BACKGROUND[1] - BACKGROUND[0]) * noise, np.float32)
 
 
@@ -121,4 +126,5 @@ TEXTURES: dict[str, Callable[[np.random.Generator], Texture]] = {
     "halves": halves,
     "islands": islands,
     "plain": plain,
+    **{name: partial(digit, name, TEXTURE_SIZE) for name in DIGITS},
 }
