@@ -581,3 +581,13 @@ def test_every_number_of_every_task_is_in_the_table() -> None:
         for field in fields(kind):
             if kind is Track or field.default != getattr(parent, field.name, None):
                 assert (kind, field.name) in there, (kind.__name__, field.name)
+
+
+def test_every_constant_of_their_modules_is_in_the_table() -> None:
+    """Numbers and ranges; fonts are no quantity, and the length of an episode is `registration`'s."""
+    there = {n.name.split(".")[0] for n in NUMBERS} | {"FONTS", "MAX_EPISODE_STEPS", "FULL_SHAPE"}
+    for module in (aiming, passes, scene, task, catch, digits, exposure, read_spin, things):
+        for name, value in vars(module).items():
+            numbers = value if isinstance(value, tuple) else (value,)
+            if name.isupper() and all(isinstance(each, int | float) for each in numbers):
+                assert name in there, (module.__name__, name)
