@@ -106,7 +106,7 @@ class AimingEnv(SpikeCameraEnv):
         """(2,) of the last step [pixels/s]."""
         return self.course.rate_px_s.copy()
 
-    def begun(self, seed: int, options: dict[str, Any] | None = None) -> Course:
+    def opening(self, seed: int, options: dict[str, Any] | None = None) -> Course:
         """The beginning of the episode that `reset(seed=seed, options=options)` plays; nothing is exposed.
 
         options: those of the task, without `model` and `light`

@@ -25,7 +25,7 @@ def nothing(course: Course) -> Any:
 @pytest.mark.parametrize("name", ["spikecam_env/Saccade-v1", "spikecam_env/Exposure-v1"])
 def test_a_course_is_the_episode_that_the_environment_plays(name: str) -> None:
     env: Any = gymnasium.make(name, split="test").unwrapped
-    courses = list(steps_of(env.begun(4), oracle))
+    courses = list(steps_of(env.opening(4), oracle))
     env.reset(seed=4)
     for course in courses:
         *_, terminated, truncated, info = env.step(oracle(env.course))
@@ -40,7 +40,7 @@ def test_the_oracle_follows_every_scene_and_doing_nothing_does_not(name: str) ->
     env: Any = gymnasium.make(name, shape=(64, 64)).unwrapped
     best, rest = [], []
     for seed in SEEDS:
-        begun = env.begun(seed)
+        begun = env.opening(seed)
         (x, y), ends = begun.standing.place, [list(steps_of(begun, policy)) for policy in (oracle, nothing)]
         assert 0 <= x <= 63 and 0 <= y <= 63 and min(map(len, ends)) > 3
         best.append(ends[0][-1].performance)
@@ -54,7 +54,7 @@ def test_no_task_plays_the_paths_of_another() -> None:
     ways = {}
     for name in TASK_NAMES:
         env: Any = gymnasium.make(f"spikecam_env/{name}-v1").unwrapped
-        begun = env.begun(0, {"episode": 7})
+        begun = env.opening(0, {"episode": 7})
         places = [np.array(begun.episode.scene.places(40.0 * step)[begun.episode.target]) for step in range(12)]
         ways[name] = np.diff(places, axis=0) / np.linalg.norm(np.diff(places, axis=0), axis=1, keepdims=True)
     for one, other in combinations(TASK_NAMES, 2):
@@ -64,5 +64,5 @@ def test_no_task_plays_the_paths_of_another() -> None:
 def test_an_episode_follows_from_its_number_alone() -> None:
     for name in SMALL_TASKS:
         env: Any = gymnasium.make(name).unwrapped
-        one, same, other = (env.begun(seed, {"episode": number}) for seed, number in ((0, 5), (1, 5), (0, 6)))
+        one, same, other = (env.opening(seed, {"episode": number}) for seed, number in ((0, 5), (1, 5), (0, 6)))
         assert one.standing == same.standing != other.standing and other.episode.number == 6

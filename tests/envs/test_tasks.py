@@ -102,7 +102,7 @@ def test_a_digit_is_told_from_its_head_stand_and_test_digits_are_new() -> None:
 @pytest.mark.parametrize("name", ["ReadSpin", "ReadDigit"])
 def test_an_answer_ends_the_episode_and_is_right_only_while_the_disc_is_looked_at(name: str) -> None:
     env: Any = gymnasium.make(f"spikecam_env/{name}-v1").unwrapped
-    begun = env.begun(0)
+    begun = env.opening(0)
     right = np.zeros(env.action_space.shape)
     right[2 + begun.episode.truth] = 1.0
     early = begun.after(right)
