@@ -105,7 +105,7 @@ def _moment(env: TaskEnv, seen: NDArray[np.uint8]) -> Moment:
     if isinstance(episode, Lit):
         said.append(f"iris {10 ** episode.iris.values[1]:.2g} x")
     if isinstance(episode, Reading) and episode.answer is not None:
-        said.append(str(episode.answer) if task.further == len(DIGITS) else f"{RPM[episode.answer]:.0f} rpm")
+        said.append(f"a {episode.answer}" if task.further == len(DIGITS) else f"{RPM[episode.answer]:.0f} rpm")
     if course.end:
         said.append("success")
     return Moment(seen, target, task.radius * min(env.shape), episode.success_px, env.axes, ", ".join(said))

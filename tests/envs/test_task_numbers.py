@@ -275,6 +275,11 @@ def dark_spikes(_: Any) -> float:
     return things.DARK * Track.frames_per_step
 
 
+def steps_to_cross(_: Any) -> float:
+    """The earliest ball is in view for ten steps or more, fewer than twenty."""
+    return Catch().crossing_s[0] * RATE_HZ / Catch.frames_per_step
+
+
 def dark_background(_: Any) -> float:
     """So does one of the background."""
     return things.BACKGROUND[0] * Track.frames_per_step
@@ -429,6 +434,18 @@ def rounds(_: Any) -> float:
     return scene.LATEST_START / float(np.diff(passes_of("car")[1].cuts).mean())
 
 
+@lru_cache
+def fastest_world() -> float:
+    """Top speed of the target of the fastest of twelve random worlds [shorter sides/s]."""
+    worlds: list[Any] = [unexposed_scene("random", (SIDE, SIDE), seed, RATE_HZ) for seed in range(12)]
+    return max(passes.passes(world, next(iter(world.places(0.0))), 20_000).top_px_s for world in worlds) / SIDE
+
+
+def over_worlds(_: Any) -> float:
+    """No random world of twelve is faster than all are taken for, and the fastest has more than half of that."""
+    return scene.RANDOM_TOP / fastest_world()
+
+
 def test_top_speed_has_no_leap_in_it() -> None:
     """A ball that is thrown again after 0.13 s, as `scenes.catalogue.ball`: some 40 sides a second."""
     top = passes_of("ball")[1].top_px_s / SIDE
@@ -438,16 +455,16 @@ def test_top_speed_has_no_leap_in_it() -> None:
 
 @dataclass(frozen=True)
 class Number:
-    """owner: a task, or the module of a constant; name: of the number, `.0` or `.1` the end of a range."""
+    """owner: a task, or the class or module of a constant; name: of the number, `.0` or `.1` the end of a range."""
 
-    owner: Task | ModuleType
+    owner: Task | type[Task] | ModuleType
     name: str
     quantity: Callable[[Any], float]
     least: float
     most: float
 
     def __str__(self) -> str:
-        owner = self.owner.__name__ if isinstance(self.owner, ModuleType) else type(self.owner).__name__
+        owner = type(self.owner).__name__ if isinstance(self.owner, Task) else self.owner.__name__
         return f"{owner.rsplit('.', 1)[-1]}.{self.name}"
 
     def measured(self, factor: float, monkeypatch: pytest.MonkeyPatch) -> float:
@@ -513,6 +530,8 @@ NUMBERS = (
     Number(X, "tolerance", exposed_by_chance, 0.1, 0.2),
     Number(L, "mean_interval.0", shortest_interval, 18, 30),
     Number(L, "mean_interval.1", longest_interval, 140, 220),
+    Number(Task, "frames_per_step", dark_spikes, 1.5, 3),
+    Number(Catch, "frames_per_step", steps_to_cross, 9, 19),
     Number(catch, "REACTION_S", seen_to_move, 1, 2),
     Number(catch, "LINE_SIDES", rows_of_line, 3, 5),
     Number(exposure, "IRIS_BEYOND", room_for_error, 1, 2.5),
@@ -539,6 +558,7 @@ NUMBERS = (
     Number(scene, "SLOWEST_GAZE", over_drift, 4, 8),
     Number(scene, "FASTEST_TARGET", beside, 4, 8),
     Number(scene, "GAZE_OVER_TARGET", pace, 0.8, 1.25),
+    Number(scene, "RANDOM_TOP", over_worlds, 1, 2),
     Number(scene, "LEAST_STEPS", moments_of_dice, 0.1, 0.35),
     Number(scene, "_STARTS", no_good_moment, 0.01, 0.1),
     Number(scene, "LATEST_START", rounds, 1.5, 3),
@@ -561,3 +581,13 @@ def test_every_number_of_every_task_is_in_the_table() -> None:
         for field in fields(kind):
             if kind is Track or field.default != getattr(parent, field.name, None):
                 assert (kind, field.name) in there, (kind.__name__, field.name)
+
+
+def test_every_constant_of_their_modules_is_in_the_table() -> None:
+    """Numbers and ranges; fonts are no quantity, and the length of an episode is `registration`'s."""
+    there = {n.name.split(".")[0] for n in NUMBERS} | {"FONTS", "MAX_EPISODE_STEPS", "FULL_SHAPE"}
+    for module in (aiming, passes, scene, task, catch, digits, exposure, read_spin, things):
+        for name, value in vars(module).items():
+            numbers = value if isinstance(value, tuple) else (value,)
+            if name.isupper() and all(isinstance(each, int | float) for each in numbers):
+                assert name in there, (module.__name__, name)
