@@ -1,7 +1,8 @@
 """What holds for all tests.
 
 Two processes that test have a core each, so BLAS and torch take one thread in each, and in what these start: a second
-one that waits spins, on the other's core.  A solve of 128 equations then takes 30 times the processor time.
+one that waits spins, on the other's core.  A solve of 128 equations then takes 27 times the processor time, on two busy
+cores.
 
 Files with slow tests come first: two processes that take file after file end together, not one with a long file last.
 """
