@@ -22,6 +22,7 @@ from spikecam_env.cli.export import Export
 from spikecam_env.cli.film_to_spikes import FilmToSpikes
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.options import check_options
+from spikecam_env.cli.play import Play
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
@@ -44,6 +45,7 @@ COMMANDS: dict[str, Any] = {
     "record": Record,
     "film": FilmToSpikes,
     "scenes": Scenes,
+    "play": Play,
     "dataset": Dataset,
     "export": Export,
     "denoise": Denoise,

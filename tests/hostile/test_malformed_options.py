@@ -89,6 +89,19 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--film": ("{here}/x.avi", "{here}/x"),
         },
     ),
+    "play": (
+        ("play", "Catch-v1", "--film", "{out}.mp4", "--size", 16, 16),
+        {
+            "--policy": ("", "oracl", "\x00", "keyboard", "{here}/none.pt", "{here}/a.dat"),
+            "--film": ("{here}/x.avi", "{here}/x", "{here}/none/x.mp4"),
+            "--episodes": (*COUNTS, 1001),
+            "--slow": (*FLOATS, "0.5", "1e5"),
+            "--seed": SEEDS,
+            "--size": SIZES,
+            "--model": ("scs", "", "{here}/none.toml"),
+        },
+    ),
+    "play ID": (("play", "--film", "{out}.mp4"), {"": ("Cath-v1", "\x00", "x" * 1000, "spikecam_env/", "CartPole-v1")}),
     "campaign simulate": (
         ("campaign", "simulate", "{out}", "--shape", 8, 8, "--frames", 2),
         {

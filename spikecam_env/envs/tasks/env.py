@@ -33,7 +33,7 @@ class TaskEnv(AimingEnv):
 
     Options of reset: split, as above, for this episode; episode, its number, instead of one drawn from the split.
     The camera's unit and noise follow from the seed, not from the number.
-    Info: episode, its number.
+    Info: episode_number; `episode` would be in the way of wrappers and learners, which keep statistics under that name.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class TaskEnv(AimingEnv):
         return self.task.draw(np.random.default_rng(self._number), view)
 
     def _of_standing(self) -> dict[str, Any]:
-        return super()._of_standing() | {"episode": self._number}
+        return super()._of_standing() | {"episode_number": self._number}
 
 
 def _task(task: str | Task) -> Task:
