@@ -26,6 +26,7 @@ from spikecam_env.cli.play import Play
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
+from spikecam_env.cli.view import View
 from spikecam_env.cli.warned import warnings_as_lines
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import Stopped
@@ -46,6 +47,7 @@ COMMANDS: dict[str, Any] = {
     "film": FilmToSpikes,
     "scenes": Scenes,
     "play": Play,
+    "view": View,
     "dataset": Dataset,
     "export": Export,
     "denoise": Denoise,
