@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +92,7 @@ class _Planes:
     def __init__(self) -> None:
         from denoiser import OnlineDnSS
 
-        self._online = OnlineDnSS.pretrained("best", output="rate")
+        self._online: Any = OnlineDnSS.pretrained("best", output="rate")
         self._middles: deque[int] = deque()
         self._ready: int | None = None
 

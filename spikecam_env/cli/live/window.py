@@ -24,8 +24,9 @@ class Window:
 
         rows, columns = picture.shape[:2]
         with plt.rc_context({"toolbar": "None"}):
-            self._figure: Any = plt.figure(title, figsize=(columns / DPI, rows / DPI), dpi=DPI)
-        self._figure.set_facecolor(tuple(level / 255 for level in BACKGROUND))
+            figure: Any = plt.figure(title, figsize=(columns / DPI, rows / DPI), dpi=DPI)
+        self._figure = figure
+        self._figure.set_facecolor("#{:02x}{:02x}{:02x}".format(*BACKGROUND))
         self.held = held
         self.pressed: list[str] = []
         self.closed = False
@@ -33,7 +34,7 @@ class Window:
         axes = self._figure.add_axes((0, 0, 1, 1))
         axes.set_axis_off()
         self._image = axes.imshow(picture, interpolation="nearest", aspect="equal")
-        canvas = self._figure.canvas
+        canvas: Any = self._figure.canvas
         if canvas.manager is not None:
             canvas.mpl_disconnect(canvas.manager.key_press_handler_id)  # its own keys: s saves, q quits
         canvas.mpl_connect("key_press_event", self._press)
