@@ -24,10 +24,12 @@ from spikecam_env.cli.film_to_spikes import FilmToSpikes
 from spikecam_env.cli.first_words import START, check_words
 from spikecam_env.cli.ladder import Ladder
 from spikecam_env.cli.options import check_options
+from spikecam_env.cli.play import Play
 from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
 from spikecam_env.cli.train_agent import TrainAgent
+from spikecam_env.cli.view import View
 from spikecam_env.cli.warned import warnings_as_lines
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import Stopped
@@ -47,6 +49,8 @@ COMMANDS: dict[str, Any] = {
     "record": Record,
     "film": FilmToSpikes,
     "scenes": Scenes,
+    "play": Play,
+    "view": View,
     "dataset": Dataset,
     "export": Export,
     "denoise": Denoise,

@@ -38,7 +38,7 @@ def display(radiance: NDArray[np.floating], white: float) -> NDArray[np.uint8]:
 def compose(panels: Sequence[Panel], white: float, corner: str = "") -> NDArray[np.uint8]:
     """Panels in a row with captions, and a line in the lower right corner; (rows, columns, 3) uint8, even sizes."""
     height, width = panels[0].picture.shape
-    scale = max(1, round(300 / width))
+    scale = panel_scale(width)
     h, w = height * scale, width * scale
     canvas = Image.new("RGB", (len(panels) * (w + MARGIN) + MARGIN, h + 2 * MARGIN + CAPTION + 26), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
@@ -46,13 +46,18 @@ def compose(panels: Sequence[Panel], white: float, corner: str = "") -> NDArray[
         x = MARGIN + i * (w + MARGIN)
         picture = Image.fromarray(display(panel.picture, white)).resize((w, h), Image.Resampling.NEAREST)
         canvas.paste(picture.convert("RGB"), (x, MARGIN))
-        draw.text((x, MARGIN + h + 6), panel.title, INK, _font(16))
-        draw.text((x, MARGIN + h + 28), _shortened(panel.line, w, _font(14)), FAINT, _font(14))
+        draw.text((x, MARGIN + h + 6), panel.title, INK, font(16))
+        draw.text((x, MARGIN + h + 28), _shortened(panel.line, w, font(14)), FAINT, font(14))
     if corner:
         right, low = canvas.size[0] - MARGIN, canvas.size[1] - 8
-        draw.text((right, low), corner, INK, _font(14), anchor="rd")
+        draw.text((right, low), corner, INK, font(14), anchor="rd")
     even = canvas.crop((0, 0, canvas.size[0] // 2 * 2, canvas.size[1] // 2 * 2))
     return np.asarray(even)
+
+
+def panel_scale(width: int) -> int:
+    """How many pixels of the panel a pixel of a picture so wide takes, each way."""
+    return max(1, round(300 / width))
 
 
 def sheet(panels: Sequence[Panel], columns: int) -> NDArray[np.uint8]:
@@ -112,5 +117,6 @@ def _shortened(text: str, width: int, font: ImageFont.FreeTypeFont) -> str:
 
 
 @lru_cache(maxsize=8)
-def _font(size: int) -> ImageFont.FreeTypeFont:
+def font(size: int) -> ImageFont.FreeTypeFont:
+    """The captions' font."""
     return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), size)

@@ -72,14 +72,6 @@ def test_check_env_is_clean_for_every_id(name: str) -> None:
     checked(name, obs=OF_IDS[name])
 
 
-@pytest.mark.parametrize("obs", ["spikes", "tfp"])
-def test_stable_baselines_takes_the_observations(obs: str) -> None:
-    checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        checker.check_env(gymnasium.make(DISK, **{**SMALL, "shape": (36, 36)}, obs=obs))
-
-
 def test_names_give_the_same_stream() -> None:
     def first(obs: str) -> Any:
         return gymnasium.make(DISK, **SMALL, obs=obs).reset(seed=4)[0]

@@ -66,8 +66,9 @@ def test_every_task_has_its_ids() -> None:
 
 def test_splits_share_no_episode_and_no_other_option_is_taken() -> None:
     env: Any = gymnasium.make("spikecam_env/Track-v1")
-    assert env.reset(seed=0)[1]["episode"] < 1_000_000 <= env.reset(options={"split": "test"})[1]["episode"]
-    assert env.reset(options={"episode": 7})[1]["episode"] == 7
+    of_training, of_tests = env.reset(seed=0)[1], env.reset(options={"split": "test"})[1]
+    assert of_training["episode_number"] < 1_000_000 <= of_tests["episode_number"]
+    assert env.reset(options={"episode": 7})[1]["episode_number"] == 7
     with pytest.raises(InputError, match="unknown option of reset"):
         env.reset(options={"number": 7})
     with pytest.raises(InputError, match="unknown split"):

@@ -117,6 +117,8 @@ TRUTH: Work = {
     "denoiser.evaluate.truth:report": lambda _: "figures\n" * 200,
 }
 TASKS: Work = {"spikecam_env.envs.score:evaluate": lambda *_, **__: [{"task": "x" * 9000}]}
+PLAYED: Work = {"spikecam_env.cli.live.filming:pictures": _film}
+VIEWED: Work = {"spikecam_env.cli.live.rerun_log:recorded": lambda *_: bytes(9000)}
 CALIBRATION: Work = {"spikecam_env.calibration:calibrate": cache(calibrate)}
 DIAGNOSIS: Work = {"spikecam_env.gap.diagnose:diagnose": lambda *_, **__: made_up._plain("none", "No gap.")}
 LADDER: Work = {
@@ -139,6 +141,8 @@ WRITINGS: dict[str, Writing] = {
     "scenes mp4": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.mp4", SCENE),
     "scenes gif": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.gif", SCENE),
     "scenes png": Writing(f"scenes disk --out {{out}} {' '.join(SMALL)}", "disk.png", SCENE),
+    "play": Writing("play Catch-v1 --film {out}", "catch.mp4", PLAYED),
+    "view": Writing("view Catch-v1 --frames 80 --save {out}", "catch.rrd", VIEWED),
     "dataset": Writing(f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}),
     "train": Writing("train --out {out} --steps 2 --batch 2 --patch 16", "run", TRAINING),
     "train ssml": Writing("train --mode ssml --out {out} --steps 2 --batch 2 --patch 16 --width 12", "run", TRAINING),

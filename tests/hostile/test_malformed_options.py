@@ -89,6 +89,36 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--film": ("{here}/x.avi", "{here}/x"),
         },
     ),
+    "play": (
+        ("play", "Catch-v1", "--film", "{out}.mp4", "--size", 16, 16),
+        {
+            "--policy": ("", "oracl", "\x00", "keyboard", "{here}/none.pt", "{here}/a.dat"),
+            "--film": ("{here}/x.avi", "{here}/x", "{here}/none/x.mp4"),
+            "--episodes": (*COUNTS, 1001),
+            "--slow": (*FLOATS, "0.5", "1e5"),
+            "--seed": SEEDS,
+            "--size": SIZES,
+            "--model": ("scs", "", "{here}/none.toml"),
+        },
+    ),
+    "play ID": (("play", "--film", "{out}.mp4"), {"": ("Cath-v1", "\x00", "x" * 1000, "spikecam_env/", "CartPole-v1")}),
+    "view": (
+        ("view", "disk", "--save", "{out}.rrd", "--frames", 2, *SIZE_8),
+        {
+            "--save": ("{here}/x.mp4", "{here}/x", "{here}/none/x.rrd"),
+            "--pixels": ("", "1", "1,2,3", "8,0", "0,8", "-1,0", "nan,1", f"{'9' * 5000},1", "\x00"),
+            "--frames": (*COUNTS, 10**15),
+            "--every": COUNTS,
+            "--seed": SEEDS,
+            "--size": SIZES,
+            "--model": ("scs", "", "{here}/none.toml"),
+        },
+    ),
+    "view ID": (("view", "Catch-v1", "--save", "{out}.rrd"), {"--policy": ("", "oracl", "\x00", "{here}/a.dat")}),
+    "view WHAT": (
+        ("view", "--save", "{out}.rrd"),
+        {"": ("disks", "Cath-v1", "\x00", "x" * 1000, "{here}", "{here}/none.h5", "{here}/x.avi", "{here}/a.dat.h5")},
+    ),
     "campaign simulate": (
         ("campaign", "simulate", "{out}", "--shape", 8, 8, "--frames", 2),
         {

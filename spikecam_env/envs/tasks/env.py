@@ -34,7 +34,7 @@ class TaskEnv(AimingEnv):
 
     Options of reset: split, as above, for this episode; episode, its number, instead of one drawn from the split.
     The camera's unit and noise follow from the seed, not from the number.
-    Info: episode, its number.
+    Info: episode_number; `episode` would be in the way of wrappers and learners, which keep statistics under that name.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class TaskEnv(AimingEnv):
         return replace(episode, number=number)
 
     def _of_standing(self) -> dict[str, Any]:
-        return super()._of_standing() | {"episode": self.episode.number}
+        return super()._of_standing() | {"episode_number": self.episode.number}
 
 
 def _task(task: str | Task) -> Task:

@@ -1,0 +1,121 @@
+"""An episode step by step, with what there is to show of each step; and how steps become pictures of a film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import floor
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.cli.live.players import Player
+from spikecam_env.envs.aiming import AimingEnv
+from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS
+from spikecam_env.envs.score import BASELINES, play, score
+from spikecam_env.errors import unknown_name
+
+FPS = 25
+"""Pictures a second of screen and film."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """After a step.
+
+    seed, step   of the episode; step 0 is that of reset
+    frame        of the camera, by which this is
+    time_s       the same in seconds of the scene
+    spikes       (K, H, W) uint8, of the step
+    reward       of the step; total: of the episode so far
+    info         as of `AimingEnv`
+    over         whether the episode ended with it
+    """
+
+    seed: int
+    step: int
+    frame: int
+    time_s: float
+    spikes: NDArray[np.uint8]
+    reward: float
+    total: float
+    info: dict[str, Any]
+    over: bool
+
+
+def environment(name: str, player: Player, **options: Any) -> gymnasium.Env[Any, Any]:
+    """Of an id, with or without `spikecam_env/`, as the player sees it; raises InputError for an unknown one.
+
+    options: of the environment; `split` goes to tasks of version 1, the others have none.
+    """
+    full, known = full_name(name), {**ENVIRONMENTS, **TASK_ENVIRONMENTS}
+    if full not in known:
+        raise unknown_name("id", name, (each.split("/")[1] for each in known))
+    if full in ENVIRONMENTS:
+        options.pop("split", None)
+    return gymnasium.make(full, **dict(player.sees), **options)
+
+
+def full_name(name: str) -> str:
+    """An id as gymnasium has it."""
+    return name if "/" in name else f"spikecam_env/{name}"
+
+
+def episode(env: gymnasium.Env[Any, Any], player: Player, seed: int) -> Iterator[Moment]:
+    """Reset, then step by step to the end of the episode."""
+    camera = env.unwrapped
+    if not isinstance(camera, AimingEnv):
+        raise TypeError(f"{type(camera).__name__} is no AimingEnv: it has no target")
+    camera.action_space.seed(seed)
+    player.begin()
+    seen, info = env.reset(seed=seed)
+    step, reward, total, over = 0, 0.0, 0.0, False
+    while True:
+        spikes = camera.blocks.spikes[0].view(np.uint8).copy()
+        yield Moment(seed, step, info["frame"], info["time_s"], spikes, reward, total, info, over)
+        if over:
+            return
+        action = np.asarray(player.act(seen, camera), np.float32)
+        seen, paid, terminated, truncated, info = env.step(action)
+        step, reward, over = step + 1, float(paid), bool(terminated or truncated)
+        total += reward
+
+
+def most_seconds(env: gymnasium.Env[Any, Any]) -> float:
+    """Of an episode, at most [s]; known once there is one, so the first is begun."""
+    camera: Any = env.unwrapped
+    env.reset(seed=0)
+    limits = [camera.episode.steps, env.spec.max_episode_steps if env.spec is not None else None]
+    return float(min(limit for limit in limits if limit) * camera.step_s)
+
+
+@dataclass(frozen=True)
+class Scored:
+    """Mean performances over the same episodes, and the score of `envs.score`."""
+
+    mean: float
+    nothing: float
+    oracle: float
+
+    @property
+    def score(self) -> float:
+        """0 is nothing's, 1 the oracle's."""
+        return score(self.mean, self.nothing, self.oracle)
+
+
+def scored(env: gymnasium.Env[Any, Any], ended: Sequence[Moment]) -> Scored:
+    """Plays the oracle and nothing on the episodes of which these are the last moments."""
+    seeds = [last.seed for last in ended]
+    nothing, best = (play(env, BASELINES[name], seeds).performance for name in ("nothing", "oracle"))
+    return Scored(float(np.mean([last.info["performance"] for last in ended])), nothing, best)
+
+
+def pictures_due(before_s: float, after_s: float, slow: float) -> int:
+    """Pictures that fall into a stretch of the scene's time, at FPS pictures a second and `slow` times slower."""
+    return floor(after_s * slow * FPS + ROUNDING) - floor(before_s * slow * FPS + ROUNDING)
+
+
+ROUNDING = 1e-6
+"""Of a picture: a step of exactly one picture's time gives one picture."""

@@ -1,0 +1,168 @@
+"""`spikecam play`: steer the camera with the keyboard, or watch a policy steer it; in a window, or as a film."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from spikecam_env.checked import checked_count, checked_number
+from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.options import Checked, Seed, Size
+from spikecam_env.errors import InputError
+
+if TYPE_CHECKING:
+    import gymnasium
+
+    from spikecam_env.cli.live.episodes import Moment
+    from spikecam_env.cli.live.players import Player
+    from spikecam_env.cli.live.screen import Screen
+
+KEYBOARD = "keyboard"
+MOST_SLOW = 10_000.0
+"""Times slower than life: a step of a millisecond then takes ten seconds."""
+MOST_EPISODES = 1000
+MOST_PICTURES = 90_000
+"""Of a film: an hour."""
+
+
+@dataclass
+class Play:
+    """Steer a spike camera with the keyboard, or watch a policy steer it.
+
+    In a window where there is a display; else, and with --film, a film is written.  In the window: arrow keys or WASD
+    turn the camera, 1 to 4 answer (ReadSpin), E and Q open and close the iris (Exposure), space pauses, N begins
+    another episode, Esc ends.
+
+    example:  spikecam play Track-v1
+              spikecam play Catch-v1 --policy oracle --denoise --film catch.mp4
+    """
+
+    id: tyro.conf.Positional[str]
+    """Environment, with or without `spikecam_env/`, e.g. Track-v1, Catch-v1, Fan-v0 (docs/environments.md)."""
+    policy: str | None = None
+    """Who steers: keyboard, oracle, nothing, random, an agent's name or its file (.pt); default: keyboard in a window,
+    oracle in a film."""
+    film: Path | None = None
+    """Write a film (.mp4) of it instead of opening a window; default where there is no display: ID.mp4."""
+    episodes: Annotated[int | None, Checked(checked_count, most=MOST_EPISODES)] = None
+    """Episodes; default: one in a film, in a window as many as its user likes."""
+    denoise: bool = False
+    """Show the online denoiser's picture too; it is 17 to 32 frames old."""
+    show_target: bool = False
+    """Draw a ring about the target."""
+    score: bool = False
+    """Also play the oracle and nothing on the same episodes, and print the score: 0 is nothing's, 1 the oracle's."""
+    slow: Annotated[float, Checked(checked_number, least=1.0, most=MOST_SLOW)] = 40.0
+    """Times slower than life: 40 shows a millisecond of the scene, 40 frames, in 40 ms."""
+    split: Literal["train", "test"] = "test"
+    """Which episodes of a task of version 1."""
+    seed: Seed = 0
+    """Of the first episode; the next has the next."""
+    size: Size | None = None
+    """Rows and columns, instead of the environment's."""
+    camera: Camera = field(default_factory=Camera)
+
+    def run(self) -> None:
+        from spikecam_env.cli.live.players import Player, player, steering
+        from spikecam_env.cli.live.window import has_display
+
+        film = self.film
+        if film is None and not has_display():
+            film = Path(f"{self.id.rpartition('/')[2]}.mp4")
+        who = (KEYBOARD if film is None else "oracle") if self.policy is None else self.policy
+        if film is not None:
+            _check_film(film, who)
+        held: set[str] = set()
+        acting = Player(steering(held)) if who == KEYBOARD else player(who)
+        env = self._environment(acting)
+        try:
+            screen = self._screen(env, who)
+            if film is None:
+                ended = self._in_a_window(env, acting, screen, held)
+            else:
+                ended = self._as_a_film(env, acting, screen, film)
+                print(f"wrote {film}: {who} at {self.id}, {self.slow:g} times slower than life")
+            self._print(env, ended)
+        finally:
+            env.close()
+
+    def _environment(self, acting: Player) -> gymnasium.Env[Any, Any]:
+        from spikecam_env.cli.live.episodes import environment
+
+        size = {} if self.size is None else {"shape": self.size}
+        return environment(self.id, acting, model=self.camera.load(), split=self.split, **size)
+
+    def _screen(self, env: gymnasium.Env[Any, Any], who: str) -> Screen:
+        from spikecam_env.cli.live.keys import explained
+        from spikecam_env.cli.live.screen import Screen
+
+        camera: Any = env.unwrapped
+        keys = explained(camera.axes, camera.action_space.shape[0] - camera.axes) if who == KEYBOARD else ""
+        name = self.id.rpartition("/")[2]
+        return Screen(name, who, denoise=self.denoise, show_target=self.show_target, keys=keys)
+
+    def _in_a_window(
+        self, env: gymnasium.Env[Any, Any], acting: Player, screen: Screen, held: set[str]
+    ) -> list[Moment]:
+        from spikecam_env.cli.live.filming import watch
+        from spikecam_env.cli.live.window import Window
+
+        seeds = count(self.seed) if self.episodes is None else range(self.seed, self.seed + self.episodes)
+        return watch(
+            env, acting, screen, seeds, self.slow, lambda picture: Window(f"spikecam {self.id}", picture, held)
+        )
+
+    def _as_a_film(self, env: gymnasium.Env[Any, Any], acting: Player, screen: Screen, film: Path) -> list[Moment]:
+        from spikecam_env.cli.live.episodes import FPS, most_seconds
+        from spikecam_env.cli.live.filming import pictures
+        from spikecam_env.cli.panels import write_film
+
+        episodes = self.episodes or 1
+        most = episodes * most_seconds(env) * self.slow * FPS
+        if most > MOST_PICTURES:
+            raise InputError(
+                f"up to {most:.0f} pictures (--episodes {episodes}, --slow {self.slow:g}); at most {MOST_PICTURES}"
+            )
+        ended: list[Moment] = []
+        seeds = range(self.seed, self.seed + episodes)
+        write_film(film, pictures(env, acting, screen, seeds, self.slow, ended), FPS)
+        return ended
+
+    def _print(self, env: gymnasium.Env[Any, Any], ended: list[Moment]) -> None:
+        from spikecam_env.cli.live.episodes import scored
+        from spikecam_env.cli.table import table
+
+        if not ended:
+            print("no episode was played to its end")
+            return
+        rows = [
+            {
+                "seed": str(last.seed),
+                "steps": last.step,
+                "time [ms]": 1e3 * last.time_s,
+                "return": last.total,
+                "distance at the end [px]": last.info["distance_px"],
+                "performance": float(last.info["performance"]),
+                "success": "yes" if last.info["is_success"] else "no",
+            }
+            for last in ended
+        ]
+        print(table(rows))
+        if self.score:
+            ends = scored(env, ended)
+            means = f"performance {ends.mean:.3f}, nothing {ends.nothing:.3f}, oracle {ends.oracle:.3f}"
+            print(f"score {ends.score:.3f}: {means}")
+
+
+def _check_film(film: Path, who: str) -> None:
+    from spikecam_env.whole import check_file
+
+    if who == KEYBOARD:
+        raise InputError("--policy keyboard needs a window: run it where there is a display, without --film")
+    if film.suffix.lower() != ".mp4":
+        raise InputError(f"--film {film}: unknown file type {film.suffix!r}; use .mp4")
+    check_file(film)

@@ -1,0 +1,225 @@
+"""`spikecam play`: films of policies, keys that steer, a window's pace; none of it needs a display."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import gymnasium
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+
+from denoiser import OnlineDnSS
+from spikecam_env.cli.live.episodes import environment, episode, most_seconds, pictures_due
+from spikecam_env.cli.live.filming import watch
+from spikecam_env.cli.live.keys import action_of, plain
+from spikecam_env.cli.live.pictures import Denoised, Noisy
+from spikecam_env.cli.live.players import Player, player, steering
+from spikecam_env.cli.live.screen import AIM, TARGET, Screen
+from spikecam_env.cli.main import run
+from spikecam_env.envs.score import BASELINES, play
+from spikecam_env.errors import InputError
+
+
+def spikecam(*args: object) -> int:
+    return run([str(a) for a in args])
+
+
+@pytest.fixture(autouse=True)
+def no_display(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("spikecam_env.cli.live.window.has_display", lambda: False)
+    monkeypatch.chdir(tmp_path)
+
+
+def test_without_a_display_the_oracle_is_filmed_and_the_path_printed(tmp_path: Path, capsys) -> None:
+    """Catch of seed 0 at 40 times slower: 25 pictures for each millisecond of a fortieth, and a second of the end."""
+    assert spikecam("play", "Catch-v1", "--denoise", "--score") == 0
+    printed = capsys.readouterr().out
+    assert "wrote Catch-v1.mp4: oracle at Catch-v1, 40 times slower than life" in printed
+    assert "score 1.000" in printed
+    cells = dict(zip(("seed", "steps", "time"), printed.splitlines()[-2].split(), strict=False))
+    film = [picture.copy() for picture in imageio.get_reader(tmp_path / "Catch-v1.mp4")]
+    assert len(film) == round(float(cells["time"]) * 40 * 25 / 1000) + 25
+    assert film[0].shape[1] > 2 * 320 and not np.array_equal(film[0], film[9])
+
+
+def test_the_film_shows_what_the_score_is_of(capsys, tmp_path: Path) -> None:
+    assert spikecam("play", "Catch-v1", "--policy", "random", "--episodes", 2, "--film", tmp_path / "a.mp4") == 0
+    rows = capsys.readouterr().out.splitlines()[-2:]
+    env = gymnasium.make("spikecam_env/Catch-v1", split="test", obs="tfp")
+    for seed, row in enumerate(rows):
+        played = play(env, BASELINES["random"], [seed])
+        assert row.split()[:2] == [str(seed), f"{played.steps:.0f}"]
+        assert row.split()[3] == f"{played.returns:.4g}"
+
+
+def test_an_agent_acts_on_what_it_was_trained_on_and_begins_each_episode(monkeypatch, capsys, tmp_path: Path) -> None:
+    """A stand-in for `spikecam_env.agents`."""
+    begun, seen = [], []
+
+    def act(observation: dict[str, Any]) -> np.ndarray:
+        seen.append(observation)
+        return np.zeros(1, np.float32)
+
+    agent = SimpleNamespace(obs="tfi", act=act, begin=lambda: begun.append(len(seen)))
+    loaded: list[str] = []
+    stand_in = SimpleNamespace(Agent=SimpleNamespace(load=lambda name: loaded.append(name) or agent))
+    monkeypatch.setitem(sys.modules, "spikecam_env.agents.agent", stand_in)
+    line = ("play", "Catch-v1", "--policy", "mine.pt", "--episodes", 2, "--film", tmp_path / "a.mp4")
+    assert spikecam(*line) == 0
+    assert loaded == ["mine.pt"] and len(begun) == 2 and begun[1] > 3
+    assert set(seen[0]) == {"picture", "gaze", "age"} and seen[0]["picture"].shape == (1, 64, 64)
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("Track-v9",), "unknown id 'Track-v9'"),
+        (("Track-v1", "--policy", "keyboard"), "needs a window"),
+        (("Track-v1", "--policy", "oracl"), "unknown .* 'oracl'"),
+        (("Track-v1", "--film", "a.avi"), "use .mp4"),
+        (("Track-v1", "--slow", "9000"), "at most 90000"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(args: tuple[str, ...], message: str, capsys, tmp_path: Path) -> None:
+    assert spikecam("play", *args) == 2
+    printed = capsys.readouterr().err.strip()
+    assert len(printed.splitlines()) == 1
+    assert re.search(message, printed), printed
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("held", "action"),
+    [
+        ({"right"}, [1, 0, 0]),
+        ({"a"}, [-1, 0, 0]),
+        ({"up"}, [0, -1, 0]),
+        ({"s", "d"}, [1, 1, 0]),
+        ({"left", "right"}, [0, 0, 0]),
+        ({"left", "a"}, [-1, 0, 0]),
+        ({"e"}, [0, 0, 1]),
+        ({"q"}, [0, 0, -1]),
+        ({"1", "2", "escape"}, [0, 0, 1]),
+    ],
+)
+def test_keys_that_are_held_make_an_action(held: set[str], action: list[float]) -> None:
+    np.testing.assert_array_equal(action_of(held, 2, 1), action)
+
+
+def test_keys_have_no_meaning_where_the_action_has_no_such_number() -> None:
+    np.testing.assert_array_equal(action_of({"up", "e", "right"}, 1, 0), [1])
+    assert [plain(key) for key in ("shift+LEFT", "A", " ", None, "+")] == ["left", "a", "space", "", ""]
+
+
+@pytest.mark.parametrize(("step_s", "slow"), [(1e-3, 40.0), (5e-4, 40.0), (1e-3, 100.0), (7e-4, 33.0)])
+def test_the_pace_is_25_pictures_a_second(step_s: float, slow: float) -> None:
+    total = sum(pictures_due(step * step_s, (step + 1) * step_s, slow) for step in range(500))
+    assert abs(total - 500 * step_s * slow * 25) <= 1
+
+
+class Acted:
+    """A window whose user is a script: what happens with each picture."""
+
+    def __init__(self, script: dict[int, str], held: set[str]) -> None:
+        self.script, self.held = script, held
+        self.shown: list[float] = []
+        self.waits, self.closed = 0, False
+        self._keys: list[str] = []
+
+    def show(self, picture: np.ndarray, seconds: float) -> None:
+        self.shown.append(seconds)
+        happens = self.script.get(len(self.shown), "")
+        self.held.clear()
+        if happens == "close":
+            self.closed = True
+        elif happens.startswith("hold "):
+            self.held.add(happens.removeprefix("hold "))
+        elif happens:
+            self._keys.append(happens)
+
+    def wait(self, seconds: float) -> None:
+        self.waits += 1
+        if self.waits == 3:
+            self._keys.append("space")
+
+    def taken(self) -> list[str]:
+        keys, self._keys = self._keys, []
+        return keys
+
+
+def played(script: dict[int, str], seeds: Iterator[int] | range, name: str = "Track-v1") -> tuple[Acted, list, Any]:
+    held: set[str] = set()
+    user = Player(steering(held))
+    env = environment(name, user, split="test")
+    window = Acted(script, held)
+    ended = watch(env, user, Screen("task", "me"), seeds, 40.0, lambda _: window)
+    return window, ended, env
+
+
+def test_a_person_steers_pauses_and_ends() -> None:
+    window, ended, env = played({2: "hold right", 3: "hold right", 5: "space", 7: "escape"}, range(9))
+    assert ended == [] and len(window.shown) == 7 and window.waits == 3
+    assert env.unwrapped.gaze[0] > 0 and env.unwrapped.gaze[1] == 0
+    assert window.shown[1] == pytest.approx(0.04)
+
+
+def test_the_next_episode_is_begun_by_n_and_a_closed_window_ends() -> None:
+    window, ended, env = played({3: "n", 6: "close"}, range(9))
+    assert ended == [] and len(window.shown) == 6 and env.unwrapped.standing.step == 2
+
+
+def test_an_episode_that_ends_is_counted_and_the_next_begins() -> None:
+    window, ended, _ = played({}, range(2), "Catch-v1")
+    assert [last.seed for last in ended] == [0, 1] and all(last.over for last in ended)
+    assert sum(window.shown) == pytest.approx(sum(40 * last.time_s + 1.0 for last in ended), abs=0.2)
+
+
+def test_a_moment_is_of_the_step_it_says() -> None:
+    env = environment("Catch-v1", player("nothing"), split="test")
+    moments = list(episode(env, player("nothing"), 0))
+    assert [m.step for m in moments] == list(range(len(moments)))
+    assert [m.frame for m in moments] == [20 * (m.step + 1) for m in moments]
+    assert moments[-1].over and not any(m.over for m in moments[:-1])
+    assert moments[-1].total == pytest.approx(sum(m.reward for m in moments))
+    assert moments[-1].time_s <= most_seconds(env) + 20 / 40_000
+
+
+def test_pictures_are_the_share_of_the_last_frames_and_the_newest_plane() -> None:
+    rng = np.random.default_rng(0)
+    blocks = (rng.random((6, 20, 16, 16)) < 0.3).astype(np.uint8)
+    noisy, denoised = Noisy(), Denoised()
+    seen = [(noisy.push(block), denoised.push(block)) for block in blocks]
+    np.testing.assert_allclose(seen[-1][0], blocks[-2:].reshape(40, 16, 16).mean(axis=0), atol=1e-6)
+    planes = OnlineDnSS.pretrained("best", output="rate").push(blocks.reshape(120, 16, 16))
+    assert seen[0][1] is None
+    np.testing.assert_array_equal(seen[-1][1], planes[-1])
+    denoised.begin()
+    assert denoised.push(blocks[0]) is None
+
+
+def test_the_target_is_marked_where_it_is_and_only_where_asked() -> None:
+    env = environment("Track-v1", player("nothing"), split="test")
+    moment = next(episode(env, player("nothing"), 0))
+
+    def places(colour: tuple[int, int, int], **options: Any) -> np.ndarray:
+        screen = Screen("Track-v1", "nothing", **options)
+        screen.see(moment)
+        return np.argwhere((screen.picture(moment) == colour).all(axis=-1))
+
+    assert len(places(TARGET)) == 0
+    ring = places(TARGET, show_target=True)
+    x, y = moment.info["target"]
+    np.testing.assert_allclose(ring.mean(axis=0), [10 + 5 * (y + 0.5), 10 + 5 * (x + 0.5)], atol=1.0)
+    np.testing.assert_allclose(places(AIM).mean(axis=0), [10 + 160, 10 + 160], atol=1.0)
+
+
+def test_an_agent_is_refused_by_name_where_the_package_has_none(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "spikecam_env.agents.agent", None)
+    with pytest.raises(InputError, match="policy 'Track-v1'"):
+        player("Track-v1")
