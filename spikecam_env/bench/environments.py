@@ -62,8 +62,8 @@ def bench_environments(
     seconds: of each row in a round.
     Columns: id, observation, environments, how (single, sync, async, native), steps/s (median over rounds), x single
     (one environment of the same id and observation) and x async (as many environments), medians over rounds of ratios
-    within a round; x real time (1000 steps a second each camera); beside scene and sensor, %: of a step's CPU time, what
-    is left when the same light is painted and the same frames are exposed alone, where that can be measured.
+    within a round; x real time (1000 steps a second each camera); beside scene and sensor, %: of a step's CPU time,
+    what is left when the same light is painted and the same frames are exposed alone, where that can be measured.
     """
     jobs = [(name, obs, count) for name, obs in cases for count in counts]
     rows: list[dict[str, Any]] = []
