@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -114,7 +115,7 @@ def paint_scenes(tickets, keys, scenes, pan, tilt, textures, numbers, places):  
     """
     n = 0
     while True:
-        m = take_ticket(tickets, 0)
+        m: Any = take_ticket(tickets, 0)  # type: ignore[call-arg]
         if m >= keys:
             return
         while n + 1 < len(scenes) and scenes[n + 1, _FIRST_KEY] <= m:

@@ -74,6 +74,8 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         make: Any = load_env_creator(single) if isinstance(single, str) else single
         options |= {"render_mode": render_mode, "threads": options.get("threads", 1)}
         self.envs: list[SpikeCameraEnv] = [make(**{**options, **own}) for own in _own_models(models, self.num_envs)]
+        for env in self.envs:
+            _check_phases(env)
         self._workers = [
             ThreadPoolExecutor(1, thread_name_prefix=f"spikecam-envs-{n}")
             for n in range(as_many(workers, self.num_envs))
@@ -176,6 +178,17 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     def _open(self) -> None:
         if self.closed:
             raise NotReadyError("the environments are closed; make new ones")
+
+
+def _check_phases(env: Any) -> None:
+    """Raise InputError for an environment whose `step` or `reset` does more than its parts, which are called here."""
+    kind = type(env)
+    for name, parts in (("step", "turn, outcome"), ("reset", "begin, begun")):
+        if getattr(kind, name, None) is not getattr(SpikeCameraEnv, name):
+            raise InputError(
+                f"{kind.__name__} has a {name} of its own, which a vector environment would not call; override "
+                f"{parts} instead"
+            )
 
 
 def batched(infos: Sequence[dict[str, Any]]) -> dict[str, Any]:

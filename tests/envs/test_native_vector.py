@@ -16,7 +16,7 @@ from spikecam_env.bench.environments import bench_environments
 from spikecam_env.envs.observations import OBSERVATIONS
 from spikecam_env.envs.registration import ENVIRONMENTS, register
 from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-from spikecam_env.envs.vector import SpikeCameraVectorEnv
+from spikecam_env.envs.vector import SpikeCameraVectorEnv, batched
 from spikecam_env.errors import InputError, NotReadyError
 
 register()
@@ -147,9 +147,33 @@ def test_the_pages_about_environments_run(name: str) -> None:
 
 
 def test_the_bench_has_a_row_for_each_way() -> None:
-    rows = bench_environments(counts=(1, 2), observations=("tfp",), seconds=0.01)
+    rows = bench_environments(counts=(1, 2), cases=(("Track-v1", "tfp"),), seconds=0.01, rounds=1)
     assert [(row["how"], row["environments"]) for row in rows] == [
         ("single", 1),
         *((how, count) for count in (1, 2) for how in ("sync", "async", "native")),
     ]
-    assert all(row["steps/s"] > 0 for row in rows) and rows[0]["x single"] == 1.0
+    assert all(row["steps/s"] > 0 for row in rows)
+    assert rows[0]["x single"] == 1.0 and all(row["x async"] == 1.0 for row in rows if row["how"] == "async")
+    measured = {row["how"]: row["beside scene and sensor, %"] for row in rows}
+    assert measured["async"] == measured["sync"] == ""
+    assert measured["single"] < 100 and measured["native"] < 100
+
+
+def test_an_environment_with_a_step_of_its_own_is_refused() -> None:
+    class Own(RotatingDiskEnv):
+        def step(self, action: Any) -> Any:
+            return super().step(action)
+
+    with pytest.raises(InputError, match=r"Own has a step of its own, .* override turn, outcome instead"):
+        SpikeCameraVectorEnv(Own, 2, **SMALL)
+
+
+def test_infos_that_only_some_have_are_marked() -> None:
+    """As gymnasium's own vectors collect them, one environment after another."""
+    infos = [{"a": 1.5, "b": np.array([1, 2])}, {"a": 2.5, "c": {"d": True}}, {"e": "text", "b": np.array([3, 4])}]
+    collected: dict[str, Any] = {}
+    own = gymnasium.vector.VectorEnv()
+    own.num_envs = 3
+    for n, info in enumerate(infos):
+        collected = own._add_info(collected, info, n)
+    assert data_equivalence(batched(infos), collected, exact=True)
