@@ -644,8 +644,8 @@ def spike(x, words, o, j, moment, taken, wave, reset, polynomial):  # type: igno
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def stay(x, words, hit, live, groups, end, left, left_tau, once_more, reset, polynomial):  # type: ignore[no-untyped-def]
-    """What stays on the photodiode at the resets of the pixels that fired; end: of the frame.  once_more: whether it may
-    take them to their threshold again: where references move within the frame, it does in the next one."""
+    """What stays on the photodiode at the resets of the pixels that fired; end: of the frame.  once_more: whether it
+    may take them to their threshold again: where references move within the frame, it does in the next one."""
     draws = x.view(np.float32)
     for g in range(groups):
         q = live[g] & _INSIDE
