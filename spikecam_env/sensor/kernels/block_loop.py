@@ -278,7 +278,8 @@ def advance(  # type: ignore[no-untyped-def]
                         scratch[b].view(np.uint8)[_HIT : _HIT + BAND],
                     )
                     groups = find_live(hit.view(np.uint64), BAND // GROUP, live)
-                    stay(x, words, hit, live, groups, number + t + 1.0, left, left_tau, reset, polynomial)
+                    once_more = not sways and at_once == 0.0
+                    stay(x, words, hit, live, groups, number + t + 1.0, left, left_tau, once_more, reset, polynomial)
             if droop != 0.0:
                 for r in range(row_of[line0], row_of[stop - 1] + 1):
                     activity[r] = bits[r * columns : (r + 1) * columns].sum() / columns
@@ -642,8 +643,9 @@ def spike(x, words, o, j, moment, taken, wave, reset, polynomial):  # type: igno
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def stay(x, words, hit, live, groups, end, left, left_tau, reset, polynomial):  # type: ignore[no-untyped-def]
-    """What stays on the photodiode at the resets of the pixels that fired; end: of the frame."""
+def stay(x, words, hit, live, groups, end, left, left_tau, once_more, reset, polynomial):  # type: ignore[no-untyped-def]
+    """What stays on the photodiode at the resets of the pixels that fired; end: of the frame.  once_more: whether it
+    may take them to their threshold again: where references move within the frame, it does in the next one."""
     draws = x.view(np.float32)
     for g in range(groups):
         q = live[g] & _INSIDE
@@ -659,7 +661,7 @@ def stay(x, words, hit, live, groups, end, left, left_tau, reset, polynomial):  
             x[_PHI + j] = phi if fires else x[_PHI + j]
             x[_LIMIT + j] = limit if fires else x[_LIMIT + j]
         for j in range(q, q + GROUP):
-            if hit[j] != 0 and x[_HELD + j] >= x[_LIMIT + j]:
+            if once_more and hit[j] != 0 and x[_HELD + j] >= x[_LIMIT + j]:
                 cross_again(x, words, j, end, left, left_tau, reset, polynomial)
 
 
