@@ -20,7 +20,6 @@ segment.  Where every frame is a ramp of its own that is a quarter of a grain le
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
