@@ -84,7 +84,7 @@ class _Player:
     @torch.no_grad()
     def roll(self) -> tuple[dict[str, Tensor], list[Ended]]:
         """A rollout's samples by name, and the episodes that ended in it."""
-        rows, ended, sigma = [], [], self.policy.log_sigma.exp()
+        rows, ended, sigma = [], list[Ended](), self.policy.log_sigma.exp()
         for _ in range(self.ppo.rollout):
             pictures, state = map(torch.from_numpy, self.seen)
             self.policy.watch(state)
@@ -97,14 +97,14 @@ class _Player:
             self.seen = self.history.push(observation, ~played)
             self.totals = np.where(played, self.totals + reward, 0.0)
             figures = np.stack([self.totals, self.info["performance"], self.info["is_success"]], axis=1)
-            ended += [tuple(row) for row in figures[self.over].tolist()]
-            flags = (torch.from_numpy(np.array(x, np.float32)) for x in (reward, terminated, self.over, played))
-            rows.append((pictures, state, place, action, law.log_prob(action).sum(1), value, *flags))
-        *samples, value, reward, terminated, over, played = (torch.stack(column) for column in zip(*rows, strict=True))
+            ended += map(tuple, figures[self.over].tolist())
+            known = (torch.from_numpy(np.array(x, np.float32)) for x in (reward, terminated, self.over, played))
+            rows.append((pictures, state, place, action, law.log_prob(action).sum(1), value, *known))
+        *samples, value, paid, decided, over, counts = (torch.stack(column) for column in zip(*rows, strict=True))
         after = torch.cat([value[1:], self.policy(*map(torch.from_numpy, self.seen))[1][None]])
-        gain = _gain(reward + self.ppo.gamma * after * (1 - terminated) - value, over, self.ppo)
+        gain = _gain(paid + self.ppo.gamma * after * (1 - decided) - value, over, self.ppo)
         names = ("pictures", "state", "place", "action", "log_p", "gain", "worth")
-        return {k: x[played > 0] for k, x in zip(names, (*samples, gain, gain + value), strict=True)}, ended
+        return {k: x[counts > 0] for k, x in zip(names, (*samples, gain, gain + value), strict=True)}, ended
 
 
 def _gain(surprise: Tensor, over: Tensor, ppo: PPO) -> Tensor:

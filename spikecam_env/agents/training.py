@@ -82,9 +82,10 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
     assert isinstance(spaces, Dict) and isinstance(action, Box)
     picture = spaces["picture"]
     assert isinstance(picture, Box)
+    channels, rows, columns = picture.shape
     return Recipe(
-        channels=picture.shape[0],
-        shape=picture.shape[1:],
+        channels=channels,
+        shape=(rows, columns),
         high=int(picture.high.max()),
         lags=LAGS.get(name, (0, 4)),
         actions=action.shape[0],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -34,6 +34,8 @@ class TrainAgent:
     """Seed of network, actions, episodes and cameras."""
     environments: Annotated[int, Checked(checked_count, most=MOST_ENVIRONMENTS)] = 16
     """Cameras stepped together."""
+    plain: bool = False
+    """Leave out the question where the target is, which is answered in training alone: PPO from rewards only."""
 
     def run(self) -> None:
         from spikecam_env.agents.training import Study, budget, train_agent
@@ -42,6 +44,8 @@ class TrainAgent:
 
         study = Study(self.task.removeprefix("spikecam_env/"), self.obs)
         with out_folder(self.out):
-            agent = train_agent(study, self.out, budget(study, self.steps), self.seed, self.environments)
+            ppo = budget(study, self.steps)
+            ppo = replace(ppo, place=0.0) if self.plain else ppo
+            agent = train_agent(study, self.out, ppo, self.seed, self.environments)
         print(table(agent.training["curve"][-10:]))
         print(f"wrote agent.pt, curve.json and last.pt in {self.out}")
