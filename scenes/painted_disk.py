@@ -7,7 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import carray
+from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_memory

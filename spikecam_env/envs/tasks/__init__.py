@@ -14,6 +14,8 @@ from spikecam_env.envs.tasks.read_spin import ReadSpin
 from spikecam_env.envs.tasks.saccade import Saccade
 from spikecam_env.envs.tasks.track import Track
 
+__all__ = ["TASKS", "Catch", "Exposure", "LowLight", "ReadDigit", "ReadSpin", "Saccade", "Task", "Track"]
+
 TASKS: dict[str, type[Task]] = {
     "Track": Track,
     "Saccade": Saccade,

@@ -23,7 +23,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import carray
+from numba.np.numpy_support import carray
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels.intrinsics import pointer_to, take_ticket, use_widest_vectors
