@@ -13,10 +13,12 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+import gymnasium
 import numpy as np
 from pydantic import Field
 from tqdm import tqdm
 
+from spikecam_env.agents.agent import Agent
 from spikecam_env.agents.playing import Actor, episodes_of, score_of
 from spikecam_env.agents.tracker import Tracker
 from spikecam_env.agents.training import Study, budget, train_agent
@@ -29,15 +31,15 @@ from spikecam_env.whole import write_text_whole
 T = TypeVar("T")
 R = TypeVar("R")
 
-TRACKER = "tracker"
-"""The sight of the classical tracker, which sees `tfp` and does not learn."""
+TRACKERS = {"tracker": "tfp", "tracker-rate": "rate", "tracker-clean": "clean"}
+"""The classical tracker, which does not learn, by what it sees."""
 
 
 class Case(Declared):
     """A cell and a seed.
 
     task      an id
-    sight     a name of `training.SIGHTS`, or TRACKER
+    sight     a name of `training.SIGHTS`, or of TRACKERS
     interval  mean interval of a pixel [frames], of LowLight alone; None is the task's own light
     steps     of training; 0 of a tracker
     """
@@ -57,7 +59,7 @@ class Case(Declared):
     def study(self) -> Study:
         """What is put before the learner."""
         light = {} if self.interval is None else {"task": LowLight(mean_interval=(self.interval, self.interval))}
-        return Study(self.task, "tfp" if self.sight == TRACKER else self.sight, light)
+        return Study(self.task, TRACKERS.get(self.sight, self.sight), light)
 
     @property
     def folder(self) -> str:
@@ -96,20 +98,22 @@ def cases(
 def measure(case: Case, out: Path, episodes: int | None = None) -> Result:
     """Train, unless it is a tracker, and play the test episodes; out: folder in which its run is kept."""
     curve: tuple[dict[str, float], ...] = ()
+    if case.sight not in TRACKERS:
+        folder = out / case.folder
+        folder.mkdir(parents=True, exist_ok=True)
+        curve = tuple(train_agent(case.study, folder, budget(case.study, case.steps), case.seed).training["curve"])
     env = case.study.make(split="test")
     try:
-        if case.sight == TRACKER:
-            inner: Any = env.unwrapped
-            actor: Actor = Tracker(inner)
-        else:
-            folder = out / case.folder
-            folder.mkdir(parents=True, exist_ok=True)
-            agent = train_agent(case.study, folder, budget(case.study, case.steps), case.seed)
-            actor, curve = agent, tuple(agent.training["curve"])
-        score = score_of(actor, env, episodes or episodes_of(case.task))
+        score = score_of(actor_of(case, out, env), env, episodes or episodes_of(case.task))
     finally:
         env.close()
     return Result(case=case, score=score, cpu_s=curve[-1]["cpu_s"] if curve else 0.0, curve=curve)
+
+
+def actor_of(case: Case, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
+    """That plays a case: the tracker, or the agent whose training is kept in `out`."""
+    inner: Any = env.unwrapped
+    return Tracker(inner) if case.sight in TRACKERS else Agent.load(out / case.folder / "agent.pt")
 
 
 def study(
@@ -184,4 +188,4 @@ def _row(cell: tuple[str, str, float | None], found: list[Result]) -> dict[str, 
 
 
 def _steps(task: str, sight: str, steps: int | None) -> int:
-    return 0 if sight == TRACKER else budget(Study(task, sight), steps).steps
+    return 0 if sight in TRACKERS else budget(Study(task, sight), steps).steps

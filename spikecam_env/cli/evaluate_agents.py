@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from spikecam_env.checked import checked_count, checked_whole
 from spikecam_env.cli.options import Checked, Count, Workers
 
+if TYPE_CHECKING:
+    from spikecam_env.agents.study import Case
+
+FILM_FPS = 20
+"""Steps a second of a film: 50 times slower than life where a step is a millisecond."""
 MOST_SEEDS = 1000
 MOST_EPISODES = 1000
 """As many as the test split has."""
@@ -37,8 +42,8 @@ class Agents:
         "frame1000",
         "tracker",
     )
-    """What agents see: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30, frame1000; `tracker` is the
-    classical one."""
+    """What agents see: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30, frame1000; the classical
+    tracker: tracker (sees tfp), tracker-rate, tracker-clean."""
     intervals: tuple[float, ...] = ()
     """Mean intervals [frames] at which LowLight-v1 is learned and played, each a row."""
     seeds: Annotated[int, Checked(checked_count, most=MOST_SEEDS)] = 5
@@ -53,6 +58,9 @@ class Agents:
     """Trainings at once, each in a process of its own."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Train on a Ray cluster: its address, or `local` for one of --jobs workers here."""
+
+    films: bool = False
+    """Write a film of the first test episode of each, TASK-NAME-SEED.mp4, of the first seed."""
 
     def run(self) -> None:
         from spikecam_env.agents.report import draw_curves
@@ -69,5 +77,21 @@ class Agents:
             text = table(summary(results))
             write_text_whole(self.out / "agents.txt", text + "\n")
             draw_curves(results, self.out / "curves.png")
+            if self.films:
+                self._film([result.case for result in results if result.case.seed == self.first_seed])
         print(text)
         print(f"wrote record.jsonl, agents.txt and curves.png in {self.out}")
+
+    def _film(self, played: list[Case]) -> None:
+        from spikecam_env.agents.report import pictures
+        from spikecam_env.agents.study import actor_of
+        from spikecam_env.cli.panels import write_film
+
+        for case in played:
+            env = case.study.make(split="test", render_mode="rgb_array")
+            try:
+                write_film(
+                    self.out / f"{case.folder}.mp4", pictures(actor_of(case, self.out, env), env, seed=0), FILM_FPS
+                )
+            finally:
+                env.close()

@@ -157,5 +157,7 @@ def test_a_study_goes_on_from_its_record(tmp_path: Path, monkeypatch, capsys) ->
     assert command(line) == 0
     assert capsys.readouterr().out == first
     assert (tmp_path / "curves.png").stat().st_size > 1000
+    assert command([*line, "--films"]) == 0
+    assert sorted(film.name for film in tmp_path.glob("*.mp4")) == ["Catch-v1-frame30-0.mp4", "Catch-v1-tracker-0.mp4"]
     rows = [row.split() for row in first.splitlines() if row.startswith("Catch-v1")]
     assert [row[1] for row in rows] == ["tracker", "frame30"] and float(rows[0][3]) == 1.0
