@@ -85,6 +85,12 @@ def score(performance: float, nothing: float, best: float) -> float:
     return (performance - nothing) / (best - nothing) if best > nothing else float("nan")
 
 
+def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[float, float]:
+    """Performance of doing nothing and of the oracle on these episodes: where a score is 0, and where it is 1."""
+    nothing, best = (play(env, BASELINES[name], seeds).performance for name in ("nothing", "oracle"))
+    return nothing, best
+
+
 def _episode(
     env: gymnasium.Env[Any, Any], inner: AimingEnv, policy: Policy, seed: int
 ) -> tuple[float, float, bool, float, float, int]:

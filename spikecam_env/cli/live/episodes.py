@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from spikecam_env.cli.live.players import Player
 from spikecam_env.envs.aiming import AimingEnv
 from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS
-from spikecam_env.envs.score import BASELINES, play, score
+from spikecam_env.envs.score import ends, score
 from spikecam_env.errors import unknown_name
 
 FPS = 25
@@ -107,8 +107,7 @@ class Scored:
 
 def scored(env: gymnasium.Env[Any, Any], ended: Sequence[Moment]) -> Scored:
     """Plays the oracle and nothing on the episodes of which these are the last moments."""
-    seeds = [last.seed for last in ended]
-    nothing, best = (play(env, BASELINES[name], seeds).performance for name in ("nothing", "oracle"))
+    nothing, best = ends(env, [last.seed for last in ended])
     return Scored(float(np.mean([last.info["performance"] for last in ended])), nothing, best)
 
 
