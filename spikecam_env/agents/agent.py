@@ -112,6 +112,11 @@ def shipped() -> list[str]:
     return sorted(path.name[: -len(ENDING)] for path in _folder().glob(f"*{ENDING}"))
 
 
+def is_file(name: str) -> bool:
+    """Whether it can be a file's, and not that of a task."""
+    return ENDING in name or os.sep in name
+
+
 def _folder() -> Path:
     return Path(str(resources.files("spikecam_env.agents") / "weights"))
 
@@ -120,6 +125,6 @@ def _path(source: str | os.PathLike[str]) -> Path:
     name = str(source).removeprefix("spikecam_env/")
     if name in shipped():
         return _folder() / f"{name}{ENDING}"
-    if f"spikecam_env/{name}" in TASK_ENVIRONMENTS or (ENDING not in name and os.sep not in name):
+    if f"spikecam_env/{name}" in TASK_ENVIRONMENTS or not is_file(name):
         raise unknown_name("agent", name, shipped())
     return Path(source)

@@ -21,10 +21,11 @@ from tqdm import tqdm
 from spikecam_env.agents.agent import Agent
 from spikecam_env.agents.playing import Actor, episodes_of, score_of
 from spikecam_env.agents.tracker import Tracker
-from spikecam_env.agents.training import Study, budget, train_agent
+from spikecam_env.agents.training import SIGHTS, Study, budget, train_agent
 from spikecam_env.checked import checked_number
 from spikecam_env.datasets.ray_cluster import connected
 from spikecam_env.envs.tasks.low_light import LowLight
+from spikecam_env.errors import unknown_name
 from spikecam_env.untrusted import Declared, Name, Positive, Seed, Whole, declared, parse_json, read_text
 from spikecam_env.whole import write_text_whole
 
@@ -81,6 +82,9 @@ def cases(
     tasks: Sequence[str], sights: Sequence[str], intervals: Sequence[float], seeds: Iterable[int], steps: int | None
 ) -> list[Case]:
     """Every cell with every seed, all cells of the first seed first; `intervals` are of LowLight."""
+    for sight in sights:
+        if sight not in (*SIGHTS, *TRACKERS):
+            raise unknown_name("observation", sight, (*SIGHTS, *TRACKERS))
     for interval in intervals:
         checked_number(interval, "interval", 1.0, unit="frames")
     found = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,7 +22,6 @@ from spikecam_env.cli.live.players import Player, player, steering
 from spikecam_env.cli.live.screen import AIM, TARGET, Screen
 from spikecam_env.cli.main import run
 from spikecam_env.envs.score import BASELINES, play
-from spikecam_env.errors import InputError
 
 
 def spikecam(*args: object) -> int:
@@ -59,17 +57,16 @@ def test_the_film_shows_what_the_score_is_of(capsys, tmp_path: Path) -> None:
 
 
 def test_an_agent_acts_on_what_it_was_trained_on_and_begins_each_episode(monkeypatch, capsys, tmp_path: Path) -> None:
-    """A stand-in for `spikecam_env.agents`."""
     begun, seen = [], []
 
     def act(observation: dict[str, Any]) -> np.ndarray:
         seen.append(observation)
         return np.zeros(1, np.float32)
 
-    agent = SimpleNamespace(obs="tfi", act=act, begin=lambda: begun.append(len(seen)))
+    policy = SimpleNamespace(recipe=SimpleNamespace(actions=1))
+    agent = SimpleNamespace(obs="tfi", act=act, begin=lambda: begun.append(len(seen)), policy=policy)
     loaded: list[str] = []
-    stand_in = SimpleNamespace(Agent=SimpleNamespace(load=lambda name: loaded.append(name) or agent))
-    monkeypatch.setitem(sys.modules, "spikecam_env.agents.agent", stand_in)
+    monkeypatch.setattr("spikecam_env.agents.agent.Agent.load", lambda name: loaded.append(name) or agent)
     line = ("play", "Catch-v1", "--policy", "mine.pt", "--episodes", 2, "--film", tmp_path / "a.mp4")
     assert spikecam(*line) == 0
     assert loaded == ["mine.pt"] and len(begun) == 2 and begun[1] > 3
@@ -81,7 +78,10 @@ def test_an_agent_acts_on_what_it_was_trained_on_and_begins_each_episode(monkeyp
     [
         (("Track-v9",), "unknown id 'Track-v9'"),
         (("Track-v1", "--policy", "keyboard"), "needs a window"),
-        (("Track-v1", "--policy", "oracl"), "unknown .* 'oracl'"),
+        (("Track-v1", "--policy", "oracl"), "unknown policy 'oracl'.*oracle"),
+        (("Track-v1", "--policy", "ReadSpin-v1"), "unknown policy 'ReadSpin-v1'"),
+        (("Track-v1", "--policy", "mine.pt"), "mine.pt"),
+        (("ReadSpin-v1", "--policy", "Catch-v1"), "takes 6 numbers an action, this agent gives 1: another task's"),
         (("Track-v1", "--film", "a.avi"), "use .mp4"),
         (("Track-v1", "--slow", "9000"), "at most 90000"),
     ],
@@ -217,9 +217,3 @@ def test_the_target_is_marked_where_it_is_and_only_where_asked() -> None:
     x, y = moment.info["target"]
     np.testing.assert_allclose(ring.mean(axis=0), [10 + 5 * (y + 0.5), 10 + 5 * (x + 0.5)], atol=1.0)
     np.testing.assert_allclose(places(AIM).mean(axis=0), [10 + 160, 10 + 160], atol=1.0)
-
-
-def test_an_agent_is_refused_by_name_where_the_package_has_none(monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "spikecam_env.agents.agent", None)
-    with pytest.raises(InputError, match="policy 'Track-v1'"):
-        player("Track-v1")

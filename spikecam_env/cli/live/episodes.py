@@ -15,7 +15,7 @@ from spikecam_env.cli.live.players import Player
 from spikecam_env.envs.aiming import AimingEnv
 from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS
 from spikecam_env.envs.score import ends, score
-from spikecam_env.errors import unknown_name
+from spikecam_env.errors import InputError, unknown_name
 
 FPS = 25
 """Pictures a second of screen and film."""
@@ -46,7 +46,9 @@ class Moment:
 
 
 def environment(name: str, player: Player, **options: Any) -> gymnasium.Env[Any, Any]:
-    """Of an id, with or without `spikecam_env/`, as the player sees it; raises InputError for an unknown one.
+    """Of an id, with or without `spikecam_env/`, as the player sees it.
+
+    Raises InputError for an unknown id, and for an agent of a task with other actions.
 
     options: of the environment; `split` goes to tasks of version 1, the others have none.
     """
@@ -55,7 +57,11 @@ def environment(name: str, player: Player, **options: Any) -> gymnasium.Env[Any,
         raise unknown_name("id", name, (each.split("/")[1] for each in known))
     if full in ENVIRONMENTS:
         options.pop("split", None)
-    return gymnasium.make(full, **dict(player.sees), **options)
+    env = gymnasium.make(full, **dict(player.sees), **options)
+    numbers = env.action_space.shape[0]  # type: ignore[index]
+    if player.actions not in (None, numbers):
+        raise InputError(f"{name} takes {numbers} numbers an action, this agent gives {player.actions}: another task's")
+    return env
 
 
 def full_name(name: str) -> str:

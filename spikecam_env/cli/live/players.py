@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -13,27 +12,36 @@ from numpy.typing import NDArray
 from spikecam_env.cli.live.keys import action_of
 from spikecam_env.envs.aiming import AimingEnv
 from spikecam_env.envs.score import BASELINES, Policy
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import unknown_name
 
 
 @dataclass(frozen=True)
 class Player:
-    """act: see `envs.score.Policy`; begin: called before each episode; sees: keywords of the environment it needs."""
+    """act: see `envs.score.Policy`; begin: called before each episode; sees: keywords of the environment it needs.
+
+    actions: numbers of its action, None where it suits every environment.
+    """
 
     act: Policy
     begin: Callable[[], object] = tuple
     sees: tuple[tuple[str, Any], ...] = (("obs", "tfp"),)
+    actions: int | None = None
 
 
 def player(name: str) -> Player:
-    """A baseline by name, or an agent.
+    """A baseline by name, or an agent, whose code, torch's too, is imported with it.
 
-    Raises InputError for an unknown name, an unusable file, and an agent where the package comes without them.
+    Raises InputError for an unknown name, an unusable file, and a task's agent that does not come with the package.
     """
     if name in BASELINES:
         return Player(BASELINES[name])
-    agent = _agents(name).load(name)
-    return Player(lambda seen, env: agent.act(seen), agent.begin, (("obs", agent.obs), ("obs_state", True)))
+    from spikecam_env.agents.agent import Agent, is_file, shipped
+
+    if not is_file(name) and name not in shipped():
+        raise unknown_name("policy", name, (*BASELINES, *shipped()))
+    agent = Agent.load(name)
+    sees = (("obs", agent.obs), ("obs_state", True))
+    return Player(lambda seen, env: agent.act(seen), agent.begin, sees, agent.policy.recipe.actions)
 
 
 def steering(held: Iterable[str]) -> Policy:
@@ -43,13 +51,3 @@ def steering(held: Iterable[str]) -> Policy:
         return action_of(held, env.axes, env.action_space.shape[0] - env.axes)  # type: ignore[index]
 
     return act
-
-
-def _agents(name: str) -> Any:
-    """The class of trained agents; torch is imported with it."""
-    try:
-        return import_module("spikecam_env.agents.agent").Agent
-    except ModuleNotFoundError as error:
-        if error.name is None or not error.name.startswith("spikecam_env.agents"):
-            raise InputError(f"an agent needs {error.name}, which is not installed") from error
-        raise unknown_name("policy", name, BASELINES) from error
