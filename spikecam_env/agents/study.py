@@ -26,7 +26,7 @@ from spikecam_env.checked import checked_number
 from spikecam_env.datasets.ray_cluster import connected
 from spikecam_env.envs.tasks.low_light import LowLight
 from spikecam_env.errors import unknown_name
-from spikecam_env.untrusted import Declared, Name, Positive, Seed, Whole, declared, parse_json, read_text
+from spikecam_env.untrusted import Count, Declared, Name, Positive, Seed, Whole, declared, parse_json, read_text
 from spikecam_env.whole import write_text_whole
 
 T = TypeVar("T")
@@ -43,6 +43,7 @@ class Case(Declared):
     sight     a name of `training.SIGHTS`, or of TRACKERS
     interval  mean interval of a pixel [frames], of LowLight alone; None is the task's own light
     steps     of training; 0 of a tracker
+    episodes  of the test split that judge; None is `playing.episodes_of` the task
     """
 
     task: Name
@@ -50,6 +51,7 @@ class Case(Declared):
     interval: Positive | None = None
     seed: Seed = 0
     steps: Whole = 0
+    episodes: Count | None = None
 
     @property
     def cell(self) -> tuple[str, str, float | None]:
@@ -79,7 +81,12 @@ class Result(Declared):
 
 
 def cases(
-    tasks: Sequence[str], sights: Sequence[str], intervals: Sequence[float], seeds: Iterable[int], steps: int | None
+    tasks: Sequence[str],
+    sights: Sequence[str],
+    intervals: Sequence[float],
+    seeds: Iterable[int],
+    steps: int | None,
+    episodes: int | None = None,
 ) -> list[Case]:
     """Every cell with every seed, all cells of the first seed first; `intervals` are of LowLight."""
     for sight in sights:
@@ -88,7 +95,7 @@ def cases(
     for interval in intervals:
         checked_number(interval, "interval", 1.0, unit="frames")
     found = [
-        Case(task=task, sight=sight, interval=interval, seed=seed, steps=_steps(task, sight, steps))
+        Case(task=task, sight=sight, interval=interval, seed=seed, steps=_steps(task, sight, steps), episodes=episodes)
         for seed in seeds
         for task in tasks
         for sight in sights
@@ -99,7 +106,7 @@ def cases(
     return found
 
 
-def measure(case: Case, out: Path, episodes: int | None = None) -> Result:
+def measure(case: Case, out: Path) -> Result:
     """Train, unless it is a tracker, and play the test episodes; out: folder in which its run is kept."""
     curve: tuple[dict[str, float], ...] = ()
     if case.sight not in TRACKERS:
@@ -108,7 +115,7 @@ def measure(case: Case, out: Path, episodes: int | None = None) -> Result:
         curve = tuple(train_agent(case.study, folder, budget(case.study, case.steps), case.seed).training["curve"])
     env = case.study.make(split="test")
     try:
-        score = score_of(actor_of(case, out, env), env, episodes or episodes_of(case.task))
+        score = score_of(actor_of(case, out, env), env, case.episodes or episodes_of(case.task))
     finally:
         env.close()
     return Result(case=case, score=score, cpu_s=curve[-1]["cpu_s"] if curve else 0.0, curve=curve)
@@ -120,13 +127,11 @@ def actor_of(case: Case, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
     return Tracker(inner) if case.sight in TRACKERS else Agent.load(out / case.folder / "agent.pt")
 
 
-def study(
-    wanted: Sequence[Case], out: Path, *, jobs: int = 1, ray: str | None = None, episodes: int | None = None
-) -> list[Result]:
+def study(wanted: Sequence[Case], out: Path, *, jobs: int = 1, ray: str | None = None) -> list[Result]:
     """What the record in `out` lacks is measured and written to it; the results of `wanted`."""
     known = {result.case: result for result in read_record(out / RECORD)}
     missing = [case for case in wanted if case not in known]
-    work = partial(measure, out=out, episodes=episodes)
+    work = partial(measure, out=out)
     for result in tqdm(spread(work, missing, jobs, ray), total=len(missing), desc="agents", unit="run", disable=None):
         known[result.case] = result
         lines = "".join(result.model_dump_json() + "\n" for result in known.values())

@@ -53,7 +53,7 @@ class Agents:
     steps: Count | None = None
     """Of training.  Default: as the shipped agents were trained."""
     episodes: Annotated[int, Checked(checked_count, most=MOST_EPISODES)] | None = None
-    """Test episodes a score.  Default: 100 of Catch, 50 of Saccade, 10 of Track."""
+    """Test episodes that make up a score.  Default: 100 of Catch, 50 of Saccade, 10 of Track."""
     jobs: Workers = 1
     """Trainings at once, each in a process of its own."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
@@ -71,9 +71,9 @@ class Agents:
 
         tasks = [name.removeprefix("spikecam_env/") for name in self.tasks]
         seeds = range(self.first_seed, self.first_seed + self.seeds)
-        wanted = cases(tasks, self.observations, self.intervals, seeds, self.steps)
+        wanted = cases(tasks, self.observations, self.intervals, seeds, self.steps, self.episodes)
         with out_folder(self.out):
-            results = study(wanted, self.out, jobs=self.jobs, ray=self.ray, episodes=self.episodes)
+            results = study(wanted, self.out, jobs=self.jobs, ray=self.ray)
             text = table(summary(results))
             write_text_whole(self.out / "agents.txt", text + "\n")
             draw_curves(results, self.out / "curves.png")

@@ -156,6 +156,8 @@ def test_a_study_goes_on_from_its_record(tmp_path: Path, monkeypatch, capsys) ->
     monkeypatch.setattr(studies, "measure", _measured_again)
     assert command(line) == 0
     assert capsys.readouterr().out == first
+    with pytest.raises(AssertionError, match="measured again"):  # by other episodes it is another score
+        command([*line[:-1], "1"])
     assert (tmp_path / "curves.png").stat().st_size > 1000
     assert command([*line, "--films"]) == 0
     assert sorted(film.name for film in tmp_path.glob("*.mp4")) == ["Catch-v1-frame30-0.mp4", "Catch-v1-tracker-0.mp4"]
