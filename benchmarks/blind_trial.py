@@ -104,7 +104,8 @@ def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequenc
     found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, progress=False)
     found.write(out)
     write_report(found, out / "report.html")
-    return json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+    written: dict[str, Any] = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+    return written
 
 
 def run(args: list[str] | None = None) -> int:

@@ -80,7 +80,7 @@ class Outcome:
     def off(self) -> np.ndarray:
         off = self.estimated / self.true - 1.0
         off[1] = (self.found.moment - self.hidden.phase + 0.5) % 1.0 - 0.5
-        return off
+        return np.asarray(off)
 
     @property
     def curve_true(self) -> np.ndarray:

@@ -44,7 +44,7 @@ def wall_table(edge: tuple[float, float, float, float] = EDGE) -> Array:
 
 def wall_start(rows: int) -> Array:
     """(rows,) phases at which rows begin, on the clock of EDGE: v = t + s (row - 155) / 250 at a row's own time t."""
-    return np.mod(SPAN * (np.arange(rows) - ROW) / 250.0, 1.0)
+    return np.asarray(np.mod(SPAN * (np.arange(rows) - ROW) / 250.0, 1.0))
 
 
 LAWS = {"without c(v)": None, "with c(v)": wall_table()}

@@ -122,4 +122,4 @@ _MARGIN = 8
 
 def unit_vectors(vectors: Points) -> Points:
     """Vectors (..., 3) of length 1; zero stays zero."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))

@@ -49,7 +49,7 @@ class Camera:
 
     def rest(self) -> NDArray[np.float64]:
         """Camera to world (4, 4), without shake."""
-        return self._rest.copy()
+        return np.asarray(self._rest.copy())
 
     @cached_property
     def _rest(self) -> NDArray[np.float64]:

@@ -237,7 +237,7 @@ def _mask(kind: str, half_width: float, half_height: float, blades: int) -> NDAr
     else:
         edge = np.sin(blades * np.arctan2(y, x)) * radius / blades
         inside = np.minimum(edge, reach - radius)
-    return np.clip(inside + 0.5, 0, 1).astype(np.float32)
+    return np.asarray(np.clip(inside + 0.5, 0, 1).astype(np.float32))
 
 
 def _key_every(fastest: float) -> int:

@@ -345,7 +345,7 @@ def given_times(times_s: NDArray[np.float64], pictures: int, how: Reading, where
         raise InputError(f"{where}: times_s has shape {times.shape} for {pictures} pictures; give one for each")
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise InputError(f"{where}: times_s must be finite, and each after the one before")
-    return times[:pictures] - times[0]
+    return np.asarray(times[:pictures] - times[0])
 
 
 def _warn_if_cut(pictures: int, end_s: float, source: _Source, how: Reading, where: str) -> None:

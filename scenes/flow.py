@@ -103,7 +103,7 @@ def _shade(
 def _alone(truth: Truth) -> NDArray[np.bool_]:
     """Pixels with one object only about them."""
     square, owner = np.ones((NEAR, NEAR), np.uint8), truth.object_id.astype(np.int16)
-    return cv2.erode(owner, square) == cv2.dilate(owner, square)
+    return np.asarray(cv2.erode(owner, square) == cv2.dilate(owner, square))
 
 
 def _alone_at(truth: Truth, x: Places, y: Places) -> NDArray[np.int32]:

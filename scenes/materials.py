@@ -155,7 +155,7 @@ def _picture(material: Any) -> Array | None:
     if image is None:
         return None
     check_size(image.width, image.height, "a texture of the mesh")
-    return np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
+    return np.asarray(np.asarray(image.convert("RGB"), np.float32) / np.float32(255))
 
 
 def _warn_of_transparency() -> None:

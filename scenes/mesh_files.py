@@ -165,16 +165,16 @@ def _sized(meshes: Sequence[trimesh.Trimesh], size: float | None) -> list[trimes
     return meshes
 
 
-def _merged(mesh: Any) -> trimesh.Trimesh:
+def _merged(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """With one vertex where several lie; those with colours of their own share the normal alone."""
     if getattr(mesh.visual, "kind", None) != "vertex" and GLTF_COLOURS not in mesh.vertex_attributes:
         mesh.process()
-        return mesh  # type: ignore[no-any-return]
+        return mesh
     if "vertex_normals" in mesh._cache:
-        return mesh  # type: ignore[no-any-return]
+        return mesh
     first, place = trimesh.grouping.unique_rows(mesh.vertices)
     whole = trimesh.Trimesh(mesh.vertices[first], place[mesh.faces], process=False)
-    mesh.vertex_normals = whole.vertex_normals[place]
+    mesh.vertex_normals = whole.vertex_normals[place]  # type: ignore[method-assign]  # a property, which caches
     return mesh
 
 

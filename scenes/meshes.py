@@ -196,7 +196,7 @@ def _turned(knots: Points, albedo: Albedo, sections: int, pieces: int, straight:
         i = np.clip(np.searchsorted(length, v, "right") - 1, 0, len(knots) - 2)
         h = (length[i + 1] - length[i])[..., None]
         t = ((v - length[i])[..., None] / h).clip(0, 1)
-        return (
+        return np.asarray(
             (1 + 2 * t) * (1 - t) ** 2 * knots[i]
             + t * (1 - t) ** 2 * h * slope[i]
             + t**2 * (3 - 2 * t) * knots[i + 1]

@@ -149,13 +149,13 @@ def _grid(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def _soften(image: Texture) -> Texture:
     """A blur of 0.6 texels across hard edges."""
-    return gaussian_filter(image, 0.6, mode="wrap").clip(0, 1).astype(np.float32, copy=False)
+    return np.asarray(gaussian_filter(image, 0.6, mode="wrap").clip(0, 1).astype(np.float32, copy=False))
 
 
 def _stretch(image: NDArray[np.float64]) -> Texture:
     """To the full range [0, 1]."""
     low, high = image.min(), image.max()
-    return ((image - low) / max(high - low, 1e-12)).astype(np.float32)
+    return np.asarray(((image - low) / max(high - low, 1e-12)).astype(np.float32))
 
 
 def _paint_disc(

@@ -72,7 +72,7 @@ class Still(Motion):
 
     @cached_property
     def _rotation(self) -> NDArray[np.float64]:
-        return Rotation.from_rotvec(np.radians(self.turn)).as_matrix()
+        return np.asarray(Rotation.from_rotvec(np.radians(self.turn)).as_matrix())
 
 
 @dataclass(frozen=True)

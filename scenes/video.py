@@ -175,7 +175,7 @@ class VideoScene:
 
     def _picture(self, number: int) -> NDArray[np.float32]:
         """A picture's light; films are kept in half precision, in which nothing is to be computed."""
-        return self._light[number].astype(np.float32, copy=False)
+        return np.asarray(self._light[number].astype(np.float32, copy=False))
 
     def _place(self, frame: float) -> float:
         """Where in the film a frame is, in pictures and shares of one; it turns round at either end."""

@@ -78,9 +78,9 @@ def declared(kind: type[D], data: Any, where: str) -> D:
 def checked_format(data: Any, expected: str, where: str) -> dict[str, Any]:
     """The data; raises InputError unless it is a table whose entry `format` is the one expected."""
     found = data.get("format") if isinstance(data, dict) else type(data).__name__
-    if found != expected:
+    if found != expected or not isinstance(data, dict):
         raise InputError(f"{where}: format is {shown(found)}, expected {expected!r}")
-    return data  # type: ignore[no-any-return]
+    return data
 
 
 def read_json(path: str | Path) -> Any:
@@ -107,9 +107,10 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 def parse_toml(text: str, where: str) -> dict[str, Any]:
     """The table in a TOML text; raises InputError where it is not one."""
     try:
-        return tomllib.loads(text)
+        table: dict[str, Any] = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where} is not a TOML file: {_short(error)}") from error
+    return table
 
 
 def read_text(path: str | Path) -> str:
@@ -298,7 +299,7 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, source: Path) -> NDA
             )
         checked_memory(declared_bytes, f"{source}: {info.filename}, {dtype} of shape {shape},")
     with archive.open(info) as member:
-        return np.lib.format.read_array(member, allow_pickle=False)  # type: ignore[no-any-return]
+        return np.lib.format.read_array(member, allow_pickle=False)
 
 
 def _selected(shape: tuple[int, ...], part: Any) -> list[int]:

@@ -147,7 +147,7 @@ def _over_cells(at_centres: Array) -> Array:
     """Means over cells of d, along the last axis, from values at their centres: with the curvature's 24th."""
     mean = at_centres.copy()
     mean[..., 1:-1] += np.diff(at_centres, 2, axis=-1) / 24.0
-    return mean
+    return np.asarray(mean)
 
 
 def _scanned(steps: Steps) -> list[Array]:

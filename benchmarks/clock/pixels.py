@@ -58,7 +58,7 @@ def counts(
     """(P,) numbers of spikes of the same pixels in `frames` frames."""
     number = np.zeros((1, interval.size), np.int64)
     _fire(interval, start, table, np.sqrt(white), frames, rng, number)
-    return number[0]
+    return np.asarray(number[0])
 
 
 @njit(cache=True)

@@ -427,6 +427,6 @@ def afterpulsing(effect: Any, camera: Camera) -> None:
         again = bits[:-later] & (camera.rng.random(bits[:-later].shape) < effect.probability)
         both = bits.copy()
         both[later:] |= again
-        return both
+        return np.asarray(both)
 
     camera.reports.append(reported)

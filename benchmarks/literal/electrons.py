@@ -15,10 +15,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
 
 _TAU = 2.0 * np.pi
+
+
+Array = NDArray[np.float64]
+Bits = NDArray[np.uint8]
+Places = NDArray[np.int64]
 
 
 class Law(NamedTuple):
@@ -95,7 +101,7 @@ class Nodes(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def radiance(t, law, film):
+def radiance(t: float, law: Law, film: Film) -> float:
     """L(t) = (linear between keys) (1 + m sin 2 pi (f t + p))."""
     keys, levels = film.keys, film.levels
     if t <= keys[0]:
@@ -107,23 +113,23 @@ def radiance(t, law, film):
         level = levels[i] + (levels[i + 1] - levels[i]) * (t - keys[i]) / (keys[i + 1] - keys[i])
     if law.flicker > 0.0:
         level *= 1.0 + law.flicker * np.sin(_TAU * (law.flicker_frequency * t + law.flicker_phase))
-    return level
+    return float(level)
 
 
 @njit(cache=True, error_model="numpy")
-def photocurrent(light, threshold, law):
+def photocurrent(light: float, threshold: float, law: Law) -> float:
     """Electrons a frame of those that light would bring: y (1 - beta x), x = y / threshold."""
     return light * (1.0 - law.beta * light / threshold)
 
 
 @njit(cache=True, error_model="numpy")
-def warming(t, law):
+def warming(t: float, law: Law) -> float:
     """Dark rate over its start: 1 + a (1 - exp(-t/tau))."""
-    return 1.0 + law.drift * (1.0 - np.exp(-max(t, 0.0) / law.drift_tau))
+    return 1.0 + law.drift * (1.0 - float(np.exp(-max(t, 0.0) / law.drift_tau)))
 
 
 @njit(cache=True, error_model="numpy")
-def reference(t, mean, law):
+def reference(t: float, mean: float, law: Law) -> float:
     """phi(t) = mean (1 + rho sin 2 pi (f t + p)) + c(t)."""
     phi = mean
     if law.ripple > 0.0:
@@ -134,14 +140,14 @@ def reference(t, mean, law):
 
 
 @njit(cache=True, error_model="numpy")
-def clock_edge(t, law):
+def clock_edge(t: float, law: Law) -> float:
     """c(t) = a (exp(-w/tau) - its mean over a frame), w = (t - v0) mod 1: since the last edge of the array's clock."""
     since = (t - law.edge_phase) % 1.0
-    return law.edge * (np.exp(-since / law.edge_tau) - law.edge_tau * (1.0 - np.exp(-1.0 / law.edge_tau)))
+    return law.edge * float(np.exp(-since / law.edge_tau) - law.edge_tau * (1.0 - np.exp(-1.0 / law.edge_tau)))
 
 
 @njit(cache=True, error_model="numpy")
-def meeting(charge, mean, offset, start, end, law):
+def meeting(charge: float, mean: float, offset: float, start: float, end: float, law: Law) -> float:
     """First moment in [start, end) at which phi(t) + offset <= charge; `end` where there is none.
 
     Looked for in steps of 1/64 frame or of 1/32 period, whichever is less, then halved to 1e-9 frames.
@@ -164,7 +170,18 @@ def meeting(charge, mean, offset, start, end, law):
 
 
 @njit(cache=True, error_model="numpy")
-def reset(t, r, c, phi, rate, read, law, pixels, nodes, rng):
+def reset(
+    t: float,
+    r: int,
+    c: int,
+    phi: float,
+    rate: float,
+    read: float,
+    law: Law,
+    pixels: Pixels,
+    nodes: Nodes,
+    rng: np.random.Generator,
+) -> float:
     """The node (r, c) crosses phi at t: start again.  rate: thresholds a frame now.  read: when the frame is read.
     Returns when the spike is reported.
 
@@ -189,7 +206,7 @@ def reset(t, r, c, phi, rate, read, law, pixels, nodes, rng):
 
 
 @njit(cache=True, error_model="numpy")
-def report(t, n, r, c, edges, spikes):
+def report(t: float, n: int, r: int, c: int, edges: Array, spikes: Bits) -> None:
     """A spike at t sets the bit of the frame that is read next."""
     while n < spikes.shape[0] and edges[n + 1, r] <= t:
         n += 1
@@ -198,7 +215,22 @@ def report(t, n, r, c, edges, spikes):
 
 
 @njit(cache=True, error_model="numpy")
-def live(n, r, c, start, end, scale, offset, law, pixels, film, nodes, edges, rng, spikes):
+def live(
+    n: int,
+    r: int,
+    c: int,
+    start: float,
+    end: float,
+    scale: float,
+    offset: float,
+    law: Law,
+    pixels: Pixels,
+    film: Film,
+    nodes: Nodes,
+    edges: Array,
+    rng: np.random.Generator,
+    spikes: Bits,
+) -> None:
     """One pixel from `start` to `end`, in its frame n, with thresholds times `scale` plus `offset`.
 
     Where the threshold comes down to the charge, the reset clears the node, and nothing is left.  A threshold that is
@@ -260,7 +292,7 @@ def live(n, r, c, start, end, scale, offset, law, pixels, film, nodes, edges, rn
 
 
 @njit(cache=True, error_model="numpy")
-def start(law, pixels, film, first, rng):
+def start(law: Law, pixels: Pixels, film: Film, first: float, rng: np.random.Generator) -> Nodes:
     """Nodes part-way through a cycle, by a uniform share of their threshold; light before has been steady."""
     rows, columns = pixels.gain.shape
     shape = (rows, columns)
@@ -285,7 +317,9 @@ def start(law, pixels, film, first, rng):
 
 
 @njit(cache=True, error_model="numpy")
-def expose(law, pixels, film, edges, offset, rng, spikes):
+def expose(
+    law: Law, pixels: Pixels, film: Film, edges: Array, offset: Array, rng: np.random.Generator, spikes: Bits
+) -> None:
     """spikes (F, H, W) uint8, zeros, are set.
 
     edges: (F+1, H), when each row is read.  offset: (F * k, H, W), or 1 for any of the last two: what is added to the
@@ -309,7 +343,17 @@ def expose(law, pixels, film, edges, offset, rng, spikes):
 
 
 @njit(cache=True, error_model="numpy")
-def expose_coupled(law, pixels, film, kick, late_kick, share, full, rng, spikes):
+def expose_coupled(
+    law: Law,
+    pixels: Pixels,
+    film: Film,
+    kick: float,
+    late_kick: bool,
+    share: float,
+    full: float,
+    rng: np.random.Generator,
+    spikes: Bits,
+) -> None:
     """spikes (F, H, W) uint8, zeros, are set; electrons of the whole array in the order of time.
 
     crosstalk: when a pixel is reset, each of its four neighbours gets k thresholds at once (late_kick: when its frame
@@ -354,7 +398,21 @@ def expose_coupled(law, pixels, film, kick, late_kick, share, full, rng, spikes)
 
 
 @njit(cache=True, error_model="numpy")
-def _fire(n, r, c, kick, late_kick, nodes, pixels, due, crossed, down, right, spikes, rng):
+def _fire(
+    n: int,
+    r: int,
+    c: int,
+    kick: float,
+    late_kick: bool,
+    nodes: Nodes,
+    pixels: Pixels,
+    due: Array,
+    crossed: Places,
+    down: Places,
+    right: Places,
+    spikes: Bits,
+    rng: np.random.Generator,
+) -> None:
     """Reset (r, c) if an electron took it to its threshold, and all whom that kicks over theirs, which keep nothing."""
     rows, columns = nodes.charge.shape
     crossed[0, 0], crossed[0, 1], waiting, kicked = r, c, 1, False

@@ -13,8 +13,8 @@ The learned ones see the 41 frames about the frame; before the first and after t
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
-from functools import lru_cache
+from collections.abc import Callable, Iterable
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +33,9 @@ from spikecam_env.streams import middleTFI, middleTFP
 from spikecam_env.streams.packing import as_stream, check_values
 from spikecam_env.untrusted import existing_file
 
-PLAIN = {
-    "tfp21": lambda spikes, t: middleTFP(spikes, t, 21),
-    "tfp41": lambda spikes, t: middleTFP(spikes, t, 41),
+PLAIN: dict[str, Callable[[NDArray[np.uint8], int], NDArray[np.float32]]] = {
+    "tfp21": partial(middleTFP, window=21),
+    "tfp41": partial(middleTFP, window=41),
     "tfi": middleTFI,
 }
 """Methods without weights."""

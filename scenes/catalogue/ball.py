@@ -65,7 +65,7 @@ def football_leather(size: int = 512) -> Texture:
     ordered = np.sort(reach, -1)
     leather = np.where(reach.argmax(-1) < 12, 0.06, 0.9)
     seam = np.clip((ordered[..., -1] - ordered[..., -2]) / 0.012, 0, 1)
-    return (0.1 + (leather - 0.1) * seam).astype(np.float32)
+    return np.asarray((0.1 + (leather - 0.1) * seam).astype(np.float32))
 
 
 def stitched(size: int = 256) -> Texture:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
+from scenes.assembly import Points
 from scenes.catalogue import stage
 from scenes.drawing import Canvas
 from scenes.meshes import Part, assemble, capsule, sheet, sphere
 from scenes.protocol import Scene
-from scenes.renderers.protocol import Renderer
+from scenes.renderers.protocol import Renderer, Surface
 from scenes.textures import Texture, blobs
 from scenes.trajectories import Path, Still, Swinging, Vibrating
 from scenes.world import Body, World
@@ -33,7 +36,7 @@ def scene(shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Ren
     return World(shape, (leaf, *bodies), stage.camera(0.9), frame_rate_hz=frame_rate_hz, renderer=renderer)
 
 
-def insect(rng: np.random.Generator):
+def insect(rng: np.random.Generator) -> Surface:
     """Head to +z: abdomen, thorax, head with eyes, six legs."""
     abdomen = sphere(0.17, banded(), 48).scaled((1, 0.9, 1.7)).moved(Still((0, -0.02, -0.3)))
     thorax = sphere(0.16, stage.mottled(rng, 0.1, 0.5, 128), 40).moved(Still((0, 0.02, 0.03)))
@@ -49,8 +52,8 @@ def insect(rng: np.random.Generator):
 def wing(side: int) -> list[Part]:
     """Upper and lower face of a veined wing towards +x or -x."""
 
-    def face(flip: bool):
-        def points(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def face(flip: bool) -> Callable[[Points, Points], Sequence[Points]]:
+        def points(u: Points, v: Points) -> Sequence[Points]:
             along = 1 - u if flip else u
             width = 0.2 * np.sqrt(np.clip(np.sin(np.pi * (0.06 + 0.9 * along)), 0, 1)) * (0.6 + 0.6 * along)
             return side * 0.72 * along, 0.05 * along**2 - (0.012 if flip else 0) + 0 * v, (0.35 - v) * width * 1.6

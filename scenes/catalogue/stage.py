@@ -49,7 +49,7 @@ def boards(
     value = 0.5 * board + 0.3 * fine + 0.2 * grain
     value[::24] *= 0.2
     value[1::24] *= 0.5
-    return (dark + (bright - dark) * value).astype(np.float32)
+    return np.asarray((dark + (bright - dark) * value).astype(np.float32))
 
 
 def mottled(rng: np.random.Generator, low: float, high: float, size: int = 768) -> Texture:
@@ -80,4 +80,4 @@ def outdoors(rng: np.random.Generator) -> tuple[Body, Body]:
 def speckle(rng: np.random.Generator, size: int) -> Texture:
     """Gravel: noise of a few texels."""
     grains = np.asarray(cv2.GaussianBlur(rng.random((size, size)).astype(np.float32), (0, 0), 1.2))
-    return np.clip(0.5 + 2.5 * (grains - 0.5), 0, 1).astype(np.float32)
+    return np.asarray(np.clip(0.5 + 2.5 * (grains - 0.5), 0, 1).astype(np.float32))

@@ -105,11 +105,11 @@ class _Traceable:
         turn = np.linalg.inv(matrix[:3, :3])
         eye = (-turn @ matrix[:3, 3] - self._middle) / self._size
         origins, directions = _rays(eye, turn, *place, *size, supersample)
-        return self._scene.run(origins, directions).reshape(*size, supersample**2)
+        return np.asarray(self._scene.run(origins, directions).reshape(*size, supersample**2))
 
 
 @njit(cache=True)
-def _inverses(corners, faces):
+def _inverses(corners: NDArray[np.float64], faces: NDArray[np.integer]) -> NDArray[np.float64]:
     """(F, 9) M^-1, row by row, of every triangle; zeros for one that is seen from its edge."""
     inverses = np.zeros((len(faces), 3, 3))
     for f in range(len(faces)):
@@ -128,7 +128,16 @@ def _inverses(corners, faces):
 
 
 @njit(cache=True)
-def _rays(eye, turn, left, top, pixel, rows, columns, supersample):
+def _rays(
+    eye: NDArray[np.float64],
+    turn: NDArray[np.float64],
+    left: float,
+    top: float,
+    pixel: float,
+    rows: int,
+    columns: int,
+    supersample: int,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Origins and directions (N, 3) float32 through the middles of every pixel's cells, pixel after pixel."""
     origins = np.empty((rows * columns * supersample * supersample, 3), np.float32)
     directions = np.empty_like(origins)
@@ -147,7 +156,23 @@ def _rays(eye, turn, left, top, pixel, rows, columns, supersample):
 
 
 @njit(cache=True, error_model="numpy")
-def _shade(hit, place, m, faces, normals, uv, texels, start, shape, sharper, lamp, light, radiance, coverage, depth):
+def _shade(
+    hit: NDArray[np.int32],
+    place: tuple[float, float, float],
+    m: NDArray[np.float64],
+    faces: NDArray[np.integer],
+    normals: NDArray[np.float64],
+    uv: NDArray[np.float64],
+    texels: NDArray[np.float32],
+    start: NDArray[np.integer],
+    shape: NDArray[np.integer],
+    sharper: float,
+    lamp: NDArray[np.float64],
+    light: tuple[float, float, float],
+    radiance: NDArray[np.float32],
+    coverage: NDArray[np.float32],
+    depth: NDArray[np.float32],
+) -> None:
     """Mean radiance and coverage of each pixel's rays, mean depth of those that hit."""
     left, top, pixel = place
     rows, columns, rays = hit.shape
@@ -204,7 +229,14 @@ def _shade(hit, place, m, faces, normals, uv, texels, start, shape, sharper, lam
 
 
 @njit(cache=True)
-def _read(texels, start, shape, u, v, fineness):
+def _read(
+    texels: NDArray[np.float32],
+    start: NDArray[np.integer],
+    shape: NDArray[np.integer],
+    u: float,
+    v: float,
+    fineness: float,
+) -> float:
     """Texture at (u, v), blended between the two levels next to `fineness`."""
     fineness = min(max(fineness, 0.0), len(start) - 1.0)
     level = min(int(fineness), max(len(start) - 2, 0))
@@ -213,11 +245,11 @@ def _read(texels, start, shape, u, v, fineness):
     if blend > 0.0:
         coarse = _bilinear(texels, start[level + 1], shape[level + 1, 0], shape[level + 1, 1], u, v)
         value += blend * (coarse - value)
-    return value
+    return float(value)
 
 
 @njit(cache=True)
-def _bilinear(texels, start, height, width, u, v):
+def _bilinear(texels: NDArray[np.float32], start: int, height: int, width: int, u: float, v: float) -> float:
     """One level, repeated without end; row 0 is at v = 1."""
     x = (u - floor(u)) * width - 0.5
     y = (ceil(v) - v) * height - 0.5
@@ -227,4 +259,4 @@ def _bilinear(texels, start, height, width, u, v):
     left, top = left % width, top % height
     upper = texels[start + top * width + left] * (1 - dx) + texels[start + top * width + right] * dx
     lower = texels[start + bottom * width + left] * (1 - dx) + texels[start + bottom * width + right] * dx
-    return upper * (1 - dy) + lower * dy
+    return float(upper * (1 - dy) + lower * dy)

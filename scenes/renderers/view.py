@@ -122,7 +122,7 @@ def to_camera(pose: NDArray[np.float64], camera: Pinhole) -> NDArray[np.float64]
 
 def moved(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (N, 3) through a (4, 4) matrix."""
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
+    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def reached(vertices: NDArray[np.float64], camera: Pinhole, window: Window) -> Window | None:
@@ -145,7 +145,7 @@ def towards(lighting: Lighting) -> NDArray[np.float64]:
     length = np.linalg.norm(direction)
     if direction.shape != (3,) or not 0 < length < np.inf:
         raise InputError(f"lighting.towards is {lighting.towards}; it must be three numbers, not all of them zero")
-    return direction / length
+    return np.asarray(direction / length)
 
 
 def blank(window: Window) -> Sprite:

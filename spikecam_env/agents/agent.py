@@ -91,7 +91,7 @@ class Agent:
         with torch.inference_mode():
             mean, _, _ = self.policy(*map(torch.from_numpy, seen))
         actions = mean.clamp(-1, 1).numpy()
-        return actions if many else actions[0]
+        return np.asarray(actions if many else actions[0])
 
     def _checked(self, observation: Any) -> bool:
         """Whether it is of many environments."""

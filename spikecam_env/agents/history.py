@@ -52,4 +52,6 @@ def pooled(pictures: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:
         return pictures
     rows, columns = (size // side for size in pictures.shape[2:])
     cut = pictures[:, :, : rows * side, : columns * side].astype(np.uint16)
-    return (cut.reshape(*cut.shape[:2], rows, side, columns, side).sum(axis=(3, 5)) // side**2).astype(np.uint8)
+    return np.asarray(
+        (cut.reshape(*cut.shape[:2], rows, side, columns, side).sum(axis=(3, 5)) // side**2).astype(np.uint8)
+    )

@@ -30,7 +30,16 @@ def supersampled(
 
 
 @njit(cache=True, nogil=True)
-def _supersample(texture, background, x0, y0, radius, angle, samples, picture):  # pragma: no cover - compiled
+def _supersample(
+    texture: NDArray[np.float32],
+    background: float,
+    x0: float,
+    y0: float,
+    radius: float,
+    angle: float,
+    samples: int,
+    picture: NDArray[np.float32],
+) -> None:  # pragma: no cover - compiled
     n = texture.shape[0]
     cosine, sine = np.cos(angle), np.sin(angle)
     for r in range(picture.shape[0]):

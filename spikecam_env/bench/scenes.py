@@ -201,7 +201,7 @@ def _disk_errors(disk: RotatingDisk, texture: NDArray[np.float32], dark: float) 
             true[i] = supersampled(disk, texture, dark, instants[i])
 
         side_by_side(draw, len(instants))
-        return (given - true.mean(axis=0))[inside]
+        return np.asarray((given - true.mean(axis=0))[inside])
 
     return {
         "rms at keys, %": _rms([off(keys.frame[i : i + 1]) for i in (0, 1, len(keys.frame) // 2)]),

@@ -108,7 +108,8 @@ def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -
     begin = times.first + rng.random(n.size) * np.clip(interval - times.first, 0.0, 1.0)
     end = times.frames - after - rng.random(n.size) * np.clip(interval - after, 0.0, 1.0)
     walk = np.sqrt(n * white) * interval * rng.standard_normal(n.size)
-    return n / np.maximum(end - begin + walk, n)  # a pixel fires once a frame at most, however wide the jitter
+    least = n  # a pixel fires once a frame at most, however wide the jitter
+    return np.asarray(n / np.maximum(end - begin + walk, least))
 
 
 def ideal_second_difference(k: NDArray[np.int64], interval: Array) -> Array:
@@ -127,7 +128,7 @@ def _variance_above_floor(spikes: NDArray[np.uint8]) -> Array:
     mean = np.bincount(owner, interval, count.size) / n
     variance = np.bincount(owner, interval**2, count.size) / n - mean**2
     fraction = mean % 1.0
-    return (variance - fraction * (1 - fraction))[count > 2]
+    return np.asarray((variance - fraction * (1 - fraction))[count > 2])
 
 
 @njit(cache=True)

@@ -89,7 +89,7 @@ def excess_covariance(wall: WallStatistics) -> Array:
     ideal = ideal_second_difference(np.array(STEPS), 1.0 / wall.rate[:, None])
     influence = wall.times.square - wall.times.terms * (ideal + wall.excess)
     influence = influence / wall.times.terms.sum(axis=0)
-    return influence.T @ influence
+    return np.asarray(influence.T @ influence)
 
 
 def simulate_wall(rate: Array, white: float, octave: float, frames: int, rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -120,4 +120,4 @@ def _simulated_excess(wall: WallStatistics, values: Array, bar: tqdm) -> Array:
         spikes = simulate_wall(rate, values[0], values[1], wall.times.frames, rng)
         runs.append(wall_statistics(spikes).excess)
         bar.update()
-    return np.mean(runs, axis=0)
+    return np.asarray(np.mean(runs, axis=0))

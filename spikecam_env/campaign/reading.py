@@ -84,7 +84,7 @@ class CampaignRecording:
         light = self.light()
         if light is None or np.any(light.radiance != light.radiance[0]):
             return None
-        return light.radiance[0].astype(np.float64)
+        return np.asarray(light.radiance[0].astype(np.float64))
 
     def packed(self) -> NDArray[np.uint8]:
         """(frames, ceil(H W / 8)) uint8 bits of the stream, mapped from the file; raises InputError for rates only."""

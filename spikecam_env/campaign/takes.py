@@ -122,7 +122,7 @@ def light_during(light: Keyframes, start: int, stop: int, shape: tuple[int, int]
     return Keyframes(light.frame[first : last + 1], np.broadcast_to(radiance, (len(radiance), *shape)))
 
 
-def _stream(sensor: SpikeSensor, take: Take, scale: float, bar: tqdm) -> Iterator[NDArray[np.uint8]]:  # type: ignore[type-arg]
+def _stream(sensor: SpikeSensor, take: Take, scale: float, bar: tqdm) -> Iterator[NDArray[np.uint8]]:
     block = max(64, _BLOCK // (sensor.shape[0] * sensor.shape[1]) // 64 * 64)
     for start in range(0, take.frames, block):
         count = min(block, take.frames - start)

@@ -36,5 +36,5 @@ def warnings_as_lines() -> Iterator[None]:
                 said.add(text)
                 print(f"spikecam: warning: {text}", file=sys.stderr)
 
-        warnings.showwarning = show  # type: ignore[assignment]
+        warnings.showwarning = show
         yield

@@ -121,4 +121,4 @@ def _light(path: Path, row: int, shape: tuple[int, ...]) -> NDArray[np.float64]:
     light = numbers(held, "truth/radiance", str(path)).astype(np.float64)
     if light.shape != (1, *shape) or not np.isfinite(light).all():
         raise InputError(f"{path}: truth/radiance has frames of {light.shape[1:]}; need finite numbers of {shape}")
-    return light[0]
+    return np.asarray(light[0])

@@ -21,7 +21,7 @@ from spikecam_env.envs.course import Course
 def approach(error: NDArray[np.float64], most_change: float) -> NDArray[np.float64]:
     """w of the head of this file, of every axis [pixels/step]."""
     size = np.abs(error)
-    return np.sign(error) * np.minimum(size, 4 * size / (1 + np.sqrt(1 + 8 * size / most_change)))
+    return np.asarray(np.sign(error) * np.minimum(size, 4 * size / (1 + np.sqrt(1 + 8 * size / most_change))))
 
 
 def oracle(course: Course) -> NDArray[np.float32]:
@@ -34,4 +34,4 @@ def oracle(course: Course) -> NDArray[np.float32]:
     change = drive.motor.most_change_px_s(drive.step_s) * drive.step_s
     move = then - now + approach(now - [(columns - 1) / 2, (rows - 1) / 2], change)
     action = np.concatenate([(move / top)[: drive.axes], episode.rest(course.standing, first, stop)])
-    return np.clip(action, -1.0, 1.0).astype(np.float32)
+    return np.asarray(np.clip(action, -1.0, 1.0).astype(np.float32))

@@ -169,7 +169,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         reward, terminated = self._judge(self._drawn, self.sensor.frame, self._gaze)
         return observation, float(reward), bool(terminated), False, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """(H, W, 3) uint8, or None without a render mode."""
         if self.render_mode is None:
             return None

@@ -34,7 +34,7 @@ def isi_plane(spikes: ArrayLike, t: int, *, future: int | None = None, normalise
 
     Errors: InputError if t is outside the stream or `future` is negative.
     """
-    return isi_planes(spikes, start=t, stop=t + 1, future=future, normalised=normalised)[0]
+    return np.asarray(isi_planes(spikes, start=t, stop=t + 1, future=future, normalised=normalised)[0])
 
 
 def isi_planes(
@@ -68,7 +68,15 @@ def isi_planes(
 
 # Not parallel: numba's OpenMP layer changes torch's number of threads, and the networks then ran 60 times slower.
 @njit(cache=True, nogil=True)
-def _isi(spikes, start, stop, ahead, normalised, planes, last_of):  # pragma: no cover - compiled
+def _isi(
+    spikes: NDArray[np.uint8],
+    start: int,
+    stop: int,
+    ahead: int,
+    normalised: bool,
+    planes: NDArray[np.float32],
+    last_of: NDArray[np.int32],
+) -> None:  # pragma: no cover - compiled
     """Fill `planes`.  last_of: the same memory as int32, which holds last(t) until the interval is known: float32 would
     round frames beyond 2^24."""
     count, pixels = spikes.shape
@@ -97,7 +105,7 @@ def _isi(spikes, start, stop, ahead, normalised, planes, last_of):  # pragma: no
 
 
 @njit(cache=True)
-def _first_that_matters(spikes, start, a, b):  # pragma: no cover - compiled
+def _first_that_matters(spikes: NDArray[np.uint8], start: int, a: int, b: int) -> int:  # pragma: no cover - compiled
     """The latest t <= start such that every pixel in [a, b) has a spike in t .. start, or 0."""
     missing = b - a
     seen = np.zeros(b - a, np.uint8)

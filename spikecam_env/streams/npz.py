@@ -110,8 +110,8 @@ def _packed(
 
 def _packed_axis(shape: tuple[int, ...], length: int, given: int | None, path: str | Path) -> tuple[int, str]:
     fitting = [axis for axis in (0, 2, 1) if shape[axis] == -(-length // 8)]
-    if given in fitting:
-        return int(given), "given"  # type: ignore[arg-type]
+    if given is not None and given in fitting:
+        return given, "given"
     if given is not None or len(fitting) != 1:
         raise InputError(
             f"{path}: seq of shape {shape} packs {length} frames along one axis, which has to be "

@@ -27,7 +27,7 @@ def middleTFP(spikes: ArrayLike, t: int | None = None, window: int = 41) -> NDAr
     frames = as_stream(spikes)
     t = _middle(frames, t)
     first, stop = _window(t, window, len(frames))
-    return check_values(frames[first:stop], spikes).mean(axis=0, dtype=np.float32)
+    return np.asarray(check_values(frames[first:stop], spikes).mean(axis=0, dtype=np.float32))
 
 
 def middleTFI(spikes: ArrayLike, t: int | None = None) -> NDArray[np.float32]:

@@ -64,9 +64,10 @@ def stream_key(arrays: Mapping[str, Any], key: str | None, path: str | Path) -> 
     listing = ", ".join(f"{name} {a.dtype}{a.shape}" for name, a in list(arrays.items())[:20]) or "nothing"
     if key is not None:
         raise InputError(f"{path} has no array {key!r}; it holds {listing}")
-    for kinds in (lambda dtype: dtype in EIGHT_BITS, lambda dtype: dtype.kind in "iuf"):
+    eight_bits = [name for name, a in arrays.items() if a.dtype in EIGHT_BITS]
+    for some in (eight_bits, [name for name, a in arrays.items() if a.dtype.kind in "iuf"]):
         for axes in (3, 4):
-            fitting = [name for name, a in arrays.items() if a.ndim == axes and kinds(a.dtype)]
+            fitting = [name for name in some if arrays[name].ndim == axes]
             if len(fitting) == 1:
                 return fitting[0]
             if fitting:
@@ -110,7 +111,7 @@ def one_item(array: NDArray[Any], choice: Choice, path: str | Path, key: str) ->
     item = 0 if choice.item is None else checked_whole(choice.item, "item")
     if not 0 <= item < size:
         raise InputError(f"{path}: item is {item}; {key} holds {size} streams along axis {choice.batch_axis}")
-    return np.take(array, item, axis=choice.batch_axis)
+    return np.asarray(np.take(array, item, axis=choice.batch_axis))
 
 
 def as_bytes(array: NDArray[Any], path: str | Path, key: str) -> NDArray[np.uint8]:

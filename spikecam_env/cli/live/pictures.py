@@ -23,7 +23,9 @@ class Noisy:
         blocks = -(-WINDOW // len(spikes))
         self._recent = [*self._recent, spikes][-blocks:]
         frames = sum(map(len, self._recent))
-        return (sum(block.sum(axis=0, dtype=np.int32) for block in self._recent) / frames).astype(np.float32)
+        return np.asarray(
+            (sum(block.sum(axis=0, dtype=np.int32) for block in self._recent) / frames).astype(np.float32)
+        )
 
 
 class Denoised:

@@ -84,7 +84,7 @@ def _exchanged(now: NDArray[Any], first: NDArray[Any], which: Streams) -> NDArra
 
 def grey(rate: NDArray[Any]) -> NDArray[np.uint8]:
     """Spikes a frame, 0 to 1 and cut beyond, as 0 to 255."""
-    return (255.0 * np.minimum(rate, 1.0) + 0.5).astype(np.uint8)
+    return np.asarray((255.0 * np.minimum(rate, 1.0) + 0.5).astype(np.uint8))
 
 
 def picture_space(view: View) -> spaces.Box:

@@ -192,7 +192,7 @@ def without_bias(deviates: Array, groups: list[NDArray[np.intp]]) -> Array:
     centred = deviates.copy()
     for group in groups:
         centred[:, group] -= deviates[:, group].mean()
-    return centred
+    return np.asarray(centred)
 
 
 @dataclass(frozen=True)
@@ -257,9 +257,8 @@ def _window_sums(plane: Array, rows: NDArray[np.int64], columns: NDArray[np.int6
     """(rows, columns) sums of a plane (H, W) over windows."""
     total = np.pad(plane.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
     top, bottom, left, right = rows, rows + size[0], columns, columns + size[1]
-    return total[np.ix_(bottom, right)] - total[np.ix_(top, right)] - total[np.ix_(bottom, left)] + total[
-        np.ix_(top, left)
-    ]  # fmt: skip
+    to_the_right = total[np.ix_(bottom, right)] - total[np.ix_(top, right)]
+    return np.asarray(to_the_right - total[np.ix_(bottom, left)] + total[np.ix_(top, left)])
 
 
 def _union(windows: list[_Window], shape: tuple[int, int]) -> Mask:

@@ -48,7 +48,7 @@ def without_motion(observed: Observed, *, static_only: bool) -> tuple[Observed, 
 
 def static_pixels(motion: tuple[Motion, ...]) -> NDArray[np.bool_]:
     """(H, W) bool: pixels that move in none of the recordings."""
-    return ~np.logical_or.reduce([m.moving for m in motion])
+    return np.asarray(~np.logical_or.reduce([m.moving for m in motion]))
 
 
 def looked_at(condition: Condition) -> NDArray[np.bool_] | slice:

@@ -43,7 +43,7 @@ def normal_deviates(null: Null, t: Array, predicted: Prediction | None = None) -
     if predicted is not None and predicted.units is not None:
         apart = (predicted.units - predicted.mean) / np.sqrt(total_variance(null, predicted))
         log_p = np.maximum(log_p, np.log(np.maximum(share_beyond(t, apart), 1e-300)))
-    return np.sign(t) * -special.ndtri_exp(log_p)
+    return np.asarray(np.sign(t) * -special.ndtri_exp(log_p))
 
 
 def share_beyond(t: Array, apart: Array) -> Array:
@@ -87,7 +87,7 @@ def adjusted(z: Array) -> Array:
     stepped = np.maximum.accumulate(p[order] * (p.size - np.arange(p.size)))
     out = np.empty_like(p)
     out[order] = np.minimum(stepped, 1.0)
-    return out
+    return np.asarray(out)
 
 
 def is_significant(null: Null, rho: Array, predicted: Prediction | None = None) -> bool:

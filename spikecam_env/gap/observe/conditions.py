@@ -54,7 +54,7 @@ class Condition:
     def picture(self) -> NDArray[np.float64]:
         """(P,) radiance, of static light."""
         assert self.light is not None
-        return self.light.radiance[0].reshape(-1).astype(np.float64)
+        return np.asarray(self.light.radiance[0].reshape(-1).astype(np.float64))
 
 
 def condition_of(recording: CampaignRecording) -> Condition:

@@ -86,7 +86,7 @@ class Observation:
     def irregular(self) -> NDArray[np.bool_]:
         """(P,) pixels with a short or a long interval; none where more than MOST_IRREGULAR of all have one."""
         some: NDArray[np.bool_] = self.short + self.long > 0
-        return some & (some.mean() < MOST_IRREGULAR)
+        return np.asarray(some & (some.mean() < MOST_IRREGULAR))
 
 
 def observe(
@@ -160,7 +160,7 @@ def _columns(by_row: NDArray[np.uint64], shape: tuple[int, int]) -> NDArray[np.i
     sums = np.zeros((-(-shape[0] // 255), len(by_row), each), np.uint64)
     add_rows(by_row.view(np.uint8), shape[0], _SPREAD, sums)
     parts = sums.view(np.uint8)[..., : shape[1]]
-    return parts[0].astype(np.int32) if len(parts) == 1 else parts.sum(axis=0, dtype=np.int32)
+    return np.asarray(parts[0].astype(np.int32) if len(parts) == 1 else parts.sum(axis=0, dtype=np.int32))
 
 
 def _film(words: NDArray[np.uint64], pixels: int) -> NDArray[np.uint8]:
@@ -169,4 +169,4 @@ def _film(words: NDArray[np.uint64], pixels: int) -> NDArray[np.uint8]:
     octets = words[: bins * BIN].view(np.uint8).reshape(bins, -1)
     sums = np.zeros((1, bins, octets.shape[1] // BIN), np.uint64)
     add_rows(octets, BIN, _SPREAD, sums)
-    return sums[0].view(np.uint8)[:, :pixels]
+    return np.asarray(sums[0].view(np.uint8)[:, :pixels])

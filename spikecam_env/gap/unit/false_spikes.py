@@ -43,4 +43,4 @@ def read_with_false_spikes(
     count = count + more
     out = read.copy()
     out[at] = np.minimum(np.where(count > 1, (count - 1.0) / np.maximum(span, 1.0), count / frames), 1.0)
-    return out
+    return np.asarray(out)

@@ -37,7 +37,7 @@ def less_traps(model: SensorModel, unit: Unit, dark: Array) -> Array:
     less = dark[highest] - trap_charge(traps, unit, model.frame_rate_hz)[highest] / 2
     out = dark.copy()
     out[highest] = np.maximum(less, np.median(dark))
-    return out
+    return np.asarray(out)
 
 
 def drawn_traps(model: SensorModel, shape: tuple[int, int], seed: int) -> Array:
