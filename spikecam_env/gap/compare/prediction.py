@@ -92,7 +92,7 @@ def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key], refits: S
 
 
 def paired(null: Null, made: Sequence[Draw]) -> Prediction:
-    """The prediction from campaigns with an effect, each less the null's of the same draws: most of their noise cancels.
+    """The prediction from campaigns with an effect, each less the null's of the same draws: their noise nearly cancels.
 
     Values that a draw lacks are the null's.  One pair has PAIR_NOISE of a campaign's noise; several show it by scatter.
     """

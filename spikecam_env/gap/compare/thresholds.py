@@ -32,8 +32,8 @@ BY_CHANCE = 3.0
 """Increase in misfit that chance of the draws can explain."""
 
 TO_JOIN = 4.0
-"""Reduction for a later effect to earn a joint refit.  Less than TO_ADD, since earlier effects may have absorbed part of
-its signature."""
+"""Reduction for a later effect to earn a joint refit.  Less than TO_ADD, since earlier effects may have absorbed part
+of its signature."""
 
 TO_STEP_SHAPE = 5.0
 """Least promised reduction for a step while candidates are compared: less would not change their order."""
