@@ -156,7 +156,7 @@ frame, not sampled at its middle. `now.start` is when each frame begins, `spikec
 closed forms, and with `wants_rise = True` a `Charge` says how light rises within the frame; a frame that holds keys
 then comes piece by piece. What an effect cannot do in such a frame it says by `off_the_line`: beyond 1 % it is refused.
 
-The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
+The tests in `tests/sensor/effects/test_every_effect.py` then check, from its declaration alone: that strength zero
 changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
 cut, saved and restored; docs, bounds, twins that exist, a declaration in order; and a test of your own,
 `test_slow_shutter_...`, of its law.
