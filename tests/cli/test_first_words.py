@@ -6,14 +6,14 @@ import re
 
 import pytest
 
-from spikecam_env.cli.first_words import START, _commands_of, _options_of
+from spikecam_env.cli.first_words import START, _options_of, commands_of
 from spikecam_env.cli.main import COMMANDS, run
 
 
 def every_command() -> dict[str, type]:
     found = {}
     for name, options in COMMANDS.items():
-        below = _commands_of(options)
+        below = commands_of(options)
         found |= {f"{name} {word}": kind for word, kind in below.items()} or {name: options}
     return found
 
