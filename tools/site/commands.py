@@ -50,7 +50,7 @@ def options_of(words: tuple[str, ...]) -> list[Option]:
 
 def _section(words: tuple[str, ...], kind: Any) -> Iterator[str]:
     yield from (f"{'#' * (len(words) + 1)} spikecam {' '.join(words)}", "")
-    yield from _described(inspect.getdoc(kind) or "")
+    yield from _described(kind)
     if not commands_of(kind):
         for option in options_of(words):
             yield from (f"`{option.written}`{_given(option.default)}", f": {_prose(option.meaning) or '(no text)'}", "")
@@ -63,13 +63,26 @@ def _given(default: str) -> str:
     return f" (default `{default}`)" if default not in ("", "False") else ""
 
 
-def _described(docstring: str) -> Iterator[str]:
-    for paragraph in docstring.split("\n\n"):
-        head, colon, lines = paragraph.partition(":")
-        if colon and head in ("example", "examples"):
-            yield from ("```bash", *(_remark_last(line.strip()) for line in lines.splitlines() if line.strip()), "```", "")
-        else:
+def examples_of(kind: Any) -> list[str]:
+    """Command lines that a command's help shows, remarks behind them."""
+    paragraphs = (inspect.getdoc(kind) or "").split("\n\n")
+    shown = [lines for paragraph in paragraphs for lines in [_example(paragraph)] if lines]
+    return [_remark_last(line) for lines in shown for line in lines]
+
+
+def _example(paragraph: str) -> list[str]:
+    head, colon, lines = paragraph.partition(":")
+    if not colon or head not in ("example", "examples"):
+        return []
+    return [line.strip() for line in lines.splitlines() if line.strip()]
+
+
+def _described(kind: Any) -> Iterator[str]:
+    for paragraph in (inspect.getdoc(kind) or "").split("\n\n"):
+        if not _example(paragraph):
             yield from (_prose(paragraph), "")
+    if examples_of(kind):
+        yield from ("```bash", *examples_of(kind), "```", "")
 
 
 def _remark_last(line: str) -> str:
