@@ -26,7 +26,7 @@ STEADY = (*STEADY_KNOWN, "unknown")
 
 LABEL_ERROR = 2e-5
 """Standard deviation, relative, to which labels of light are exact, and first-order laws of it: an assumption
-(docs/gap.md, "What is not claimed")."""
+(docs/gap.md, "Known limits")."""
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ FLOORS: dict[tuple[str, str], float] = {
 """Floors of the statistics' noise, whatever the number of spikes, by group and start of the name.
 
 Labels and first-order laws are exact to no more: light labels to 2e-5, laws of noise to 1 %; counts, on the scale of
-their root, to 1.  Source: docs/gap.md, "What is not claimed"."""
+their root, to 1.  Source: docs/gap.md, "Known limits"."""
 
 
 def floor_of(key: Key) -> float:
