@@ -28,8 +28,8 @@ COMMENT = re.compile(r"<!-- (?P<mark>at small size|given|file|not run|tested by)
 FENCE = re.compile(r"^(?P<indent> *)```(?P<language>[\w{}-]*).*$")
 PYTHON, COMMANDS, TEXT = "python", "commands", "text"
 SHELLS = ("bash", "sh", "shell", "console")
-PROGRAMS = ("spikecam", "python", "make", "pip", ".venv/bin/spikecam", ".venv/bin/python")
-"""A block without a language whose first line begins with one of these is one of command lines."""
+PROGRAMS = ("spikecam", "python", "make", "pip", "mkdir", "export", ".venv/bin/spikecam", ".venv/bin/python")
+"""A block without a language, or of text, whose first line begins with one of these is one of command lines."""
 
 
 @dataclass(frozen=True)
@@ -64,15 +64,22 @@ class Block:
 
 
 def blocks_of(text: str) -> list[Block]:
-    """Every fenced block and every indented one, with the comments that stand right above it."""
+    """Every fenced block and every indented one, with the comments that stand right above it.
+
+    Command lines in a block that says it is text are shown for reading: they are not run.
+    """
     return list(_blocks(text.splitlines()))
 
 
 def inline_commands(text: str) -> list[str]:
     """Command lines within prose and tables, as `code`."""
-    outside = re.sub(r"^( *)```.*?^\1```", "", text, flags=re.DOTALL | re.MULTILINE)
-    found = re.findall(r"(?<!`)`([^`\n]+)`(?!`)", outside)
+    found = re.findall(r"(?<!`)`([^`\n]+)`(?!`)", without_code(text))
     return [code for code in found if re.match(r"(spikecam|python -m|make) [a-z]", code)]
+
+
+def without_code(text: str) -> str:
+    """A page without its fenced blocks."""
+    return re.sub(r"^( *)```.*?^\1```", "", text, flags=re.DOTALL | re.MULTILINE)
 
 
 def command_lines(code: str) -> list[str]:
@@ -120,13 +127,16 @@ def _closing(lines: list[str], at: int, indent: str) -> int:
 def _block(language: str, lines: list[str], line: int, above: list[str]) -> Block:
     code = dedent("\n".join(lines)).strip("\n") + "\n"
     marks = {found["mark"]: found["text"].strip() for found in COMMENT.finditer("\n".join(above))}
-    return Block(_kind(language, code), code, line, marks)
+    kind = _kind(language, code)
+    if kind == COMMANDS and language == "text":
+        marks.setdefault("not run", "shown as text")
+    return Block(kind, code, line, marks)
 
 
 def _kind(language: str, code: str) -> str:
     if language in SHELLS:
         return COMMANDS
     first = next((line for line in code.splitlines() if line.strip() and not line.startswith("#")), "")
-    if not language and first.split()[:1] and first.split()[0] in PROGRAMS:
+    if language in ("", "text") and first.split()[:1] and first.split()[0] in PROGRAMS:
         return COMMANDS
     return PYTHON if language in ("python", "py") else TEXT

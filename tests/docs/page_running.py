@@ -13,7 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -24,11 +24,11 @@ from page_blocks import COMMANDS, PYTHON, ROOT, Block, command_lines
 from page_sizes import BROUGHT, ONLY_READ, SMALL
 from pytest import MonkeyPatch
 
-from spikecam_env.cli.main import COMMANDS as SPIKECAM
 from spikecam_env.cli.main import run, understood
 from spikecam_env.cli.options import check_options
 
 INSTALLED = f"{sys.executable} -m spikecam_env"
+ENVIRONMENT = re.compile(r"^[A-Z_]+=\S+ ")
 SHELL = ("mkdir", "cp", "mv", "ls", "cat")
 """What a page may do in its folder besides `spikecam` and `python`."""
 
@@ -41,8 +41,10 @@ class Page:
     patch: MonkeyPatch
     counts: Counter[str] = field(default_factory=Counter)
 
-    def do(self, block: Block) -> None:
-        """Run a block, or, where it says so, only read it."""
+    def do(self, block: Block, instead: str = "") -> None:
+        """Run a block; or only read it, where it says so or `instead` does, a reason."""
+        if instead:
+            block = replace(block, marks={"not run": instead})
         self.bring(block.code)
         if "given" in block.marks:
             self.python(block.marks["given"], block.line)
@@ -63,6 +65,11 @@ class Page:
     def python(self, code: str, line: int) -> None:
         exec(compile("\n" * (line - 1) + code, self.module.__name__, "exec"), self.module.__dict__)
 
+    def environment(self, line: str) -> None:
+        """Set what a line sets before its program."""
+        for word in ENVIRONMENT.findall(line):
+            self.patch.setenv(*word.strip().split("="))
+
     def _python_block(self, block: Block) -> None:
         if "not run" in block.marks:
             compile(block.code, self.module.__name__, "exec")
@@ -72,10 +79,11 @@ class Page:
         self.counts["Python blocks run"] += 1
 
     def _line(self, line: str, block: Block) -> None:
-        words = without_environment(line)
-        reason = block.marks.get("not run") or reason_not_to_run(words)
+        words = words_of(line)
+        reason = block.marks.get("not run") or ("" if block.options else reason_not_to_run(words))
         if words[0] == "spikecam" and not reason:
             words = [*words, *at_small_size(words), *block.options]
+            self.environment(line)
             assert run(words[1:]) == 0, shlex.join(words)
         elif reason:
             read(line)
@@ -84,9 +92,10 @@ class Page:
         self.counts[f"command lines not run: {reason}" if reason else "command lines run"] += 1
 
 
-def without_environment(line: str) -> list[str]:
-    """The words of a line; programs of `.venv/bin` by their names."""
-    return [word.removeprefix(".venv/bin/") if at == 0 else word for at, word in enumerate(shlex.split(line))]
+def words_of(line: str) -> list[str]:
+    """The words of a line, from its program on; one of `.venv/bin` by its name."""
+    program, *words = shlex.split(ENVIRONMENT.sub("", line))
+    return [program.removeprefix(".venv/bin/"), *words]
 
 
 def reason_not_to_run(words: Sequence[str]) -> str:
@@ -116,7 +125,7 @@ def begins(words: Sequence[str], command: str) -> bool:
 
 def read(line: str) -> None:
     """Read a command line with its own parser, and run nothing; raises where it is not understood."""
-    words = without_environment(line)
+    words = words_of(line)
     if words[0] == "spikecam":
         check_options(understood(words[1:]))
     elif words[:2] == ["python", "-m"] and words[2].split(".")[0] in ("benchmarks", "tools"):
@@ -163,7 +172,7 @@ def in_shell(line: str) -> None:
     """Run a line by bash, with this Python and the command first on its path."""
     functions = f'spikecam() {{ {INSTALLED} "$@"; }}; python() {{ {sys.executable} "$@"; }}'
     done = subprocess.run(
-        ["bash", "-euc", f"{functions}; {line}"], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)}
+        ["bash", "-euc", f"{functions}; {line.replace('.venv/bin/', '')}"], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)}
     )
     assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
 
@@ -175,6 +184,8 @@ def alternatives(code: str) -> list[str]:
 
 
 def is_name_alone(code: str) -> bool:
-    """Whether inline code names a command and gives no values, as `spikecam evaluate` does."""
+    """Whether inline code names a command and gives it nothing, as `spikecam evaluate` does."""
     words = code.split()
-    return words[0] == "spikecam" and not any(word.startswith("-") for word in words) and words[1] in SPIKECAM
+    if words[0] == "python":
+        return len(words) == 3
+    return words[0] == "spikecam" and not any(word.startswith("-") for word in words)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
@@ -15,7 +16,7 @@ from spikecam_env.cli.first_words import check_words
 from spikecam_env.cli.main import COMMANDS as SPIKECAM
 from tools.site.commands import every_command, examples_of
 
-SLOW: set[str] = set()
+SLOW = {"docs/tutorials/first_diagnosis.md", "docs/howto/train.md"}
 """Pages that take ten seconds or more."""
 
 
@@ -35,8 +36,11 @@ def test_what_a_page_shows_works(
     shown = Page(ModuleType("the_page"), monkeypatch)
     monkeypatch.setitem(sys.modules, "the_page", shown.module)
     began = time.process_time()
-    for block in blocks_of(page.read_text(encoding="utf-8")):
-        shown.do(block)
+    blocks = blocks_of(page.read_text(encoding="utf-8"))
+    elsewhere = next((block.marks["tested by"] for block in blocks if "tested by" in block.marks), "")
+    for block in blocks:
+        shown.do(block, f"run by {elsewhere}" if elsewhere else "")
+    assert not elsewhere or page.name in (ROOT / elsewhere).read_text(encoding="utf-8")
     record_property("docs", dict(shown.counts))
     print(f"{NAMES[page]}: {time.process_time() - began:.1f} s", dict(shown.counts))
 
@@ -45,13 +49,21 @@ def test_what_a_page_shows_works(
 def test_command_lines_within_the_text_are_understood(page: Path) -> None:
     for code in inline_commands(page.read_text(encoding="utf-8")):
         if is_name_alone(code):
-            check_words(code.split()[1:], SPIKECAM)
+            check_name(code)
         else:
             for line in alternatives(code):
                 read(line)
 
 
-@pytest.mark.parametrize("words, kind", every_command(), ids=lambda value: " ".join(value) if isinstance(value, tuple) else "")
+def check_name(code: str) -> None:
+    program, *words = code.split()
+    if program == "spikecam":
+        check_words(words, SPIKECAM)
+    elif not words[1].endswith(".NAME"):
+        assert find_spec(words[1]), f"no module {words[1]}"
+
+
+@pytest.mark.parametrize("words, kind", [*every_command()], ids=lambda value: " ".join(value) if isinstance(value, tuple) else "")
 def test_examples_of_the_help_are_understood(words: tuple[str, ...], kind: type) -> None:
     for line in examples_of(kind):
         read(line.partition("  #")[0])

@@ -52,7 +52,8 @@ def names_of(module: str) -> list[str]:
     if offered is not None:
         return sorted(offered, key=str.casefold)
     made_here = (n for n, value in vars(loaded).items() if getattr(value, "__module__", None) == module)
-    return sorted((n for n in made_here if not n.startswith("_")), key=str.casefold)
+    offered = (n for n in made_here if not n.startswith("_") and kind_of(vars(loaded)[n]) in ("class", "function"))
+    return sorted(offered, key=str.casefold)
 
 
 def home_of(module: str, name: str) -> str:
