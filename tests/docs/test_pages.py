@@ -41,7 +41,7 @@ def test_what_a_page_shows_works(
     for block in blocks:
         shown.do(block, f"run by {elsewhere}" if elsewhere else "")
     assert not elsewhere or page.name in (ROOT / elsewhere).read_text(encoding="utf-8")
-    record_property("docs", dict(shown.counts))
+    record_property("pages", {what: {"count": count} for what, count in shown.counts.items()})
     print(f"{NAMES[page]}: {time.process_time() - began:.1f} s", dict(shown.counts))
 
 
@@ -67,3 +67,10 @@ def check_name(code: str) -> None:
 def test_examples_of_the_help_are_understood(words: tuple[str, ...], kind: type) -> None:
     for line in examples_of(kind):
         read(line.partition("  #")[0])
+
+
+@pytest.mark.parametrize("what", ["an_effect", "a_scene", "a_statistic", "a_task"])
+def test_a_how_to_that_adds_one_thing_is_short(what: str) -> None:
+    lines = (ROOT / "docs" / "howto" / f"add_{what}.md").read_text(encoding="utf-8").splitlines()
+    print(f"add_{what}.md: {len(lines)} lines")
+    assert len(lines) <= 40

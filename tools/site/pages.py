@@ -1,7 +1,8 @@
 """What is filled in as Sphinx reads a page of docs: the reference, and links to files that are no pages.
 
 `<!-- generated: commands -->` becomes the command line reference, `<!-- generated: formats -->` the table of file formats,
-`<!-- generated: api MODULE -->` what a module offers, `<!-- generated: page FILE -->` a page at the root.
+`<!-- generated: benchmarks -->` those of speed by version, `<!-- generated: api MODULE -->` what a module offers,
+`<!-- generated: page FILE -->` a page at the root.
 A link to a file of the repository becomes a download of it; a link to a folder, its name.
 """
 
@@ -12,7 +13,7 @@ import re
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 
-from tools.site import commands
+from tools.site import benchmarks, commands
 from tools.site.docstrings import rendered
 from tools.site.public import docstring_of, home_of, kind_of, names_of
 
@@ -30,12 +31,12 @@ def filled_in(text: str, page: str) -> str:
 
 
 def generated(what: str, of: str = "") -> str:
-    """The command line reference, the table of formats, a module's reference, or a page at the root."""
+    """The reference of the command line or of a module, tables of formats or of benchmarks, or a page at the root."""
     if what == "api":
         return "\n".join(_module(of))
     if what == "page":
         return _from_root(of)
-    return {"commands": commands.page, "formats": _formats}[what]()
+    return {"commands": commands.page, "formats": _formats, "benchmarks": benchmarks.page}[what]()
 
 
 def _formats() -> str:
