@@ -1,6 +1,6 @@
 """How true presets are to the real recordings: static wall pixels, and the flat maps' distributions.
 
-python -m benchmarks.check_measured ../shared/data/real
+python -m benchmarks.check_measured REAL
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Does the wall's disturbance by the clock show in the other recordings: the flat maps, and the low-light one?
 
-    python -m benchmarks.clock_elsewhere ../shared/data/real
+    python -m benchmarks.clock_elsewhere REAL
 
 Both are set beside pixels simulated spike by spike (`benchmarks/clock/pixels.py`) at the recordings' own rates,
 without and with the edge and the skew that the wall has (docs/clock_feedthrough.md).

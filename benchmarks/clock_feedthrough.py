@@ -1,6 +1,6 @@
 """The wall by rows: late and early spikes near whole intervals, real and simulated with and without the clock's edge.
 
-    python -m benchmarks.clock_feedthrough ../shared/data/real
+    python -m benchmarks.clock_feedthrough REAL
 
 Rows below 100 hold trees and a fence that move; of the others, pixels count whose spikes lie on one line N = a t.
 """

@@ -1,6 +1,6 @@
 """Are rates of the real wall better, if the disturbance c(v) and the skew of the rows are known and taken into account?
 
-    python -m benchmarks.clock_known ../shared/data/real
+    python -m benchmarks.clock_known REAL
 
 An interval m is measured in the first half of the frames, from its first and last spike.  Near a whole interval n, c
 pulls it: many free intervals T give the same m.  Simulated pixels (`benchmarks/clock/pixels.py`), T uniform, in the

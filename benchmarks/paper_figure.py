@@ -1,6 +1,6 @@
 """The paper's validation figure: simulated streams beside the real wall, at matched rates.
 
-    python -m benchmarks.paper_figure ../shared/data/real --out validation.png
+    python -m benchmarks.paper_figure REAL --out validation.png
 
 Five patches of bare wall stand for the paper's five grey levels.  Cameras: an ideal one (as SPCS), SCSim, `measured`,
 for 0.1 s each under flat light that gives them the patch's mean rate; the real one for the 500 frames that there are.

@@ -71,8 +71,9 @@ def draw(path: Path) -> None:
 
 
 def _box(axes: Axes, x: float, y: float, stage: Stage, colour: str) -> None:
+    style = "round,pad=0,rounding_size=0.08"
     box = matplotlib.patches.FancyBboxPatch(
-        (x, y - HEIGHT / 2), WIDTH, HEIGHT, boxstyle="round,pad=0,rounding_size=0.08", facecolor=colour, edgecolor="#444"
+        (x, y - HEIGHT / 2), WIDTH, HEIGHT, boxstyle=style, facecolor=colour, edgecolor="#444"
     )
     axes.add_patch(box)
     axes.text(x + WIDTH / 2, y + 0.24, stage[0], ha="center", va="center", weight="bold", fontsize=11)

@@ -154,9 +154,9 @@ in a model file take it, `engine="auto"` picks an engine that carries it, and th
 anew. `acts` says how it acts within a frame, and its docstring how far that is exact: charge is integrated over the
 frame, not sampled at its middle. `now.start` is when each frame begins, `spikecam_env/sensor/frame_moments.py` has
 closed forms, and with `wants_rise = True` a `Charge` says how light rises within the frame; a frame that holds keys
-then comes piece by piece. What an effect cannot do in such a frame it says by `off_the_line`: beyond 1 % it is refused.
+then comes piece by piece. `off_the_line` gives an effect's error in such a frame: beyond 1 % it is refused.
 
-The tests in `tests/sensor/effects/test_every_effect.py` then ask of it, without being told: that strength zero
+The tests in `tests/sensor/effects/test_every_effect.py` then check, from its declaration alone: that strength zero
 changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
 cut, saved and restored; docs, bounds, twins that exist, a declaration in order; and a test of your own,
 `test_slow_shutter_...`, of its law.
@@ -165,12 +165,12 @@ Which hook: `imprint` for a fixed pattern, `image` for static optics (neither co
 carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames,
 arrays of (frames, rows, columns), which the fast engine runs as they stand. A `Charge` keeps a picture and a number a
 frame apart: `light.scaled(numbers)` costs nothing a pixel, `dark.plus(Few(pixels, charge))` only in these few, and
-`Charge(f(light.values))` an array. What depends on the spikes is written frame by frame, `react`, `after_reset`,
+`Charge(f(light.values))` an array. Reactions to spikes are written frame by frame, `react`, `after_reset`,
 `spiked`, for the reference, and declared in `feedback` for the fast engine; without a declaration that engine refuses
 the effect by name and `engine="auto"` takes the reference.
 
-What must be remembered is made by `begin`, handed to each hook and returned by it; by default it is a random generator
-of the effect's own, so that no other effect's draws change. What belongs to the unit (which pixels have a trap) `begin`
+An effect's memory is made by `begin`, handed to each hook and returned by it; by default it is a random generator
+of the effect's own, so that no other effect's draws change. Properties of the unit (which pixels have a trap) `begin`
 draws from `pattern`, the same in all recordings by one unit. Time is `now.number`, absolute, never a count of calls.
 '''
 

@@ -1,6 +1,6 @@
 """Fit the preset `measured` to real recordings and write it with its provenance.
 
-    python -m tools.fit_measured ../shared/data/real
+    python -m tools.fit_measured REAL
 
 From the flat maps: smooth shading, pixel-to-pixel response, log-normal dark level, hot pixels.  From the wall: white
 and slow temporal noise, told apart by A_k.  Prior: the published circuit, and with it N = C V_d / q and sqrt(kT/C).

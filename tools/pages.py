@@ -54,8 +54,8 @@ class RealPage:
 
     @property
     def campaign_command(self) -> str:
-        """How the campaign is made, as the page shows it."""
-        return f"spikecam campaign import {REAL} {self.name} {self.options}"
+        """How the campaign is made, as the page shows it; REAL is the folder of the real recordings, wherever it is."""
+        return f"spikecam campaign import REAL {self.name} {self.options}"
 
     def lacking(self, data: Path) -> str:
         """Why it cannot be made here; empty where it can."""

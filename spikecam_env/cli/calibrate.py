@@ -26,9 +26,9 @@ class Calibrate:
     out: Path
     """Folder for the results."""
     reset_noise_mv: Positive | None = None
-    """Reset noise taken as known where there is one V_d; default sqrt(kT/C)."""
+    """Reset noise to assume where all recordings have one V_d; default sqrt(kT/C)."""
     outside: bool = False
-    """Read files of the campaign that lie outside of its folder too."""
+    """Also read files of the campaign that lie outside its folder."""
 
     def run(self) -> None:
         from spikecam_env.calibration import calibrate, findings, save_calibration

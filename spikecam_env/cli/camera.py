@@ -23,7 +23,7 @@ class Camera:
     """Add an effect, or replace the model's own of that name, e.g. dead_time:tau_us=0.2; may be repeated.  `spikecam
     effects` lists them."""
     without: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
-    """Take an effect of the model away; may be repeated."""
+    """Remove an effect from the model; may be repeated."""
     effect_file: EffectFiles = ()
     """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
 

@@ -31,9 +31,9 @@ class Simulate:
     shape: Size = (64, 64)
     """Rows and columns."""
     frames: Count = 8000
-    """Length of each recording; 40 000 are a second."""
+    """Frames of each recording; 40 000 are a second."""
     seed: Seed = 0
-    """Which unit of the model: its fixed pattern, and the noise of all recordings."""
+    """Seed of the unit: its fixed pattern, and the noise of all recordings."""
     recording: Annotated[Repeated, tyro.conf.arg(metavar="KIND[:PARAM=VALUE,...]")] = ()
     """What to record instead of the standard design (dark, nine flats, step, bars, disk), which `standard` stands for;
     kinds: dark, flat, step, bars, disk or masked_rows, e.g. flat:radiance=0.3,use=holdout; may be repeated."""
@@ -85,16 +85,16 @@ class Import:
     frame_rate_hz: Positive | None = None
     """Frames a second; needed where the files do not say."""
     rows: tuple[Whole, Whole] | None = None
-    """First and stop of the rows to keep."""
+    """First row to keep, and the row after the last."""
     columns: tuple[Whole, Whole] | None = None
-    """First and stop of the columns to keep."""
+    """First column to keep, and the column after the last."""
     holdout_share: float = 0.0
-    """Share of every recording, its end, to hold out for judging."""
+    """Share of each recording, at its end, to hold out for judging the result."""
     radiance_per_unit: Positive = 1.0
-    """Radiance that 1 in the labels is, if they are in lux or another unit."""
+    """Radiance of a label of 1, for labels in lux or another unit."""
     reading: Reading = field(default_factory=Reading)
     outside: bool = False
-    """Read files that labels name outside of the folder too."""
+    """Also read labelled files that lie outside the folder."""
 
     def run(self) -> None:
         from spikecam_env.gap import import_campaign, label_from_text, labels_from_table

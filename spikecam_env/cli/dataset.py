@@ -26,13 +26,13 @@ class Making:
     size: Size = (250, 400)
     """Rows and columns; 500 800 is the other size in use."""
     seed: Seed = 0
-    """Of the scenes and the cameras; the same seed gives the same bytes."""
+    """Seed of the scenes and the cameras; the same seed gives the same bytes."""
     truth_every: Whole = 100
     """Frames between ground truths (radiance, flow, object number, depth, poses); 0: none."""
     mean_interval: float = 10.0
     """Exposure: frames between spikes, on average over the picture."""
     renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
-    """Back-end that draws; auto: the best there is, and the same again when a run goes on."""
+    """Back-end that draws; auto: the best that works here, and the same one when a run is continued."""
     camera: Camera = field(default_factory=Camera)
     jobs: Workers = 1
     """Worker processes on this machine, or workers of a local Ray cluster."""
@@ -107,9 +107,9 @@ class Verify:
     folder: tyro.conf.Positional[Path]
     """Folder of the dataset."""
     jobs: Workers = 1
-    """Files read at a time."""
+    """Files to read at the same time."""
     outside: bool = False
-    """Read files that the dataset keeps outside of its folder too."""
+    """Also read files that the dataset keeps outside its folder."""
 
     def run(self) -> None:
         from spikecam_env.datasets import verify

@@ -35,15 +35,15 @@ class Diagnose:
     effect_file: EffectFiles = ()
     """Effects of your own to try too, a Python file each; it is run, so give what you would run.  May be repeated."""
     seed: Seed = 0
-    """Of every simulation; the same seed gives the same result."""
+    """Seed of every simulation; the same seed gives the same result."""
     jobs: Workers = 1
-    """Simulations at a time."""
+    """Simulations to run at the same time; the result does not depend on it."""
     effort: Effort = 200.0
-    """Times the campaign may be simulated before nothing more is begun that an answer can do without; inf: no end."""
+    """Budget: how often the campaign may be simulated before optional steps are skipped; inf for no limit."""
     static_only: bool = False
-    """Of unknown scenes in which something moves, look at the pixels that stand still."""
+    """In unknown scenes with motion, use only the pixels in which nothing moves."""
     outside: bool = False
-    """Read files of the campaign that lie outside of its folder too."""
+    """Also read files of the campaign that lie outside its folder."""
 
     def run(self) -> None:
         from spikecam_env.campaign import read_campaign

@@ -67,11 +67,11 @@ class New:
     """
 
     name: tyro.conf.Positional[str]
-    """Of the effect: lower-case words with underscores between them, not one of the catalogue."""
+    """Name of the effect: lower-case words joined by underscores, not a name of the catalogue."""
     out: Path = Path()
-    """Folder to write them into; it is made if there is none."""
+    """Folder for the two files; it is made if it does not exist."""
     force: bool = False
-    """Replace files of these names."""
+    """Overwrite files of these names."""
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder

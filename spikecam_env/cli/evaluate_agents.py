@@ -47,15 +47,15 @@ class Agents:
     intervals: tuple[float, ...] = ()
     """Mean intervals [frames] at which LowLight-v1 is learned and played, each a row."""
     seeds: Annotated[int, Checked(checked_count, most=MOST_SEEDS)] = 5
-    """Trainings of each."""
+    """Trainings of each task and observation, with different seeds."""
     first_seed: Annotated[int, Checked(checked_whole, least=0, most=10**9)] = 0
-    """Of them."""
+    """The first of these seeds; the others follow it."""
     steps: Count | None = None
-    """Of training.  Default: as the shipped agents were trained."""
+    """Training steps.  Default: as many as the shipped agents had."""
     episodes: Annotated[int, Checked(checked_count, most=MOST_EPISODES)] | None = None
     """Test episodes a score.  Default: 100 of Catch, 50 of Saccade, 10 of Track."""
     jobs: Workers = 1
-    """Trainings at once, each in a process of its own."""
+    """Trainings to run at the same time, each in a process of its own."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Train on a Ray cluster: its address, or `local` for one of --jobs workers here."""
 

@@ -85,9 +85,9 @@ class OnScenes(Making):
     seeds: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 3
     """Cameras before each scene, each with a fixed pattern and noise of its own; their spread is printed."""
     intervals: Annotated[tuple[float, ...], Checked(_each, least=SHORTEST, most=LONGEST)] = (10.0,)
-    """Mean frames between spikes, a group of the table each; 3 10 40 100 go from bright to dim."""
+    """Mean intervals between spikes [frames], each a group of the table; 3 10 40 100 go from bright to dim."""
     speeds: Annotated[tuple[float, ...], Checked(_each, least=0.0, most=FASTEST)] = (0.0,)
-    """Speed of the motion [pixels a frame], a group each; 0: as the scene has it."""
+    """Speeds of the motion [pixels a frame], each a group of the table; 0 is the scene's own speed."""
     frames: Count | None = None
     """Frames of each stream, whose middle one is the picture; by default as many as the interval asks for."""
     data: Path | None = None
@@ -114,7 +114,7 @@ class OnRecordings(Making):
     """A table on real recordings."""
 
     recordings: Path | None = None
-    """Folder with wall.npz and helicopter_low_light.npz; by default ../shared/data/real beside the checkout."""
+    """Folder of the real recordings, with wall.npz and helicopter_low_light.npz."""
 
     def make(self, table: str) -> None:
         """Make a table on real recordings and print it."""

@@ -33,7 +33,7 @@ class Export:
     rate: Positive = 0.6
     """Light [spikes/frame] that is white; another one than 0.6 has to be set in Spike-Zoo's data configuration too."""
     bits: Literal[8, 16] = 8
-    """Of a pixel of the pictures; Spike-Zoo reads the upper 8."""
+    """Bits of a pixel of the pictures; Spike-Zoo reads the upper 8."""
     stream: Literal["spikes", "clean"] = "spikes"
     """Which stream: the noisy one, or that of the noise-free twin, which datasets hold."""
 

@@ -36,14 +36,14 @@ class FilmToSpikes:
     film_rate: Positive | None = None
     """Pictures a second when the film was taken; default: its time stamps.  A folder and an array need it."""
     slow: Positive = 1.0
-    """The film plays so many times slower than life: its time stamps are divided by it."""
+    """Factor of slow motion: the film's time stamps are divided by it."""
     transfer: str | None = None
     """From its values to linear light: srgb, bt709, gamma2.2 (or another power), linear, pq, hlg; default: what the
     file states."""
     channel: Literal["luminance", "red", "green", "blue"] = "luminance"
-    """Light of which colour: all as the eye weighs them, or one."""
+    """Colour to take as light: luminance, or one channel."""
     interpolation: Literal["linear", "hold"] = "linear"
-    """Of light between two pictures: a straight line, or the former until the next."""
+    """Light between two pictures: a straight line, or the earlier picture held until the next."""
     mean_interval: Positive = 10.0
     """Exposure: frames between spikes, on average over the film and the picture."""
     frames: Count | None = None

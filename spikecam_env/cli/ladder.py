@@ -27,11 +27,11 @@ class Ladder:
     effect_file: EffectFiles = ()
     """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
     seed: Seed = 0
-    """Of every simulation; the same seed gives the same result."""
+    """Seed of every simulation; the same seed gives the same result."""
     jobs: Workers = 1
-    """Simulations at a time."""
+    """Simulations to run at the same time; the result does not depend on it."""
     outside: bool = False
-    """Read files of the campaign that lie outside of its folder too."""
+    """Also read files of the campaign that lie outside its folder."""
 
     def run(self) -> None:
         from spikecam_env.campaign import read_campaign

@@ -49,7 +49,7 @@ class Play:
     film: Path | None = None
     """Write a film (.mp4) of it instead of opening a window; default where there is no display: ID.mp4."""
     episodes: Annotated[int | None, Checked(checked_count, most=MOST_EPISODES)] = None
-    """Episodes; default: one in a film, in a window as many as its user likes."""
+    """Number of episodes; default: one in a film, no limit in a window."""
     denoise: bool = False
     """Show the online denoiser's picture too; it is 17 to 32 frames old."""
     show_target: bool = False
@@ -61,7 +61,7 @@ class Play:
     split: Literal["train", "test"] = "test"
     """Which episodes of a task of version 1."""
     seed: Seed = 0
-    """Of the first episode; the next has the next."""
+    """Seed of the first episode; each further episode has the next number."""
     size: Size | None = None
     """Rows and columns, instead of the environment's."""
     camera: Camera = field(default_factory=Camera)

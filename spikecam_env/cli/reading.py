@@ -11,7 +11,7 @@ from spikecam_env.cli.options import Count, Whole
 @dataclass(frozen=True)
 class Reading:
     """Options of reading; which apply depends on the format.  A file `recording.dat.json` beside a recording can hold
-    height, width, crop_width, flip, bit_order and frame_rate_hz; what is given here counts before it."""
+    height, width, crop_width, flip, bit_order and frame_rate_hz; options given here have precedence."""
 
     height: Count | None = None
     """Rows of a .dat file (250 by default) or a .raw file."""

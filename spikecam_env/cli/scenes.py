@@ -37,7 +37,7 @@ class Scenes:
     size: Size = (250, 400)
     """Rows and columns."""
     seed: Seed = 0
-    """Seed of what the scene leaves to chance; the scene `random` is another world with each."""
+    """Seed of textures and starting poses; `random` is another world for each seed."""
     frames: Count = 4000
     """Length of the film in frames of the camera; 40 000 are a second."""
     every: Count = 32

@@ -29,33 +29,33 @@ class Train:
     """`paper`: the paper's network and loss; `best`: many rate planes a pass, trained on true light.  The others are
     reconstructors, which make pictures of spikes."""
     steps: Count = 20_000
-    """Training steps in all; the rate of learning falls to nothing over them."""
+    """Training steps in all; the learning rate falls to zero over them."""
     minutes: Positive | None = None
-    """End by the clock instead."""
+    """End after this many minutes, instead of after --steps."""
     batch: Annotated[int, Checked(checked_count, most=65_536)] | None = None
-    """Streams a step.  Default: 16, of reconstructors 64."""
+    """Streams a step.  Default: 16; for reconstructors 64."""
     patch: Count = 64
     """Side of a stream's frames [pixels], a multiple of 16, at most 128."""
     lr: Annotated[float, Checked(checked_number, least=0.0, most=1.0, above=True)] = 1e-3
-    """Highest rate of learning."""
+    """Highest learning rate."""
     seed: Seed = 0
     """Seed of network, scenes, cameras and noise."""
     threads: Workers = 2
     """Threads, on a processor."""
     device: str = "cpu"
-    """Where streams and network are: cpu, cuda, cuda:1."""
+    """Device of streams and network: cpu, cuda, cuda:1."""
     refine: bool = True
-    """`paper` with its refine module, or for the ablation without."""
+    """Give `paper` its refine module; without it for the ablation."""
     start: str | None = None
     """Weights to begin from: a file of this command, or `best` or `paper` for those that ship.  Default: none."""
     width: Count | None = None
     """Channels of a reconstructor, a multiple of 12 up to 252.  Default: 48."""
     frames_a_step: Count | None = None
-    """Frames by which the streams of a reconstructor go on in a step, at most 41.  Default: 12."""
+    """Frames that a reconstructor's streams advance in a step, at most 41.  Default: 12."""
     validate_every: Count | None = None
     """Steps between validations.  Default: 1000, of reconstructors 500."""
     resume: bool = True
-    """Go on from the folder's checkpoint where there is one."""
+    """Continue from the folder's checkpoint, if there is one."""
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder

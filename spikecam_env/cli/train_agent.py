@@ -12,7 +12,7 @@ from spikecam_env.checked import checked_count
 from spikecam_env.cli.options import Checked, Count, Seed
 
 MOST_ENVIRONMENTS = 1024
-"""Cameras stepped together."""
+"""Number of cameras stepped together."""
 
 
 @dataclass
@@ -29,13 +29,13 @@ class TrainAgent:
     obs: str = "tfp"
     """What the agent sees: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30 or frame1000."""
     steps: Count | None = None
-    """Steps of all environments together.  Default: as the shipped agent of the task was trained."""
+    """Steps of all environments together.  Default: as many as the shipped agent of the task had."""
     seed: Seed = 0
     """Seed of network, actions, episodes and cameras."""
     environments: Annotated[int, Checked(checked_count, most=MOST_ENVIRONMENTS)] = 16
-    """Cameras stepped together."""
+    """Number of cameras stepped together."""
     plain: bool = False
-    """Leave out the question where the target is, which is answered in training alone: PPO from rewards only."""
+    """Train by PPO from rewards alone, without the auxiliary loss that asks for the target's place."""
 
     def run(self) -> None:
         from spikecam_env.agents.training import Study, budget, train_agent

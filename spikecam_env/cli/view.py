@@ -46,13 +46,13 @@ class View:
     every: Count = 40
     """Frames of a picture, for a scene or a file; an environment gives one a step."""
     denoise: bool = True
-    """Also the online denoiser's picture (`best`)."""
+    """Show the online denoiser's picture (`best`) too."""
     policy: str = "oracle"
-    """Of an episode: oracle, nothing, random, an agent's name or its file (.pt)."""
+    """Who steers in an episode: oracle, nothing, random, an agent's name or its file (.pt)."""
     split: Literal["train", "test"] = "test"
     """Which episodes of a task of version 1."""
     seed: Seed = 0
-    """Of the scene and the camera's unit, or of the episode."""
+    """Seed of the scene and the camera's unit, or of the episode."""
     size: Size | None = None
     """Rows and columns of a scene or an environment; default: 250 x 400, or the environment's own."""
     camera: Camera = field(default_factory=Camera)

@@ -18,23 +18,24 @@ HEAVY = 8.0
 """Degrees of freedom of the loss: statistics far off count by their logarithm."""
 
 GATE = 0.005
-"""Adjusted p-value of what a named effect leaves, below which something is left."""
+"""Adjusted p-value of the residuals of a named effect below which something is left."""
 
 
 def effect_size(null: Null, measured: Array, change: Array) -> float:
-    """Noises by which a change of the statistics (S,) shows at best, on those that were measured."""
+    """Largest change among the measured statistics (S,), in units of their noise."""
     return float(np.max(np.where(np.isfinite(measured), np.abs(change), 0.0) / null.noise))
 
 
 def deviates(null: Null, values: Array) -> Array:
-    """(S,) normal deviates: Student's t of few twins, made normal; 0 where unknown."""
+    """(S,) normal deviates from Student's t with the freedom of few twins; 0 where unknown."""
     return normal_deviates(null, np.nan_to_num((values - null.mean) / null.noise))
 
 
 def normal_deviates(null: Null, t: Array, predicted: Prediction | None = None) -> Array:
-    """(S,) normal deviates of distances in noise, of a prediction's or of the null's: the noise was learnt from few
-    twins, and has more freedom where part of it is floor.  What drawn units show is no less likely than their number
-    says."""
+    """(S,) normal deviates of distances in noise, of a prediction or of the null model.
+
+    The noise is estimated from few twins, and has more degrees of freedom where part of it is floor.  A distance that n
+    drawn units do not show counts as no rarer than 1 in n."""
     known, freedom = null.sd**2 * (1.0 + 1.0 / null.twins), null.freedom
     if predicted is not None:
         known, freedom = predicted.spread**2 + predicted.error**2, freedom_of(null, predicted)
@@ -50,17 +51,17 @@ def share_beyond(t: Array, apart: Array) -> Array:
     """(S,) share of drawn units, half at most, that lie as far to the same side as a distance; 0 where none does.
     apart: (U, S) their own distances, NaN where they show nothing.
 
-    Pixels far out in a pattern of rows come by whole rows: one unit in a hundred has some, and no t knows of it.
+    Outliers of a row pattern come by whole rows: one unit in a hundred has some, which no t distribution describes.
     """
     beyond = np.sum(np.sign(t) * apart >= np.abs(t), axis=0)
     return np.where(beyond > 0, np.minimum((beyond + 1) / (len(apart) + 1), 0.5), 0.0)
 
 
 def freedom_of(null: Null, predicted: Prediction) -> Array:
-    """(S,) degrees of freedom of a prediction's spread (Welch and Satterthwaite): what is the null's has its own, what
-    an effect's twins scatter beyond has those of few twins, `half_pooled`, or of the drawn units.
+    """(S,) degrees of freedom of a prediction's spread (Welch and Satterthwaite).
 
-    How much they scatter beyond, all statistics of a group say: one that happened to scatter little has no more.
+    The null's part has the null's freedom; the excess of the effect's twins has that of few twins, `half_pooled`, or of
+    the drawn units.  The excess is pooled over a group: a statistic with a small one by chance gains no freedom.
     """
     beyond = np.maximum(predicted.spread / np.maximum(null.sd, 1e-300), 1.0) ** 2 - 1.0
     groups = np.unique([k.group for k in null.keys], return_inverse=True)[1]
@@ -81,7 +82,7 @@ def of_all_recordings(keys: Sequence[Key], z: Array, group: str) -> Array:
 
 
 def adjusted(z: Array) -> Array:
-    """(S,) two-sided p-values, by Holm's step-down for as many statistics as there are."""
+    """(S,) two-sided p-values, adjusted by Holm's step-down for the number of statistics."""
     p = 2.0 * special.ndtr(-np.abs(z))
     order = np.argsort(p)
     stepped = np.maximum.accumulate(p[order] * (p.size - np.arange(p.size)))
@@ -91,7 +92,7 @@ def adjusted(z: Array) -> Array:
 
 
 def is_significant(null: Null, rho: Array, predicted: Prediction | None = None) -> bool:
-    """Whether residuals, of a prediction or of the null's, say that something is left."""
+    """Whether the residuals of a prediction, or of the null model, are beyond chance."""
     return bool(adjusted(normal_deviates(null, rho, predicted)).min() < GATE)
 
 
@@ -101,9 +102,10 @@ def residual(null: Null, measured: Array, predicted: Prediction) -> Array:
 
 
 def residual_and_misfit(null: Null, measured: Array, predicted: Prediction) -> tuple[Array, float]:
-    """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squares of what is left, and the logarithm
-    of the variance over the null's, without which a prediction would win by being vague.  What was not measured (NaN,
-    held out) counts for nothing."""
+    """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squared residuals, plus the logarithm of
+    the variance over the null's.  Without that term a prediction would win by being vague.  Statistics that were not
+    measured (NaN, held out) do not count.
+    """
     rho = residual(null, measured, predicted)
     wider = (total_variance(null, predicted) - predicted.error**2) / (null.sd**2 + null.floor**2)
     log_variance = np.where(np.isfinite(measured), null.weight * np.log(wider), 0.0)
@@ -111,5 +113,5 @@ def residual_and_misfit(null: Null, measured: Array, predicted: Prediction) -> t
 
 
 def robust_squares(rho: Array, weight: Array | float = 1.0) -> float:
-    """Heavy-tailed sum of squares: of the order of the weights' sum for noise alone."""
+    """Heavy-tailed sum of squares; about the sum of the weights for noise alone."""
     return float(np.sum(weight * (HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))

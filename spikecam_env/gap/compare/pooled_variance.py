@@ -1,4 +1,4 @@
-"""Variances from few twins, moderated: what they say of one statistic is joined with what they say of its like.
+"""Moderated variances: a variance from few twins is combined with those of similar statistics.
 
 Empirical Bayes as in Smyth, "Linear models and empirical Bayes methods for assessing differential expression in
 microarray experiments", 2004, but for logarithms: those of one kind are normal about the kind's own, and how closely

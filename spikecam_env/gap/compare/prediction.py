@@ -1,4 +1,4 @@
-"""What a model gives: the mean of every statistic, the error of that mean, and how far one campaign lies from it."""
+"""A model's prediction: the mean of every statistic, the error of that mean, and the scatter of one campaign."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from spikecam_env.gap.unit.refit import BaseFit
 Array = NDArray[np.float64]
 
 TOLERANCE = 0.05
-"""Share of an effect's own size by which its simulation may be off: laws are first order, and simulated with noise."""
+"""Relative error of an effect's simulated change: laws are first order, and simulated with noise."""
 
 PAIR_NOISE = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6,
               "spectrum": 0.7, "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
-"""Share of a campaign's noise that is left of a pair of twins of the same draws, with an effect and without, by group
+"""Noise of a pair of twins of the same draws, with and without an effect, over a campaign's noise, by group
 (`python -m benchmarks.paired_twins`, the noisiest effect); 1 for the others."""
 
 
@@ -92,9 +92,9 @@ def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key], refits: S
 
 
 def paired(null: Null, made: Sequence[Draw]) -> Prediction:
-    """What campaigns with an effect say, each less the null's of the same number: their noise cancels nearly.
+    """The prediction from campaigns with an effect, each less the null's of the same draws: their noise nearly cancels.
 
-    What a draw lacks is the null's.  One pair has PAIR_NOISE of a campaign's noise; several give it by their scatter.
+    Values that a draw lacks are the null's.  One pair has PAIR_NOISE of a campaign's noise; several show it by scatter.
     """
     without = {d.number: d for d in null.draws}
     made = [
@@ -122,7 +122,7 @@ def own_variance(null: Null, predicted: Prediction) -> Array:
 
 
 def with_change_scaled(null: Null, one: Prediction, factor: float) -> Prediction:
-    """A prediction whose change from the null is multiplied, and with it what it scatters more."""
+    """A prediction with its change from the null, and its excess scatter, multiplied."""
     error2 = null.sd**2 / null.twins + own_variance(null, one) * factor**2
     spread2 = null.sd**2 + np.maximum(one.spread**2 - null.sd**2, 0.0) * abs(factor)
     mean = null.mean + factor * (one.mean - null.mean)
@@ -136,12 +136,12 @@ def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
 
 
 def total_variance(null: Null, predicted: Prediction) -> Array:
-    """(S,) of measured less predicted; a prediction is good to TOLERANCE of its effect."""
+    """(S,) variance of measured less predicted; a prediction is exact to TOLERANCE of its effect."""
     return predicted.spread**2 + predicted.error**2 + null.floor**2 + law_error(null, predicted) ** 2
 
 
 def law_error(null: Null, predicted: Prediction) -> Array:
-    """(S,) by how much a prediction's laws may be off."""
+    """(S,) error of a prediction's laws."""
     return TOLERANCE * (predicted.mean - null.mean if predicted.own is None else predicted.own)
 
 
@@ -155,7 +155,7 @@ def pooled(keys: Sequence[Key], values: Array) -> Array:
 def spread_of(null: Null, values: Array) -> Array:
     """(S,) standard deviation of statistics under a model with an effect, from its twins (n, S), at least the null's.
 
-    An effect of rare events makes statistics noisier than the null knows.
+    Rare events make statistics noisier than under the null model.
     """
     if len(values) < 2:
         return null.sd
@@ -163,8 +163,7 @@ def spread_of(null: Null, values: Array) -> Array:
 
 
 def half_pooled(null: Null, variances: Array) -> Array:
-    """(S,) variances from few twins: what they say of one statistic counts half, the other half is what they say of the
-    same one over all recordings."""
+    """(S,) variances from few twins: half the statistic's own, half that of the same statistic over all recordings."""
     known = null.sd**2 + null.floor**2
     return 0.5 * variances + 0.5 * known * pooled(null.keys, variances) / pooled(null.keys, known)
 

@@ -1,4 +1,4 @@
-"""From what a prediction leaves to a step of parameters, with the covariance of its errors."""
+"""From the residuals of a prediction to a step of parameters, with its covariance."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def step_of(
 
     noise: (S, n) of the jacobian.  before: (n,) prior standard deviation, of what the statistics leave open.
 
-    Residuals are taken over the median of those that move: far from the solution all would be outliers of small weight.
+    If most statistics are far off, residuals are scaled by their median; otherwise all would count as outliers.
 
     Statistics are not independent: the covariance is of where the null's own draws would have led the step,
     and, where there are TWINS_FOR_COVARIANCE of the effect, its own (other pixels have its traps), with the floors and

@@ -1,7 +1,7 @@
-"""Thresholds of deviance: by how much less one hypothesis has to leave than another, for each decision of a search.
+"""Thresholds of deviance: the difference in misfit between two hypotheses that each decision of a search requires.
 
-Unit: deviance, twice the logarithm of a likelihood ratio (`distance.deviance_of`): 2 is what a parameter of no meaning
-removes, 6 a likelihood ratio of 20.
+Unit: deviance, twice the logarithm of a likelihood ratio (`distance.deviance_of`): 2 is the mean reduction by a
+meaningless parameter, 6 a likelihood ratio of 20.
 
     name             value  what is decided                                              compared are
     TO_STEP              1  whether parameters take another step                         a step's prediction, none
@@ -22,40 +22,39 @@ are choices without a derivation, which the blind trial (docs/blind_trial.md) me
 """
 
 TO_STEP = 1.0
-"""A step has to promise it for another: of two parameters that make up for each other either may be open by far, and
-both together leave much."""
+"""Least promised reduction for another step of the parameters.  Small, since two parameters that compensate each
+other may both be far off while little is gained by a step."""
 
 PER_PARAMETER = 2.0
-"""A parameter of no meaning removes so much (Akaike)."""
+"""Mean reduction by a meaningless parameter (Akaike)."""
 
 BY_CHANCE = 3.0
-"""A step may seem so much worse, by chance of the draws."""
+"""Increase in misfit that chance of the draws can explain."""
 
 TO_JOIN = 4.0
-"""A later effect has to remove it, while those before it stay as they were fitted without it, to be fitted together
-with them: they may have taken its share."""
+"""Reduction for a later effect to earn a joint refit.  Less than TO_ADD, since earlier effects may have absorbed part
+of its signature."""
 
 TO_STEP_SHAPE = 5.0
-"""A step has to promise it where candidates are compared: less does not put them in another order."""
+"""Least promised reduction for a step while candidates are compared: less would not change their order."""
 
 TO_CONTINUE = 5.0
-"""A twin, scaled at best, has to remove it for its candidate's fit to go on."""
+"""Reduction by the best-scaled twin for a candidate's fit to go on."""
 
 TO_PREFER = 6.0
-"""A lead of less says nothing, whatever the draws say: a likelihood ratio of 20."""
+"""Least lead that counts between two candidates: a likelihood ratio of 20."""
 
 TO_ADD = 12.0
-"""An effect has to remove it to be added."""
+"""Reduction in misfit to add an effect."""
 
 TO_DISMISS = 2 * TO_PREFER
-"""One may be so much behind on recordings to fit, and win on all: noise beside another effect is known from few
-twins."""
+"""Lead on recordings to fit up to which all recordings decide: noise beside another effect is known from few twins."""
 
 TO_KEEP = 15.0
-"""An effect found earlier has to be missed by it, once another has been added, to be kept."""
+"""Increase in misfit without an earlier effect, once another has been added, for the earlier one to be kept."""
 
 TO_CONFIRM = 15.0
-"""A fit that is not confirmed may be so much worse than the best that is, to be confirmed as well."""
+"""Distance from the best confirmed fit up to which an unconfirmed one is confirmed as well."""
 
 TO_KEEP_UNTRIED = 10 * TO_KEEP
-"""An effect is missed by it beyond what a unit refitted without it could make up for."""
+"""Increase in misfit without an effect that no refit of the unit could compensate: the effect is kept untried."""

@@ -28,26 +28,26 @@ from spikecam_env.sensor import SensorModel
 Array = NDArray[np.float64]
 
 MOST_TWINS = 5
-"""Twins that the fit of one candidate's strength takes at most."""
+"""Most twins for the fit of one candidate's strength."""
 
 VISIBLE = 4.0
-"""Noises that a simulated effect has to show somewhere to be scaled by."""
+"""Least effect size [noises] of a simulated effect from which its strength is scaled."""
 
 LEAST_FACTOR = 1e-3
-"""Least factor by which a strength is multiplied at once; and of one whose fit does not go on."""
+"""Least factor by which a strength is multiplied at once; and that of a strength whose fit does not go on."""
 
 LEAST_LOG_STEP = 0.05
 """Least step of a strength's logarithm between two twins for a slope."""
 
 ROUND_OFF = (0.7, 1.4)
-"""Factors between which what is left of a strength is scaled, without another twin."""
+"""Range of factors within which a strength is scaled without another twin."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A candidate at its best.  parameters, sd: by name.  prediction: what it gives; base: its unit.
+    """A candidate at its best fit.  parameters, sd: by name.  prediction: of its model; base: its unit.
 
-    rho: (S,) what it leaves, in noise.  misfit: `distance.residual_and_misfit`.
+    rho: (S,) residuals, in noise.  misfit: `distance.residual_and_misfit`.
     """
 
     name: str
@@ -176,7 +176,7 @@ def slope_between(
 
 
 def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]) -> Fit:
-    """The strength under which what is seen is as likely as can be among twins that scatter.
+    """The maximum-likelihood strength of an effect that shows by the scatter of its twins.
 
     Statistics of one recording are of one course in time: its strength is known no better than from one number each.
     """

@@ -1,4 +1,4 @@
-"""A fit rests on one twin; more confirm it, on the recordings held out as well, and beside what was found before."""
+"""Confirmation: a fit from one twin is repeated with more twins, on held-out recordings too."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from spikecam_env.sensor import SensorModel
 Array = NDArray[np.float64]
 
 TWINS_TO_CONFIRM, TWINS_IN_THE_END = 2, 4
-"""Twins by which a candidate is confirmed, and what was chosen of them in the end."""
+"""Twins that confirm a candidate, and twins that confirm the chosen one."""
 
 
 def confirmed(problem: Problem, found: Fit, count: int = TWINS_TO_CONFIRM) -> Fit:
@@ -80,9 +80,9 @@ def attenuated(null: Null, stronger: Prediction, times: float) -> Prediction:
 
 
 def with_dark_levels_open(problem: Problem, model: SensorModel, base: BaseFit, predicted: Prediction) -> Prediction:
-    """A prediction known no better than the dark levels of a fresh unit of the model would change it.
+    """A prediction with the additional error of unknown dark levels, those of a fresh unit of the model.
 
-    Slow pixels lock to a severe noise, or drown in it: a refit then does not show how they differ.
+    Slow pixels lock to a severe noise, and a refit then does not show how they differ.
     """
     _, dark = drawn_response(model, base, problem.case.shape, problem.case.seed)
     other = problem.predict(model, constrained_refit(model, replace(base, dark=dark)), 1)
@@ -98,7 +98,7 @@ def resettled(problem: Problem, found: Fit, model: SensorModel) -> Fit:
 
 
 def no_more_certain(problem: Problem, found: Fit, known: Prediction) -> Fit:
-    """The fit known no better, and its campaigns scattering no less, than a prediction of the same effects."""
+    """The fit with errors and scatter no smaller than those of a prediction of the same effects."""
     here = found.prediction
     spread, error = np.maximum(here.spread, known.spread), np.maximum(here.error, known.error)
     return with_prediction(problem, found, replace(here, spread=spread, error=error))

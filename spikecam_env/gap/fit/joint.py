@@ -1,4 +1,4 @@
-"""The last step: all parameters of the effects found, refined together, and how certain each is."""
+"""The last step: a joint refit of all parameters of the effects found, with their errors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from spikecam_env.sensor import SensorModel
 Array = NDArray[np.float64]
 
 AGREEMENT = 3.0
-"""Errors by which a parameter may move when held-out recordings are fitted as well, for them to agree."""
+"""Standard errors by which a parameter may move when held-out recordings are fitted too."""
 
 OWN_SHARE = 0.9
 """Share of a refit's s^2 that is the unit's own, below which it is fitted together with the noise of the effects."""
@@ -129,7 +129,7 @@ def _stepped(problem: Problem, best: Fit, free: Free, columns: Array, step: Arra
 
 
 def agree(before: Fit, after: Fit, errors: Errors) -> bool:
-    """Whether parameters moved by no more than their errors allow."""
+    """Whether parameters moved within their errors."""
     then = {e.name: e.parameters() for e in after.model.effects}
     here = {e.name: e.parameters() for e in before.model.effects}
     known = [(n, k, sd) for n, by in errors.items() for k, sd in by.items() if sd > 0]

@@ -20,7 +20,7 @@ from spikecam_env.sensor import SensorModel
 Array = NDArray[np.float64]
 
 MANY_UNITS = 240
-"""Units drawn for the pattern where DRAWN_UNITS of them do not show what was measured."""
+"""Units to draw for the pattern where DRAWN_UNITS of them are too few to show the measured value."""
 
 
 def predict_by_twins(
@@ -51,7 +51,7 @@ def with_drawn_pattern(
 
 
 def settled_unit(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> BaseFit:
-    """The unit moved so that with the effect it is refitted as the null's is without."""
+    """Indirect inference: adjust the unit until its twin with the effect refits to the null twin's refit without it."""
     [without] = [d.refit for d in null.draws if d.number == predicted.draws[-1].number]
     there = predicted.draws[-1].refit
     return inferred_unit(model, base, without, [there]) if without and there else base

@@ -1,4 +1,4 @@
-"""What a fit or a search has to explain: a campaign, the model that effects are added to, and how far it is off."""
+"""The problem of a fit or a search: a campaign, a model to add effects to, and the distance between them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Problem:
         return self.residual_and_misfit(predicted or self.null.prediction)[1]
 
     def is_explained(self, predicted: Prediction) -> bool:
-        """Whether a prediction leaves nothing but chance of the recordings to fit."""
+        """Whether a prediction explains the recordings to fit to within chance."""
         return not is_significant(self.null, residual(self.null, self.seen, predicted), predicted)
 
     def predict(self, model: SensorModel, base: BaseFit, count: int, only: Sequence[int] | None = None) -> Prediction:

@@ -1,4 +1,4 @@
-"""Which recordings a candidate's twins simulate, and how many twins say what it does."""
+"""The recordings that a candidate's twins simulate, and the number of twins."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from spikecam_env.gap.twins.case import Case, refit_recordings
 Array = NDArray[np.float64]
 
 TWINS_OF_RANDOM_COURSE, TWINS_OF_EVENTS = 6, 3
-"""Twins of an effect that makes statistics scatter; and of one that is few events, or in few pixels, or that is
-`mixed`, and so cannot be simulated stronger to stand above one twin's noise."""
+"""Twins of an effect that makes statistics scatter; and of a sparse one (few events, few random pixels) or a
+`mixed` one, which cannot be simulated stronger to exceed one twin's noise, so several twins are averaged."""
 
 AFFECTED = 5.0
 """Noises by which a statistic of a recording has to change, or to be off, for the recording to be simulated: of 600
@@ -23,7 +23,7 @@ statistics one is off by so many in one campaign of 3000 by chance."""
 
 
 def twins_of(name: str) -> int:
-    """How many twins say what an effect does."""
+    """Number of twins for an effect."""
     what = candidate(name)
     return TWINS_OF_EVENTS if what.events or what.few_pixels or what.mixed else 1
 

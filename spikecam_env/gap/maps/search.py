@@ -27,23 +27,22 @@ from spikecam_env.sensor import CATALOGUE, SensorModel
 Array = NDArray[np.float64]
 
 PREDICTED_UNITS = 8
-"""Units of each model that its predictions are means over."""
+"""Drawn units over which a model's predictions are averaged."""
 
 MAP_FIT_STEPS = 6
 """Gauss-Newton steps of a fit."""
 
 LEAST_IMPROVEMENT = 25.0
-"""Deviance that an effect has to remove to be added: statistics of one map depend on one another, and count several
-times over."""
+"""Least reduction in deviance to add an effect; larger than for spikes, since statistics of one map are dependent."""
 
 MOST_MAP_EFFECTS = 5
-"""Effects that one diagnosis of maps names together."""
+"""Largest number of effects that one diagnosis of maps names."""
 
 FITTED_SPREADS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
 """What is scaled to fit how pixels differ: parameters of effects, by what they spread."""
 
 LINEAR_PARAMETERS = ("centre_x", "centre_y")
-"""Parameters that are fitted as they are; all others by their logarithm."""
+"""Parameters that are fitted in their own unit; all others are fitted by their logarithm."""
 
 DERIVATIVE_STEP = 0.1
 """Step of a derivative, of a parameter's logarithm or in its own unit."""

@@ -1,4 +1,4 @@
-"""How much one diagnosis simulates: counted in recordings, and not in seconds, whatever the machine's speed."""
+"""The budget of one diagnosis, counted in simulated recordings: the answer does not depend on the machine's speed."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import math
 from dataclasses import dataclass, field
 
 CAMPAIGNS = 200.0
-"""Default: so many times the campaign's recordings, with the twins that its noise is known from (about 15)."""
+"""Default budget [campaigns], including the twins of the null model (about 15)."""
 
 OVERRUN = 1.3
-"""Times as much may be spent before what a verdict can hardly do without is not begun either."""
+"""Factor by which steps that a verdict needs may overrun the budget."""
 
 
 @dataclass
 class Budget:
-    """limit: recordings from which nothing more is begun that an answer can do without.
+    """limit: recordings after which no optional step is begun.
 
-    spent: recordings that were simulated, a number a twin.  left_out: what was not begun.
-    verdict_known: whether the verdict is there already, so that an answer can do without all.
+    spent: simulated recordings, one number a twin.  left_out: steps that were skipped.
+    verdict_known: whether the verdict is decided, so that every further step is optional.
     """
 
     limit: float = math.inf
@@ -31,9 +31,9 @@ class Budget:
         return sum(self.spent)
 
     def allows(self, what: str, recordings: int = 0, *, needed: bool = False) -> bool:
-        """Whether `what`, which takes so many recordings at least, may be begun; noted where it may not.
+        """Whether the step `what`, which takes at least so many recordings, may begin; a refusal is noted.
 
-        needed: an answer whose verdict is not known yet can hardly do without it.
+        needed: an undecided verdict needs this step, so it may overrun the limit by OVERRUN.
         """
         limit = self.limit * (OVERRUN if needed and not self.verdict_known else 1.0)
         if self.simulated + recordings < limit:

@@ -26,14 +26,14 @@ from spikecam_env.sensor import Keyframes, SensorModel
 Array = NDArray[np.float64]
 
 FEWEST_SPIKES = 3
-"""Spikes from which a pixel has a rate; others are given what two would."""
+"""Fewest spikes for a rate; other pixels get the rate of two spikes."""
 
 RATE_TOLERANCE = 3e-4
-"""Relative error of rates from which light is corrected."""
+"""Relative error of rates beyond which light is corrected."""
 
 MOST_AT_ONCE = 2.0
-"""Factor by which light is corrected at once.  Pixels that stay silent in a twin, or fire in every frame whatever the
-light, say nothing of how far it is off."""
+"""Largest factor of one correction of light.  Pixels that stay silent in a twin, or fire in every frame, do not show
+the size of the error."""
 
 BRIGHTEST = 1e4
 """Radiance of a scene at most: a pixel with a gain of 2e-4 of nominal saturates in it."""

@@ -1,7 +1,8 @@
-"""The unit under an effect, by indirect inference: its twins are refitted as the measurement was.
+"""The unit under an effect, by indirect inference: the unit is adjusted until its twins refit to the measured refit.
 
-An effect biases the refit.  The unit of its twins is moved by as much the other way; else an effect would be fitted
-with a unit that has taken up a part of it.  Source: Gourieroux, Monfort and Renault, "Indirect inference", 1993.
+An effect biases the refit.  Without the adjustment the fitted unit would already contain part of the effect.
+
+Source: Gourieroux, Monfort and Renault, "Indirect inference", 1993.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def inferred_unit(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated:
 
 
 def has_converged(one: BaseFit, other: BaseFit) -> bool:
-    """Whether a unit has changed so little, from one to the other, that twins of the one stand for the other's."""
+    """Whether the change between two units is so small that twins of one serve for the other."""
     return gain_change(one, other) <= CONVERGED
 
 

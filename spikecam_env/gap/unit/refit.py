@@ -37,7 +37,7 @@ UNSEEN_JITTER = 3e-5
 """s^2 of a unit whose recordings do not show it: that of 33 000 electrons a spike."""
 
 NOISY = 3.0
-"""Times the median relative A_16 from which a pixel is left out of the jitter."""
+"""Relative A_16, over the median, from which a pixel is left out of the jitter."""
 
 EQUAL_WITHIN = 5.0
 """Standard errors from the median up to which a pixel does not differ from most."""
@@ -115,7 +115,7 @@ def pooled_jitter(observations: list[Observation]) -> float:
 def noisy_pixels(o: Observation) -> NDArray[np.bool_]:
     """(P,) pixels whose A_16 is far above the others', or with irregular intervals.
 
-    The noise of all is not that of a few: one false spike in a pixel of three hundred is half as much as all noise."""
+    A few pixels would bias the noise of all: one false spike in a pixel of three hundred adds half of it."""
     terms = o.times.terms[:, DIFFERENCES.index(16)]
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = o.times.square[:, DIFFERENCES.index(16)] / terms * o.times.rate**2

@@ -1,0 +1,75 @@
+"""Pages of the documentation: how long they may be, the pictures they promise, and words that no reader can use."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tools import diagnosis_figure
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
+LENGTHS = {
+    "README.md": 120,
+    **{f"docs/howto/add_{what}.md": 40 for what in ("an_effect", "a_scene", "a_statistic", "a_task")},
+    **{f"docs/tutorials/{page.name}": 80 for page in TUTORIALS},
+    "docs/explanation/diagnosis.md": 100,
+}
+"""Most lines of a page."""
+MOST_BYTES = 100_000
+"""Of a tutorial's picture."""
+UNUSABLE = {
+    "a commit": r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*[0-9])[0-9a-f]{7,40}\b",
+    "the history of the work": r"git log",
+    "a folder that only the authors have": r"\.\./shared|(?<![\w/])/work/",
+}
+
+
+@pytest.mark.parametrize(("page", "most"), LENGTHS.items())
+def test_a_page_is_short(page: str, most: int) -> None:
+    lines = len((ROOT / page).read_text(encoding="utf-8").splitlines())
+    print(f"{page}: {lines} lines of at most {most}")
+    assert lines <= most
+
+
+def test_there_are_six_tutorials() -> None:
+    assert len(TUTORIALS) == 6
+
+
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
+def test_a_tutorial_shows_the_picture_that_its_own_code_makes(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    (shown,) = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)
+    (saved,) = re.findall(r'savefig\("([^"]+)"', text)
+    assert shown == saved and (page.parent / shown).stat().st_size < MOST_BYTES
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_a_page_names_nothing_that_its_reader_does_not_have(page: Path) -> None:
+    text = re.sub(r"code [0-9a-f]{12}", "", page.read_text(encoding="utf-8"))  # generated figures state their code
+    found = {what: re.findall(pattern, text) for what, pattern in UNUSABLE.items()}
+    assert not any(found.values()), found
+
+
+def test_every_link_of_the_readme_leads_to_a_file() -> None:
+    links = re.findall(r"\]\(([^)#\s]+)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    missing = [link for link in links if not link.startswith("http") and not (ROOT / link).exists()]
+    assert links and not missing, missing
+
+
+def test_the_figure_of_the_diagnosis_is_drawn_by_its_command(tmp_path: Path) -> None:
+    diagnosis_figure.main([str(tmp_path / "diagnosis.svg")])
+    drawn, shipped = (
+        re.findall(r">([^<>]+)</text>", path.read_text(encoding="utf-8"))
+        for path in (tmp_path / "diagnosis.svg", DOCS / "explanation" / "diagnosis.svg")
+    )
+    assert drawn == shipped and {name for stages, _ in diagnosis_figure.ROWS for name, _ in stages} <= set(drawn)
+
+
+def test_the_figure_s_command_says_how_to_call_it() -> None:
+    with pytest.raises(SystemExit, match=r"tools\.diagnosis_figure docs/explanation/diagnosis\.svg"):
+        diagnosis_figure.main([])
