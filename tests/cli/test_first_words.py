@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from spikecam_env.cli.first_words import START, options_of, commands_of
+from spikecam_env.cli.first_words import START, commands_of, options_of
 from spikecam_env.cli.main import COMMANDS, run
 
 

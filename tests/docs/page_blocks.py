@@ -34,7 +34,7 @@ PROGRAMS = ("spikecam", "python", "make", "pip", "mkdir", "export", ".venv/bin/s
 
 @dataclass(frozen=True)
 class Block:
-    """kind: PYTHON, COMMANDS or TEXT.  line: where its code begins, counted from 1.  marks: by the comment's first words."""
+    """kind: PYTHON, COMMANDS or TEXT.  line: where its code begins, from 1.  marks: by the comment's first words."""
 
     kind: str
     code: str
@@ -83,11 +83,15 @@ def without_code(text: str) -> str:
 
 
 def command_lines(code: str) -> list[str]:
-    """The lines of a block of commands: continued ones and loops joined, remarks (`# ...`, or two spaces on) left out."""
-    joined = re.sub(r"\\\n\s*", " ", code)
-    joined = re.sub(r"^(for .*?^done.*?)$", lambda found: re.sub(r"\n\s*", " ", found[1]), joined, flags=re.M | re.S)
+    """The lines of a block of commands: continued ones and loops joined, remarks (`# ...`, or two spaces on) cut off."""
+    continued = re.sub(r"\\\n\s*", " ", code)
+    joined = re.sub(r"^for .*?^done.*?$", lambda found: _in_one_line(found[0]), continued, flags=re.M | re.S)
     lines = (re.sub(r"(^|\s+)#.*$|(?<=\S) {2,}\S.*$", "", line).strip() for line in joined.splitlines())
     return [line.removeprefix("$ ") for line in lines if line]
+
+
+def _in_one_line(loop: str) -> str:
+    return re.sub(r"(\bdo)?\n\s*", lambda found: "do " if found[1] else "; ", loop)
 
 
 def _blocks(lines: list[str]) -> Iterator[Block]:

@@ -35,7 +35,7 @@ SHELL = ("mkdir", "cp", "mv", "ls", "cat")
 
 @dataclass
 class Page:
-    """A page as it is run.  module: the namespace of its Python.  counts: blocks and lines run, and not run by reason."""
+    """A page as it is run.  module: its Python's namespace.  counts: blocks and lines that were run, or not and why."""
 
     module: ModuleType
     patch: MonkeyPatch
@@ -172,7 +172,10 @@ def in_shell(line: str) -> None:
     """Run a line by bash, with this Python and the command first on its path."""
     functions = f'spikecam() {{ {INSTALLED} "$@"; }}; python() {{ {sys.executable} "$@"; }}'
     done = subprocess.run(
-        ["bash", "-euc", f"{functions}; {line.replace('.venv/bin/', '')}"], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)}
+        ["bash", "-euc", f"{functions}; {line.replace('.venv/bin/', '')}"],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
 

@@ -17,9 +17,12 @@ from spikecam_env.cli.main import COMMANDS as SPIKECAM
 from tools.site.commands import every_command, examples_of
 
 SLOW = {
+    "docs/gap.md",
     "docs/howto/train.md",
     "docs/play_and_view.md",
+    "docs/scenes.md",
     "docs/tutorials/calibrate.md",
+    "docs/tutorials/denoise.md",
     "docs/tutorials/first_diagnosis.md",
 }
 """Pages that take ten seconds or more."""
@@ -32,9 +35,7 @@ def with_blocks() -> list[object]:
 
 
 @pytest.mark.parametrize("page", with_blocks())
-def test_what_a_page_shows_works(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, record_property
-) -> None:
+def test_what_a_page_shows_works(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, record_property) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")
     (tmp_path / "docs").symlink_to(ROOT / "docs")
@@ -68,7 +69,9 @@ def check_name(code: str) -> None:
         assert find_spec(words[1]), f"no module {words[1]}"
 
 
-@pytest.mark.parametrize("words, kind", [*every_command()], ids=lambda value: " ".join(value) if isinstance(value, tuple) else "")
+@pytest.mark.parametrize(
+    "words, kind", [*every_command()], ids=lambda value: " ".join(value) if isinstance(value, tuple) else ""
+)
 def test_examples_of_the_help_are_understood(words: tuple[str, ...], kind: type) -> None:
     for line in examples_of(kind):
         read(line.partition("  #")[0])

@@ -36,7 +36,9 @@ def test_a_public_name_says_what_it_is(module: str, name: str) -> None:
     assert docstring_of(module, name) or kind_of(value) == "module" or name.startswith("__")
 
 
-@pytest.mark.parametrize("words, kind", [*commands.every_command()], ids=lambda value: " ".join(value) if isinstance(value, tuple) else "")
+@pytest.mark.parametrize(
+    "words, kind", [*commands.every_command()], ids=lambda value: " ".join(value) if isinstance(value, tuple) else ""
+)
 def test_every_option_of_a_command_is_in_the_reference(words: tuple[str, ...], kind: Any) -> None:
     page = filled_in("<!-- generated: commands -->", "reference/command_line.md")
     [section] = re.findall(rf"^#+ spikecam {' '.join(words)}\n(.*?)(?=^## |^### |\Z)", page, re.MULTILINE | re.DOTALL)

@@ -1,8 +1,11 @@
 """What is filled in as Sphinx reads a page of docs: the reference, and links to files that are no pages.
 
-`<!-- generated: commands -->` becomes the command line reference, `<!-- generated: formats -->` the table of file formats,
-`<!-- generated: benchmarks -->` those of speed by version, `<!-- generated: api MODULE -->` what a module offers,
-`<!-- generated: page FILE -->` a page at the root.
+<!-- generated: commands -->        the command line reference
+<!-- generated: api MODULE -->      what a module offers
+<!-- generated: formats -->         the table of file formats
+<!-- generated: benchmarks -->      speed by version
+<!-- generated: page FILE -->       a page at the root
+
 A link to a file of the repository becomes a download of it; a link to a folder, its name.
 """
 
@@ -65,7 +68,12 @@ def _module(module: str) -> list[str]:
         kind = kind_of(value)
         directive = f".. auto{kind}:: {module}.{name}"
         if home_of(module, name) != module:
-            lines += ["```{eval-rst}", f":py:obj:`{name} <{home_of(module, name)}.{name}>` is offered here too.", "```", ""]
+            lines += [
+                "```{eval-rst}",
+                f":py:obj:`{name} <{home_of(module, name)}.{name}>` is offered here too.",
+                "```",
+                "",
+            ]
         elif kind == "data":
             text = ["   " + line for line in rendered(docstring_of(module, name))]
             lines += ["```{eval-rst}", f".. py:data:: {module}.{name}", "", *text, "```", ""]
