@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 # Of some 16 000 modules few are imported, and compiled then.
 PIP := -m pip install --quiet --no-compile
 
-.PHONY: install install-dev install-oldest demo test test-oldest lint pages clean
+.PHONY: install install-dev install-oldest demo test test-oldest lint docs pages clean
 
 install: $(VENV)/.installed
 install-dev: $(VENV)/.installed-dev
@@ -50,6 +50,10 @@ test-oldest: install-oldest
 pages: install-dev
 	$(BIN)/python -m tools.pages
 
+# The site of docs, in docs/_build: warnings are errors, and nothing is fetched to build or to show it.
+docs: install-dev
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --fresh-env --quiet -b html docs docs/_build
+
 lint: install-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -57,4 +61,4 @@ lint: install-dev
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf $(VENV) $(VENV)-oldest build *.egg-info
+	rm -rf $(VENV) $(VENV)-oldest build docs/_build *.egg-info

@@ -16,6 +16,7 @@ from scenes.trajectories import Trajectory
 from spikecam_env.errors import InputError
 
 Albedo = float | Texture
+"""Share of light that a surface throws back: one for all of it, or a texture of it, in [0, 1]."""
 Points = NDArray[np.float64]
 
 

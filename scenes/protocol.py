@@ -51,7 +51,11 @@ class Gaze:
 
     @classmethod
     def fixed(cls, pan: float, tilt: float) -> Gaze:
-        """A camera at rest at this offset [pixels]."""
+        """A camera at rest at this offset [pixels].
+
+        >>> Gaze.fixed(2.0, 0.0).rate
+        (0.0, 0.0)
+        """
         return cls((pan, tilt), (pan, tilt), (0.0, 1.0))
 
     @property

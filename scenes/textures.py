@@ -125,6 +125,7 @@ TEXTURES: dict[str, Callable[[np.random.Generator, int], Texture]] = {
     "gradient": gradient,
     "glyphs": glyphs,
 }
+"""Kinds of textures by name: (rng, size) -> (size, size) in [0, 1], periodic."""
 
 _ALPHABET = tuple("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789&%?!  ")
 _FONTS = (

@@ -23,16 +23,25 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_terminal_summary(terminalreporter) -> None:
-    """Cases of malformed input by reader and command (`tests/hostile`)."""
-    tally: dict[str, Counter[str]] = {}
-    for report in (r for reports in terminalreporter.stats.values() for r in reports):
-        if getattr(report, "when", "") != "teardown":
-            continue
-        for name, counts in getattr(report, "user_properties", ()):
-            for target, outcomes in counts.items() if name == "malformed input" else ():
-                tally.setdefault(target, Counter()).update(outcomes)
+    """Cases of malformed input by reader and command (`tests/hostile`), and blocks of the pages (`tests/docs`)."""
+    tally = counted(terminalreporter, "malformed input")
     if tally:
         total = sum(sum(outcomes.values()) for outcomes in tally.values())
         terminalreporter.write_line(f"\nmalformed input: {total} cases, refused in one line or taken as good after all")
     for target, outcomes in sorted(tally.items()):
         terminalreporter.write_line(f"  {target:42} {outcomes['refused']:5} refused {outcomes['taken']:4} taken")
+    pages = counted(terminalreporter, "pages")
+    for what, outcomes in sorted(pages.items()):
+        terminalreporter.write_line(f"  {what:70} {outcomes['count']:5}")
+
+
+def counted(terminalreporter, name: str) -> dict[str, Counter[str]]:
+    """What tests have recorded under a name, over all of them: target -> outcome -> how often."""
+    tally: dict[str, Counter[str]] = {}
+    for report in (r for reports in terminalreporter.stats.values() for r in reports):
+        if getattr(report, "when", "") != "teardown":
+            continue
+        for recorded, counts in getattr(report, "user_properties", ()):
+            for target, outcomes in counts.items() if recorded == name else ():
+                tally.setdefault(target, Counter()).update(outcomes)
+    return tally

@@ -76,6 +76,10 @@ def make_scene(
     seed       of what the scene leaves to chance: textures, starting poses
     renderer   default: chosen on first use, in each process (`scenes.renderers`)
     Errors: InputError for an unknown name, with those that there are.
+
+    >>> light = make_scene("collage", shape=(16, 24)).radiance(0, 64)
+    >>> light.radiance.shape[1:]
+    (16, 24)
     """
     return exposed(unexposed_scene(name, shape, seed, frame_rate_hz, renderer), mean_interval)
 

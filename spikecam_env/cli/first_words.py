@@ -39,7 +39,7 @@ def check_words(args: Sequence[str], commands: Mapping[str, type]) -> None:
             if word not in choices:
                 raise _unknown_command(said, word, choices)
             chosen = choices[word]
-            said, choices, options = f"{said} {word}", _commands_of(chosen), set(ALWAYS).union(_options_of(chosen))
+            said, choices, options = f"{said} {word}", commands_of(chosen), set(ALWAYS).union(options_of(chosen))
         elif word.startswith("--") and not choices:
             name = word[2:].partition("=")[0].replace("_", "-")
             if name and name not in options and not name.startswith(OF_THE_PARSER):
@@ -59,7 +59,7 @@ def _unknown_option(said: str, name: str, options: Iterable[str]) -> InputError:
     return InputError(f"unknown option {shown('--' + name)} of `{said}`{meant} `{said} --help` lists them")
 
 
-def _commands_of(options: type) -> dict[str, type]:
+def commands_of(options: type) -> dict[str, type]:
     """Commands below a command, by their names; none of most."""
     found: dict[str, type] = {}
     for hint in get_type_hints(options, include_extras=True).values():
@@ -70,14 +70,14 @@ def _commands_of(options: type) -> dict[str, type]:
     return found
 
 
-def _options_of(options: Any) -> set[str]:
+def options_of(options: Any) -> set[str]:
     """Names of a command's options, as they are written after the two dashes."""
     hints = get_type_hints(options, include_extras=True)
     names: set[str] = set()
     for field in fields(options):
         hint, name = hints[field.name], field.name.replace("_", "-")
         if is_dataclass(hint):
-            names |= _options_of(hint)
+            names |= options_of(hint)
         elif tyro.conf.Positional not in get_args(hint):
             names |= {name, f"no-{name}"} if hint is bool else {name}
     return names

@@ -79,10 +79,11 @@ def run(args: list[str] | None = None) -> int:
     if not words:
         print(START)
         return 0
-    return run_parsed(lambda: _parsed(words))
+    return run_parsed(lambda: understood(words))
 
 
-def _parsed(words: list[str]) -> Any:
+def understood(words: list[str]) -> Any:
+    """The command that these words say, an instance of one of COMMANDS, not run yet; exits where there is none."""
     check_words(words, COMMANDS)
     union: Any = None
     for name, options in COMMANDS.items():

@@ -27,6 +27,7 @@ MOST_SCENES = 100_000
 """Of a split; the paper has 100."""
 
 PHM = ("ball", "cook", "dice", "doll", "fan", "fly", "hand", "jump", "poker", "top")
+"""Scenes of PHM_N, the ten that are designed, by their names in the catalogue."""
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,9 @@ def isi_plane(spikes: ArrayLike, t: int, *, future: int | None = None, normalise
     """(T, H, W) spikes -> (H, W) float32, the interval at frame t [frames], or its inverse if `normalised`.
 
     Errors: InputError if t is outside the stream or `future` is negative.
+
+    >>> isi_plane(np.uint8([1, 0, 0, 1, 0, 1]).reshape(6, 1, 1), t=2).tolist()
+    [[3.0]]
     """
     return np.asarray(isi_planes(spikes, start=t, stop=t + 1, future=future, normalised=normalised)[0])
 

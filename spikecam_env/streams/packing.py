@@ -19,7 +19,11 @@ BitOrder = Literal["little", "big"]
 
 
 def pack_frames(spikes: ArrayLike, *, bit_order: BitOrder = "little") -> NDArray[np.uint8]:
-    """(T, H, W) spikes -> (T, ceil(H W / 8)) uint8; raises InputError as `as_spikes` does."""
+    """(T, H, W) spikes -> (T, ceil(H W / 8)) uint8; raises InputError as `as_spikes` does.
+
+    >>> pack_frames(np.uint8([[[1, 0, 0, 1]]])).tolist()
+    [[9]]
+    """
     return pack_checked(as_spikes(spikes), bit_order)
 
 

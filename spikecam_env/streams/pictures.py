@@ -23,6 +23,9 @@ def middleTFP(spikes: ArrayLike, t: int | None = None, window: int = 41) -> NDAr
 
     t defaults to the middle.  The window holds `window` frames from t - window // 2, cut to the stream.
     Errors: InputError if t is outside the stream or window < 1.
+
+    >>> middleTFP(np.tile(np.uint8([1, 0, 0, 0]), 10).reshape(40, 1, 1), window=20).tolist()
+    [[0.25]]
     """
     frames = as_stream(spikes)
     t = _middle(frames, t)

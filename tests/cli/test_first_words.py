@@ -6,14 +6,14 @@ import re
 
 import pytest
 
-from spikecam_env.cli.first_words import START, _commands_of, _options_of
+from spikecam_env.cli.first_words import START, commands_of, options_of
 from spikecam_env.cli.main import COMMANDS, run
 
 
 def every_command() -> dict[str, type]:
     found = {}
     for name, options in COMMANDS.items():
-        below = _commands_of(options)
+        below = commands_of(options)
         found |= {f"{name} {word}": kind for word, kind in below.items()} or {name: options}
     return found
 
@@ -62,7 +62,7 @@ def test_the_options_that_are_known_are_those_that_the_help_lists(command: str, 
         run([*command.split(), "--help"])
     heads = re.findall(r"^\S?\s*(--?[a-z].*?)(?:  |$)", capsys.readouterr().out, re.MULTILINE)
     listed = {name for head in heads for name in re.findall(r"--([a-z0-9-]+)", head)}
-    assert listed and listed - {"help"} == _options_of(every_command()[command])
+    assert listed and listed - {"help"} == options_of(every_command()[command])
 
 
 def test_an_option_may_be_written_with_underscores(monkeypatch: pytest.MonkeyPatch) -> None:

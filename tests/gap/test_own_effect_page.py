@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from page_blocks import COMMANDS, PYTHON, blocks_of, command_lines
 
 from spikecam_env import cache_folder
 from spikecam_env.cli.main import run
@@ -17,8 +17,9 @@ from spikecam_env.gap.fit import standard_case, standard_templates
 from spikecam_env.sensor import CATALOGUE
 
 PAGE = Path(__file__).parents[2] / "docs" / "own_effect.md"
-LAW, LIMITING_CASE, IN_PYTHON = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-LINES = "".join(re.findall(r"```bash\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)).splitlines()
+BLOCKS = blocks_of(PAGE.read_text(encoding="utf-8"))
+LAW, LIMITING_CASE, IN_PYTHON = (block.code for block in BLOCKS if block.kind == PYTHON)
+LINES = [line for block in BLOCKS if block.kind == COMMANDS for line in command_lines(block.code)]
 
 SHAPE, FRAMES = (16, 16), 1000
 SMALLER = {

@@ -61,7 +61,11 @@ def labels_from_table(path: str | Path) -> tuple[Label, ...]:
 
 
 def label_from_text(text: str) -> Label:
-    """A label written as FILE=RADIANCE, e.g. `wall.npz=unknown`."""
+    """A label written as FILE=RADIANCE, e.g. `wall.npz=unknown`.
+
+    >>> label_from_text("flat.dat=0.2").radiance
+    0.2
+    """
     file, equals, radiance = text.rpartition("=")
     if not equals or not file:
         raise InputError(f"label {shown(text)} is not of the form FILE=RADIANCE, e.g. wall.npz=unknown or flat.dat=0.2")

@@ -1,0 +1,86 @@
+"""The reference has every public name, command and option, and the examples of docstrings do what they say."""
+
+from __future__ import annotations
+
+import doctest
+import re
+from importlib import import_module
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spikecam_env.cli.first_words import commands_of, options_of
+from tools.site import commands
+from tools.site.docstrings import rendered
+from tools.site.pages import GENERATED, ROOT, filled_in
+from tools.site.public import MODULES, docstring_of, home_of, kind_of, names_of
+
+API = ROOT / "docs" / "reference" / "api"
+PACKAGES = ("spikecam_env", "spikecam_env.sensor", "spikecam_env.streams", "spikecam_env.gap", "spikecam_env.datasets",
+            "spikecam_env.calibration", "spikecam_env.campaign", "spikecam_env.envs.wrappers", "scenes",
+            "scenes.catalogue", "denoiser")  # fmt: skip
+"""Packages whose names users import; each is in the reference, whatever else is."""
+NAMES = [(module, name) for module in MODULES for name in names_of(module) if home_of(module, name) == module]
+
+
+def test_every_module_of_the_reference_stands_on_one_page() -> None:
+    placed = [m["of"] for page in API.glob("*.md") for m in GENERATED.finditer(page.read_text(encoding="utf-8"))]
+    assert sorted(placed) == sorted(MODULES) and set(PACKAGES) <= set(MODULES)
+
+
+@pytest.mark.parametrize("module, name", NAMES, ids=lambda part: part)
+def test_a_public_name_says_what_it_is(module: str, name: str) -> None:
+    value = getattr(import_module(module), name)
+    assert docstring_of(module, name) or kind_of(value) == "module" or name.startswith("__")
+
+
+@pytest.mark.parametrize(
+    "words, kind", [*commands.every_command()], ids=lambda value: " ".join(value) if isinstance(value, tuple) else ""
+)
+def test_every_option_of_a_command_is_in_the_reference(words: tuple[str, ...], kind: Any) -> None:
+    page = filled_in("<!-- generated: commands -->", "reference/command_line.md")
+    [section] = re.findall(rf"^#+ spikecam {' '.join(words)}\n(.*?)(?=^## |^### |\Z)", page, re.MULTILINE | re.DOTALL)
+    written = set(re.findall(r"--([a-z][a-z0-9-]*)", " ".join(re.findall(r"^`(-.*?)`", section, re.MULTILINE))))
+    assert written == (set() if commands_of(kind) else options_of(kind))
+
+
+def test_docstrings_become_fields_and_nothing_of_them_is_markup() -> None:
+    text = """A camera of `shape` pixels: 2*3.
+
+    T = 1/x
+
+model: what kind of
+    camera.  seed: which unit.
+radius     [pixels] of the disk
+           at rest
+Raises InputError for a seed_ below 0.
+
+>>> 1 + 1
+2
+"""
+    lines = rendered(text, ("model", "seed", "radius"))
+    assert lines[:1] == [r"A camera of \ ``shape``\  pixels: 2\*3."]
+    assert "       T = 1/x" in lines and "::" in lines
+    fields = [line for line in lines if line.startswith(":")][1:]
+    assert fields == [
+        ":param model: what kind of camera.",
+        ":param seed: which unit.",
+        ":param radius: [pixels] of the disk at rest",
+        r":raises InputError: for a seed\_ below 0.",
+    ]
+    assert lines[-3:] == [">>> 1 + 1", "2", ""]
+
+
+def test_examples_in_docstrings_of_public_names_do_what_they_say() -> None:
+    finder, runner = doctest.DocTestFinder(recurse=True, exclude_empty=True), doctest.DocTestRunner()
+    for module, name in NAMES:
+        value = getattr(import_module(module), name)
+        if kind_of(value) in ("class", "function"):
+            home = import_module(value.__module__)
+            for found in finder.find(value, name, module=home, globs={**vars(home), "np": np}):
+                runner.run(found)
+    result = SimpleNamespace(failed=runner.failures, tried=runner.tries)
+    print(f"{result.tried} lines of examples in docstrings")
+    assert result.failed == 0 and result.tried > 10

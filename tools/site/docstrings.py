@@ -1,0 +1,114 @@
+"""Docstrings of this repository as reStructuredText, which Sphinx's autodoc reads.
+
+A docstring here is plain text: a summary, prose with `code`, indented equations, and arguments as `name: meaning` or in
+two columns.  Prose is escaped, indented blocks stay as they stand, arguments and errors become fields.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable
+
+ARGUMENT = re.compile(r"(?:^|\n|  )(?P<names>\w+(?:, \w+)*): ")
+COLUMNS = re.compile(r"^(?P<name>\w+) {2,}(?P<text>\S.*)$")
+RAISES = re.compile(r"(?:^|\n|(?<=[.;])\s+)(?:Raises |Errors: ?|NotReadyError (?=for ))")
+ERROR = re.compile(r"(?P<kind>[A-Z]\w+Error) ?(?P<text>.*)", re.DOTALL)
+CODE = re.compile(r"(`+)(.+?)\1", re.DOTALL)
+
+
+def rendered(text: str, arguments: Collection[str] = ()) -> list[str]:
+    """Lines of reStructuredText: prose, then fields, then examples.
+
+    text: a docstring without its common indentation.  arguments: names that may stand as `name: meaning`.
+    """
+    prose: list[str] = []
+    fields: list[str] = []
+    examples: list[str] = []
+    for paragraph in re.split(r"\n[ \t]*\n", text.strip("\n")):
+        lines = paragraph.splitlines() or [""]
+        if lines[0].lstrip().startswith(">>>"):
+            examples += [*lines, ""]
+        elif all(line.startswith("  ") for line in lines):
+            prose += ["::", "", *(f"   {line}" for line in lines), ""]
+        else:
+            plain, found = _sorted_out(lines, arguments)
+            fields += found
+            prose += [*plain, ""] if plain else []
+    return [*prose, *fields, "", *examples]
+
+
+def _sorted_out(lines: list[str], arguments: Collection[str]) -> tuple[list[str], list[str]]:
+    """Prose and fields of one paragraph."""
+    prose, fields = [], []
+    for piece in _in_columns(lines, arguments):
+        if isinstance(piece, tuple):
+            fields.append(_field(*piece))
+            continue
+        before, *parts = RAISES.split(piece)
+        kept, found = _by_argument(before, arguments)
+        prose += kept
+        fields += found
+        for part in parts:
+            errors, after = _by_argument(part, arguments)
+            fields += [*_errors(" ".join(errors)), *after]
+    return prose, fields
+
+
+def _in_columns(lines: list[str], arguments: Collection[str]) -> Iterable[str | tuple[str, str]]:
+    """The paragraph cut at rows of two columns, each (name, meaning) with the lines that go on below it."""
+    rest: list[str] = []
+    row: tuple[str, str] | None = None
+    for line in lines:
+        found = COLUMNS.match(line)
+        if found and found["name"] in arguments:
+            yield from ([row] if row else [])
+            yield from (["\n".join(rest)] if rest else [])
+            row, rest = (found["name"], found["text"]), []
+        elif row and line.startswith("   "):
+            row = (row[0], f"{row[1]} {line.strip()}")
+        else:
+            yield from ([row] if row else [])
+            row = None
+            rest.append(line)
+    yield from ([row] if row else [])
+    yield from (["\n".join(rest)] if rest else [])
+
+
+def _by_argument(text: str, arguments: Collection[str]) -> tuple[list[str], list[str]]:
+    """Prose before the first argument, and the arguments as fields."""
+    found = [m for m in ARGUMENT.finditer(text) if set(m["names"].split(", ")) <= set(arguments)]
+    ends = [*(m.start() for m in found[1:]), len(text)][: len(found)]
+    before = text[: found[0].start()] if found else text
+    fields = [_field(m["names"], text[m.end() : end]) for m, end in zip(found, ends, strict=True)]
+    return ([escaped(_one_line(before))] if before.strip() else []), fields
+
+
+def _field(names: str, meaning: str) -> str:
+    return f":param {names}: {escaped(_one_line(meaning))}"
+
+
+def _errors(text: str) -> list[str]:
+    found = ERROR.match(text)
+    return [f":raises {found['kind']}: {found['text']}" if found else f":raises: {text}"]
+
+
+def escaped(text: str) -> str:
+    """Prose in which nothing but `code` is markup."""
+    parts, at = [], 0
+    for code in CODE.finditer(text):
+        parts += [_plain(text[at : code.start()]), _literal(code[2])]
+        at = code.end()
+    return "".join([*parts, _plain(text[at:])])
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"([\\*|`]|_(?!\w))", r"\\\1", text)
+
+
+def _literal(code: str) -> str:
+    """A role rather than backticks: those need a space on either side."""
+    return rf"\ ``{_one_line(code)}``\ " if code.strip() else ""
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
