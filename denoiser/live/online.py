@@ -10,8 +10,8 @@ nothing else with them.  A picture is the newest pass of the network that these 
                     ago, of the last HISTORY frames before the window, as if the stream had begun there
     gain, carried   as the pass before left them, however long ago that is
 
-Where every pass of a stream is asked for, pictures have the bits of `OnlineDnSS`.  Where passes are left out the network
-knows less of the past; `spikecam bench live` prints what that costs.
+Where every pass of a stream is run, pictures have the bits of `OnlineDnSS`.  Where passes are left out the network knows
+less of the past; `spikecam bench live` prints what that costs.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ from denoiser.window import RollingWindow, Window
 from spikecam_env.checked import checked_count, checked_shape, checked_whole
 from spikecam_env.errors import InputError, NotReadyError
 
-HISTORY = 256
-"""Frames before a window that its running means hold at least, where there are so many."""
+HISTORY = 64
+"""Frames before a window that its running means hold at least, where there are so many.  More change a picture by less
+than 0.1 dB and take 40 us a frame at 250 x 400; none cost 0.4 dB in the dark (`tumble` at mean interval 60)."""
 ROOM = 4096
-"""Frames that are kept: a tenth of a second at 40 kHz, five times what a picture takes to read its own."""
+"""Frames that are kept: a tenth of a second at 40 kHz, five times as long as it takes to read those of a picture."""
 _LONG = 1 << 20
 """Age of a stream [frames] from which on it changes no bit of a running mean, 1 - (1 - 1/m)^age being 1."""
 
@@ -47,6 +48,7 @@ class LiveDnSS:
 
     shape: (rows, columns).
     mode: "best", "paper", or the path of a checkpoint.
+    passes: of the network for a picture, one after another, the last of which is shown: more know more, and take longer.
     plane: which frame of a pass a picture shows, 0 the oldest; default its middle, which the network knows best.
     room: frames that are kept.
     options: `precision` and `unit`, as of `OnlineDnSS`.
@@ -60,6 +62,7 @@ class LiveDnSS:
         shape: tuple[int, int],
         mode: str | os.PathLike[str] = "best",
         *,
+        passes: int = 1,
         plane: int | None = None,
         room: int = ROOM,
         **options: Any,
@@ -69,6 +72,7 @@ class LiveDnSS:
         self._layout = recipe.layout
         self._online = OnlineDnSS(recipe, network, output="rate", **options)
         self._unit = _map(options.get("unit"), self.shape)
+        self._passes = checked_count(passes, "passes")
         middle = self._layout.planes // 2
         self._plane = middle if plane is None else checked_whole(plane, "plane", 0, self._layout.planes - 1)
         least = 2 * (HISTORY + self._layout.span)
@@ -124,45 +128,53 @@ class LiveDnSS:
 
         Raises NotReadyError while there are fewer frames than a pass needs.
         """
-        while (start := self._newest()) != (None if self.window is None else self.window.start):
-            if (found := self._seen(start)) is not None:
-                self._pass(*found)
+        while not self._is_shown(newest := self._newest()):
+            if all(self._pass(newest[0], start) for start in self._due(*newest)):
                 break
         assert self.rates is not None
         return self.rates[self._plane]
 
     def ready(self) -> bool:
         """Whether there are frames for a picture, and for another than the last."""
-        begun, stop = self.ring.extent
-        held = self._start_of(begun, stop)
-        return held >= begun and (self.window is None or held != self.window.start)
+        newest = self._newest_or_none()
+        return newest is not None and not self._is_shown(newest)
 
-    def _start_of(self, begun: int, stop: int) -> int:
-        """First frame of the newest whole pass; before `begun` where there is none."""
-        planes = self._layout.planes
-        return begun + (stop - begun - planes - self._layout.future) // planes * planes
+    def _is_shown(self, newest: tuple[int, int]) -> bool:
+        return self.window is not None and self.window.start == newest[1]
 
-    def _newest(self) -> int:
+    def _newest_or_none(self) -> tuple[int, int] | None:
+        """First frame of the stream, and of its newest whole pass."""
         begun, stop = self.ring.extent
-        start = self._start_of(begun, stop)
-        if start < begun:
-            need = self._layout.planes + self._layout.future
+        passes = (stop - begun - self._layout.future) // self.step
+        return (begun, begun + (passes - 1) * self.step) if passes > 0 else None
+
+    def _newest(self) -> tuple[int, int]:
+        newest = self._newest_or_none()
+        if newest is None:
+            begun, stop = self.ring.extent
+            need = self.step + self._layout.future
             raise NotReadyError(f"{stop - begun} frames have come; the first picture needs {need}, push more")
-        return start
+        return newest
 
-    def _seen(self, start: int) -> tuple[RollingWindow, Window, int] | None:
-        """The window of the pass that begins at frame `start`, and the frame that is its frame 0; None where its frames
-        were overwritten meanwhile."""
-        begun = min(self.ring.extent[0], start)
-        first, stop = max(start - self._layout.past, begun), start + self._layout.planes + self._layout.future
+    def _due(self, begun: int, newest: int) -> range:
+        """First frames of the passes to run for a picture: the last `passes`, but for those that were run."""
+        first = max(begun, newest - (self._passes - 1) * self.step)
+        if self.window is not None:
+            first = max(first, self.window.start + self.step)
+        return range(first, newest + 1, self.step)
+
+    def _pass(self, begun: int, start: int) -> bool:
+        """Run the pass that begins at frame `start` of a stream that begins at `begun`, and keep what it leaves; whether
+        its frames were still there."""
+        first, stop = max(start - self._layout.past, begun), start + self.step + self._layout.future
         past = self._past_before(first, begun)
         oldest = past.stop
         past.advance(self.ring.rows, first, self._shares)
         spikes = self.ring.unpacked(first, stop)
-        self._past = past if self.ring.holds(oldest) else None
-        if self._past is None:
-            return None
-        origin = max(past.begun, first - _LONG)
+        if not self.ring.holds(oldest):
+            self._past = None
+            return False
+        self._past, origin = past, max(past.begun, first - _LONG)
         rolling = RollingWindow(self._layout, self.shape, self._unit)
         rolling.restore(
             {
@@ -175,7 +187,12 @@ class LiveDnSS:
                 "sums": self._sums,
             }
         )
-        return rolling, next(rolling.push(spikes[:0])), origin
+        window = next(rolling.push(spikes[:0]))
+        ((self.rates, self._carried),) = self._online.passes([window], [self._carried])
+        rolling.learn(window, self.rates)
+        self._sums = rolling.state()["sums"]
+        self.window = replace(window, start=start)
+        return True
 
     def _past_before(self, first: int, begun: int) -> Past:
         """The past to go on from to frame `first`: that of the pass before, or a new one."""
@@ -184,13 +201,6 @@ class LiveDnSS:
             return past
         pixels = self.shape[0] * self.shape[1]
         return Past.nothing(max(begun, first - HISTORY), pixels, len(self._shares))
-
-    def _pass(self, rolling: RollingWindow, window: Window, origin: int) -> None:
-        """Run the network for a window, and keep what it leaves."""
-        ((self.rates, self._carried),) = self._online.passes([window], [self._carried])
-        rolling.learn(window, self.rates)
-        self._sums = rolling.state()["sums"]
-        self.window = replace(window, start=window.start + origin)
 
 
 def _map(unit: Any, shape: tuple[int, int]) -> PixelMap | None:

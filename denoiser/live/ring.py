@@ -22,7 +22,8 @@ class Ring:
 
     def __init__(self, shape: tuple[int, int], room: int) -> None:
         self.shape = shape
-        self.rows = np.zeros((room, packed_bytes(shape)), np.uint8)
+        self.rows = np.empty((room, packed_bytes(shape)), np.uint8)
+        self.rows.fill(0)  # memory is given now, not while frames come
         self.extent = (0, 0)
         self._lent = 0  # frames up to here may be being written
 
