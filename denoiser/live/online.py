@@ -10,8 +10,8 @@ nothing else with them.  A picture is the newest pass of the network that these 
                     ago, of the last HISTORY frames before the window, as if the stream had begun there
     gain, carried   as the pass before left them, however long ago that is
 
-Where every pass of a stream is run, pictures have the bits of `OnlineDnSS`.  Where passes are left out the network knows
-less of the past; `spikecam bench live` prints what that costs.
+Where every pass of a stream is run, pictures have the bits of `OnlineDnSS`.  Where passes are left out the network
+knows less of the past; `spikecam bench live` prints what that costs.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class LiveDnSS:
 
     shape: (rows, columns).
     mode: "best", "paper", or the path of a checkpoint.
-    passes: of the network for a picture, one after another, the last of which is shown: more know more, and take longer.
+    passes: of the network for a picture, one after another; the last is shown.  More know more, and take longer.
     plane: which frame of a pass a picture shows, 0 the oldest; default its middle, which the network knows best.
     room: frames that are kept.
     options: `precision` and `unit`, as of `OnlineDnSS`.
@@ -93,6 +93,11 @@ class LiveDnSS:
         return self._layout.planes
 
     @property
+    def needed(self) -> int:
+        """Frames that the first picture needs."""
+        return self._layout.planes + self._layout.future
+
+    @property
     def count(self) -> int:
         """Frames of the stream so far, those that were lost included."""
         return self.ring.extent[1]
@@ -114,6 +119,13 @@ class LiveDnSS:
         self._sums = np.zeros((2, *self.shape), np.float32)
         self._carried: infer.Carried = ()
 
+    def warm_up(self) -> None:
+        """Do once what the first picture would do for long, such as to compile; forgets the stream."""
+        frames = HISTORY + self._layout.span
+        self.ring.push(np.zeros((frames, self.ring.rows.shape[1]), np.uint8))
+        self.picture()
+        self.reset()
+
     def push(self, packed: NDArray[np.uint8]) -> None:
         """(T, ceil(H W / 8)) uint8 more frames, packed as by `pack_frames`; raises InputError for another array."""
         self.ring.push(packed)
@@ -123,8 +135,7 @@ class LiveDnSS:
         self.ring.skip(checked_count(frames, "frames"))
 
     def picture(self) -> NDArray[np.float32]:
-        """(H, W) float32, the rate [spikes/frame] at `frame`, the newest that can be known so well; the same array until
-        frames for another pass have come.
+        """(H, W) float32, the rate [spikes/frame] at `frame`; the same array until frames for another pass have come.
 
         Raises NotReadyError while there are fewer frames than a pass needs.
         """
@@ -152,8 +163,7 @@ class LiveDnSS:
         newest = self._newest_or_none()
         if newest is None:
             begun, stop = self.ring.extent
-            need = self.step + self._layout.future
-            raise NotReadyError(f"{stop - begun} frames have come; the first picture needs {need}, push more")
+            raise NotReadyError(f"{stop - begun} frames have come; the first picture needs {self.needed}, push more")
         return newest
 
     def _due(self, begun: int, newest: int) -> range:
@@ -164,8 +174,8 @@ class LiveDnSS:
         return range(first, newest + 1, self.step)
 
     def _pass(self, begun: int, start: int) -> bool:
-        """Run the pass that begins at frame `start` of a stream that begins at `begun`, and keep what it leaves; whether
-        its frames were still there."""
+        """Run the pass that begins at frame `start` of a stream that begins at `begun`, and keep what it leaves; false
+        where its frames were overwritten meanwhile."""
         first, stop = max(start - self._layout.past, begun), start + self.step + self._layout.future
         past = self._past_before(first, begun)
         oldest = past.stop

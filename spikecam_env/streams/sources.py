@@ -12,6 +12,7 @@ caller's to give, 250 x 400 if he does not.  Whatever order rows and bits come i
 
 from __future__ import annotations
 
+import io
 import os
 import socket
 import stat
@@ -62,12 +63,23 @@ FLOWING = ("height", "width", "crop_width", "flip", "bit_order")
 
 
 class Source(Protocol):
-    """A stream of packed frames.  waits: whether frames wait until they are asked for, as those of a file do."""
+    """A stream of packed frames."""
 
-    title: str
-    shape: tuple[int, int]
-    frame_rate_hz: float
-    waits: bool
+    @property
+    def title(self) -> str:
+        """What it is called."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Of the camera."""
+
+    @property
+    def waits(self) -> bool:
+        """Whether frames wait until they are asked for, as those of a file do."""
 
     def read(self, rows: Packed) -> int:
         """Fill rows with the next frames, from the first row on; how many, 0 at the end of the stream."""
@@ -131,7 +143,9 @@ class Flowing:
         except OSError as error:
             raise InputError(f"{self.title} broke after {self._frames} frames: {error.strerror or error}") from error
         self._frames += frames
-        here = f"{rest} of {packed_bytes(self.taken.shape)} bytes of a frame of {self.taken.height} x {self.taken.width}"
+        here = (
+            f"{rest} of {packed_bytes(self.taken.shape)} bytes of a frame of {self.taken.height} x {self.taken.width}"
+        )
         if not self._frames:
             raise InputError(f"{self.title} ended before a frame had come, with {here}")
         if rest:
@@ -194,7 +208,7 @@ def _whole_frames(receive: Receive, rows: Packed, taken: Geometry) -> tuple[int,
     the end of the stream)."""
     size = packed_bytes(taken.shape)
     lying = rows if _lies_as_packed(taken) else np.empty((len(rows), size), np.uint8)
-    room = memoryview(lying.reshape(-1))
+    room = lying.reshape(-1).data
     got = receive(room)
     while got % size and (more := receive(room[got : got + size - got % size])):
         got += more
@@ -242,7 +256,7 @@ def _dat_file(path: Path, loop: bool, how: dict[str, Any], stack: ExitStack) -> 
         frame_rate_hz=how.get("frame_rate_hz"),
         source=how["geometry_from"],
     )
-    file = stack.enter_context(open(path, "rb", buffering=0))
+    file = stack.enter_context(path.open("rb", buffering=0))
     size = packed_bytes(taken.shape)
 
     def fetch(first: int, rows: Packed) -> None:
@@ -282,7 +296,7 @@ def _flowing(where: str, options: dict[str, Any], stack: ExitStack) -> Flowing:
     try:
         if where.startswith((TCP, UNIX)) or stat.S_ISSOCK(os.stat(where).st_mode):
             return Flowing(title, taken, stack.enter_context(_connected(where)).recv_into)
-        pipe = stack.enter_context(open(where, "rb", buffering=0))
+        pipe = stack.enter_context(io.FileIO(where))
         return Flowing(title, taken, _of_pipe(pipe.fileno()))
     except OSError as error:
         raise InputError(f"cannot connect to {where}: {error.strerror or error}") from error

@@ -137,16 +137,22 @@ def test_a_named_pipe_brings_frames(tmp_path: Path) -> None:
 
 def test_a_stream_that_ends_within_a_frame_says_so_and_keeps_the_whole_ones(tmp_path: Path) -> None:
     packed = pack_frames(stream())
-    with sent(packed.tobytes()[:-7], "tcp", tmp_path) as where, open_source(where, **SIZE) as source:
-        with pytest.warns(UserWarning, match="middle of a frame, with 13 of 20 bytes of a frame of 10 x 16; its 39"):
-            np.testing.assert_array_equal(all_of(source), packed[:39])
+    with (
+        sent(packed.tobytes()[:-7], "tcp", tmp_path) as where,
+        open_source(where, **SIZE) as source,
+        pytest.warns(UserWarning, match="middle of a frame, with 13 of 20 bytes of a frame of 10 x 16; its 39"),
+    ):
+        np.testing.assert_array_equal(all_of(source), packed[:39])
 
 
 @pytest.mark.parametrize("content", [b"", b"1234567"], ids=["empty", "cut"])
 def test_a_stream_without_a_whole_frame_is_refused(content: bytes, tmp_path: Path) -> None:
-    with sent(content, "tcp", tmp_path) as where, open_source(where, **SIZE) as source:
-        with pytest.raises(InputError, match=rf"ended before a frame had come, with {len(content)} of 20 bytes"):
-            all_of(source)
+    with (
+        sent(content, "tcp", tmp_path) as where,
+        open_source(where, **SIZE) as source,
+        pytest.raises(InputError, match=rf"ended before a frame had come, with {len(content)} of 20 bytes"),
+    ):
+        all_of(source)
 
 
 def test_a_connection_that_breaks_is_named(tmp_path: Path) -> None:
@@ -187,9 +193,11 @@ def test_what_cannot_be_opened_is_named_in_a_line(where: str, options: dict, mes
     (tmp_path / "empty.dat").touch()
     written(tmp_path / "a.dat", stream())
     written(tmp_path / "a.h5", stream())
-    with pytest.raises(InputError, match=message) as caught:
-        with open_source(where.format(folder=tmp_path), **options) as source:
-            all_of(source)
+    with (
+        pytest.raises(InputError, match=message) as caught,
+        open_source(where.format(folder=tmp_path), **options) as source,
+    ):
+        all_of(source)
     assert "\n" not in str(caught.value)
 
 
