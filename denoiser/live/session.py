@@ -12,6 +12,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
 
@@ -25,6 +26,8 @@ PICTURES_S = 30.0
 """Pictures a second: what an eye sees as motion."""
 BUFFER_S = 0.1
 """For which frames wait for a reader that is late [s]: 50 MB of a camera of 250 x 400 at 40 kHz."""
+LEAVE_S = 0.5
+"""For which a reader is waited for at the end [s]; one that waits for a sender may never come back."""
 BLOCK = 256
 """Frames that are read at a time, at most."""
 TICK_S = 0.002
@@ -85,7 +88,7 @@ class Session:
 
     speed: of a source that waits, 1 being its frame rate.  pictures: a second, at most.  frames, seconds: after which
     the session is over; None: when its source is.
-    An error of a thread is raised by `newest`.
+    What a thread raised, InputError for a stream that breaks, `over` and `newest` raise.
     """
 
     def __init__(
@@ -102,10 +105,9 @@ class Session:
         self._source, self._period_s = source, 1.0 / pictures
         self._rate = speed * source.frame_rate_hz if source.waits else None
         self._most, self._seconds = frames, seconds
-        self._threads = [
-            threading.Thread(target=self._run, args=(work,), daemon=True) for work in (self._read, self._denoise)
-        ]
-        self._reading = True
+        self._reader = threading.Thread(target=self._run, args=(self._read,), daemon=True)
+        self._denoiser = threading.Thread(target=self._run, args=(self._denoise,), daemon=True)
+        self._reading = self._denoising = True
         self._stop = threading.Event()
         self._changed = threading.Condition()
         self._shown: Shown | None = None
@@ -117,8 +119,8 @@ class Session:
 
     def __enter__(self) -> Session:
         self.live.warm_up()  # else frames would be lost meanwhile
-        for thread in self._threads:
-            thread.start()
+        self._reader.start()
+        self._denoiser.start()
         return self
 
     def __exit__(
@@ -126,33 +128,31 @@ class Session:
     ) -> None:
         self._stop.set()
         if error is None:
-            self._threads[1].join()
+            self._denoiser.join()
+            self._reader.join(LEAVE_S)
 
     @property
     def over(self) -> bool:
         """Whether there will be no other picture."""
-        return not self._threads[1].is_alive() and not self._reading
+        if self._error is not None:
+            raise self._error
+        return not self._denoising
 
     @property
     def figures(self) -> Figures:
-        until = self._ended_s or time.perf_counter()
+        until = time.perf_counter() if self._denoising else self._ended_s
         seconds = until - self._begun_s if self._begun_s else 0.0
         return Figures(seconds, self._taken, self._lost, self._pictures, self._latency_s)
 
     def newest(self, after: Shown | None, timeout_s: float) -> Shown | None:
-        """The newest picture, once it is another than `after`, waited for so long; None where there is none.
-
-        Raises what a thread raised: InputError for a stream that breaks.
-        """
+        """The newest picture, once it is another than `after`, waited for so long; None where there is none."""
         with self._changed:
-            self._changed.wait_for(lambda: self._shown is not after or self._error or self.over, timeout_s)
-            if self._error is not None:
-                raise self._error
+            self._changed.wait_for(lambda: self._shown is not after or self.over, timeout_s)
             return None if self._shown is after else self._shown
 
-    def _run(self, work: object) -> None:
+    def _run(self, work: Callable[[], object]) -> None:
         try:
-            work()  # type: ignore[operator]
+            work()
         except BaseException as error:
             self._error = error
             self._stop.set()
@@ -161,27 +161,30 @@ class Session:
 
     def _read(self) -> None:
         try:
-            while not self._stop.is_set() and (due := self._due()) is not None:
-                if due == 0:
+            while not self._is_time_up() and (left := self._left()):
+                due = min(left, self._due())
+                if not due:
                     time.sleep(TICK_S)
-                    continue
-                rows = self.live.ring.lend(min(due, BLOCK))
-                count = self._source.read(rows)
-                if not count:
+                elif count := self._source.read(self.live.ring.lend(due)):
+                    self._take(count)
+                else:
                     return
-                self._take(count)
         finally:
-            self._ended_s = time.perf_counter()
             self._reading = False
 
-    def _due(self) -> int | None:
-        """Frames that may be read now; None at the end.  Those that are overdue are skipped."""
-        now = time.perf_counter()
-        left = BLOCK if self._most is None else self._most - self._taken
-        if left <= 0 or (self._seconds is not None and self._begun_s and now - self._begun_s > self._seconds):
-            return None
+    def _is_time_up(self) -> bool:
+        taken_s = time.perf_counter() - self._begun_s if self._begun_s else 0.0
+        return self._stop.is_set() or (self._seconds is not None and taken_s > self._seconds)
+
+    def _left(self) -> int:
+        """Frames until there were enough."""
+        return BLOCK if self._most is None else self._most - self._taken
+
+    def _due(self) -> int:
+        """Frames that may be read now; those that are overdue are skipped."""
         if self._rate is None:
-            return left
+            return BLOCK
+        now = time.perf_counter()
         self._begun_s = self._begun_s or now
         due = int((now - self._begun_s) * self._rate) - self._taken - self._lost
         late = due - int(BUFFER_S * self._rate)
@@ -190,7 +193,7 @@ class Session:
             self.live.skip(late)
             self._lost += late
             due -= late
-        return min(due, left)
+        return min(due, BLOCK)
 
     def _take(self, count: int) -> None:
         now = time.perf_counter()
@@ -200,16 +203,20 @@ class Session:
         self._arrivals.append((self.live.count, now))
 
     def _denoise(self) -> None:
-        due = 0.0
-        while not self._stop.is_set():
-            now = time.perf_counter()
-            if now >= due and self.live.ready():
-                self._show()
-                due = max(due + self._period_s, now)
-            elif not self._reading:
-                return
-            else:
-                time.sleep(min(TICK_S, max(due - now, 0.0)) or TICK_S)
+        due_s = 0.0
+        try:
+            while not self._is_time_up():
+                now = time.perf_counter()
+                if now >= due_s and self.live.ready():
+                    self._show()
+                    due_s = max(due_s + self._period_s, now)
+                elif self._reading or self.live.ready():
+                    time.sleep(TICK_S)
+                else:
+                    return
+        finally:
+            self._ended_s = time.perf_counter()
+            self._denoising = False
 
     def _show(self) -> None:
         rate = self.live.picture()

@@ -16,7 +16,6 @@ import io
 import os
 import socket
 import stat
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
@@ -81,6 +80,10 @@ class Source(Protocol):
     def waits(self) -> bool:
         """Whether frames wait until they are asked for, as those of a file do."""
 
+    @property
+    def cut(self) -> str:
+        """What is wrong with how the stream ended, once it has; nothing where that is not known."""
+
     def read(self, rows: Packed) -> int:
         """Fill rows with the next frames, from the first row on; how many, 0 at the end of the stream."""
 
@@ -99,6 +102,7 @@ class Stored:
     fetch: Callable[[int, Packed], object]
     loop: bool = False
     waits: bool = field(default=True, init=False)
+    cut: str = field(default="", init=False)
     _next: int = field(default=0, init=False)
 
     def read(self, rows: Packed) -> int:
@@ -125,6 +129,7 @@ class Flowing:
     taken: Geometry
     receive: Receive
     waits: bool = field(default=False, init=False)
+    cut: str = field(default="", init=False)
     _frames: int = field(default=0, init=False)
 
     @property
@@ -136,8 +141,7 @@ class Flowing:
         return self.taken.frame_rate_hz or FRAME_RATE_HZ
 
     def read(self, rows: Packed) -> int:
-        """Raises InputError where the connection breaks, and where the stream ends before its first frame; warns where
-        it ends within a frame."""
+        """Raises InputError where the connection breaks, and where the stream ends before its first frame."""
         try:
             frames, rest = _whole_frames(self.receive, rows, self.taken)
         except OSError as error:
@@ -149,10 +153,8 @@ class Flowing:
         if not self._frames:
             raise InputError(f"{self.title} ended before a frame had come, with {here}")
         if rest:
-            warnings.warn(
-                f"{self.title} ended in the middle of a frame, with {here}; its {self._frames} whole frames were taken",
-                UserWarning,
-                stacklevel=2,
+            self.cut = (
+                f"{self.title} ended in the middle of a frame, with {here}; its {self._frames} whole frames were taken"
             )
         return frames
 

@@ -28,6 +28,7 @@ class Simulated:
     sensor: SpikeSensor
     speed: float = 1.0
     waits: bool = field(default=False, init=False)
+    cut: str = field(default="", init=False)
     _next: int = field(default=0, init=False)
     _due_s: float = field(default=0.0, init=False)
 

@@ -75,8 +75,11 @@ class Watching:
                 window.wait(IDLE_S)
 
     def summary(self) -> dict[str, Any]:
-        """What came and what was shown, as a row; raises InputError where there was no picture."""
+        """What came and what was shown, as a row; warns where the stream was cut, raises InputError where there was no
+        picture."""
         self._write("")
+        if self._source.cut:
+            warnings.warn(self._source.cut, UserWarning, stacklevel=2)
         figures = self._session.figures
         if not figures.pictures:
             raise self._too_short()
