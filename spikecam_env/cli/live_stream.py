@@ -14,7 +14,7 @@ from spikecam_env.checked import checked_number
 from spikecam_env.cli.camera import Camera
 from spikecam_env.cli.options import Checked, Count, Positive, Rpm, Seed, Size
 from spikecam_env.cli.reading import Reading
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
     from spikecam_env.streams.sources import Source
@@ -105,7 +105,7 @@ class Live:
         from spikecam_env.cli.live.simulated import Simulated
         from spikecam_env.cli.named_scene import scene_named
         from spikecam_env.sensor import SpikeSensor
-        from spikecam_env.streams.sources import open_source
+        from spikecam_env.streams.sources import is_flow, open_source
 
         if self.source in SCENES:
             model = self.camera.load()
@@ -113,6 +113,8 @@ class Live:
             sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
             yield Simulated(self.source, scene, sensor, self.speed or 1.0)
             return
+        if not Path(self.source).suffix and not is_flow(self.source):
+            raise unknown_name("scene, file or address", self.source, SCENES)
         with open_source(self.source, loop=self.loop, **self.reading.options()) as source:
             if not source.waits and self.speed is not None:
                 raise InputError(f"--speed {self.speed:g}: {source.title} has a pace of its own; leave --speed")

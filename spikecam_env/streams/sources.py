@@ -172,7 +172,7 @@ def open_source(where: str, *, loop: bool = False, **options: Any) -> Iterator[S
     Raises InputError for what cannot be opened or read, and for options that do not apply.
     """
     with ExitStack() as stack:
-        if _flows(where):
+        if is_flow(where):
             if loop:
                 raise InputError(f"{where} cannot begin again; a recording can")
             yield _flowing(where, options, stack)
@@ -195,7 +195,8 @@ def turned(packed: Packed, taken: Geometry) -> Packed:
     return (rows[:, ::-1] if taken.flip else rows).reshape(len(packed), taken.height * columns // 8)
 
 
-def _flows(where: str) -> bool:
+def is_flow(where: str) -> bool:
+    """Whether it is a pipe or a socket, and no file."""
     if where == STANDARD_INPUT or where.startswith((TCP, UNIX)):
         return True
     try:
