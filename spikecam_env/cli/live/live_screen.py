@@ -12,13 +12,13 @@ from PIL import Image, ImageDraw
 from spikecam_env.cli.live.screen import BRIGHT_PERCENT
 from spikecam_env.cli.panels import BACKGROUND, INK, MARGIN, Panel, compose, display, font, panel_scale
 
-LEVELS = 4096
-"""Brightnesses that are told apart: the darkest grey value of the screen is 30 of them wide."""
+LEVELS = 1 << 16
+"""Brightnesses in the table, those of a uint16: with fewer the darkest would be more than two grey values apart."""
 FOLLOWS = 0.1
 """Of the way to the newest picture's brightness, white goes at every picture: it follows the light in a third of a
 second, and does not flicker."""
 SAMPLED = 4
-"""Every so manieth row and column says how bright a picture is."""
+"""Rows and columns from one pixel that says how bright a picture is to the next."""
 STATUS = 26
 """Rows of the line with the figures, at the bottom."""
 
