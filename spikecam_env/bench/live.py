@@ -25,6 +25,7 @@ from scenes import RotatingDisk, Scene
 from scenes.catalogue import make_scene
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
 from spikecam_env.sensor import SpikeSensor
+from spikecam_env.streams.hdf5 import SpikeWriter
 from spikecam_env.streams.packing import pack_frames, unpack_frames
 from spikecam_env.streams.sources import open_source
 from spikecam_env.streams.vidar import save_vidar_dat
@@ -60,9 +61,9 @@ def bench_live(seconds: float = SECONDS, seed: int = 0) -> dict[str, list[dict[s
 
 
 def costs(spikes: NDArray[np.uint8]) -> list[dict[str, Any]]:
-    """CPU time of taking a frame in, and of a picture; `OnlineDnSS` for every frame is what both are compared with.
+    """CPU time of taking a frame in, of reading it, and of a picture; `OnlineDnSS`, for every frame, to compare with.
 
-    Columns: what, CPU time [us] of a frame or picture, MB/s of packed bytes, and the share of one core at real time (30
+    Columns: what, CPU time [us] of a frame or picture, MB/s of packed bytes, and the cores that real time would take (30
     pictures a second).
     """
     packed = pack_frames(spikes)
@@ -74,8 +75,12 @@ def costs(spikes: NDArray[np.uint8]) -> list[dict[str, Any]]:
     chunk = spikes[:16]
     online.push(spikes[:64])
     whole_s = _cpu_s(lambda: online.push(chunk), 8) / len(chunk)
+    with tempfile.TemporaryDirectory() as folder:
+        dat, h5 = (_read_s(_saved(spikes, Path(folder) / name)) for name in ("stream.dat", "stream.h5"))
     found = (
         ("push, a frame", push_s, FRAME_RATE_HZ),
+        ("read from .dat, a frame", dat, FRAME_RATE_HZ),
+        ("read from .h5, a frame", h5, FRAME_RATE_HZ),
         ("picture", picture_s, 30),
         ("OnlineDnSS, a frame", whole_s, FRAME_RATE_HZ),
     )
@@ -98,8 +103,7 @@ def streams(spikes: NDArray[np.uint8], seconds: float) -> list[dict[str, Any]]:
     """
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "stream.dat"
-        save_vidar_dat(path, spikes, side_file=True, frame_rate_hz=FRAME_RATE_HZ)
+        path = _saved(spikes, Path(folder) / "stream.dat")
         for speed in tqdm(SPEEDS, desc="bench", unit="speed", leave=False):
             figures = _played(path, speed, seconds)
             rows.append(
@@ -184,6 +188,23 @@ def _whole_stream(spikes: NDArray[np.uint8], seconds: float) -> float:
     while (taken_s := time.perf_counter() - begun_s) < seconds or not frames:
         frames += len(online.push(spikes[:16]))
     return frames / taken_s
+
+
+def _saved(spikes: NDArray[np.uint8], path: Path) -> Path:
+    if path.suffix == ".dat":
+        save_vidar_dat(path, spikes, side_file=True, frame_rate_hz=FRAME_RATE_HZ)
+    else:
+        with SpikeWriter(path, SHAPE, FRAME_RATE_HZ) as writer:
+            writer.append(spikes)
+    return path
+
+
+def _read_s(path: Path) -> float:
+    """CPU time [s] of reading a frame of a file that is in memory already."""
+    rows = np.empty((BLOCK, SHAPE[0] * SHAPE[1] // 8), np.uint8)
+    with open_source(str(path), loop=True) as source:
+        source.read(rows)
+        return _cpu_s(lambda: source.read(rows), 40) / BLOCK
 
 
 def _pushed(live: LiveDnSS, packed: NDArray[np.uint8]) -> None:
