@@ -12,14 +12,16 @@ import tyro
 
 @dataclass
 class Bench:
-    """Measure speed on this machine: sensor engines, effects, the online denoiser, environments, scenes, datasets.
+    """Measure speed on this machine: sensor engines, effects, the denoiser online and live, environments, scenes,
+    datasets.
 
     example:  spikecam bench sensor
     """
 
-    what: tyro.conf.Positional[Literal["sensor", "effects", "online", "env", "scenes", "renderers", "dataset"]]
+    what: tyro.conf.Positional[Literal["sensor", "effects", "online", "live", "env", "scenes", "renderers", "dataset"]]
     """sensor: pixel-steps a second of numpy, reference and fast.  effects: what each costs, over the base model.
-    online: denoised frames a second.  env: steps a second of 1, 16 and 64 environments, one way and another.
+    online: denoised frames a second.  live: pictures a second of a stream as it comes, frames lost, latency, and the
+    error of leaving passes out (some minutes).  env: steps a second of 1, 16 and 64 environments, one way and another.
     scenes: frames of light a second, how far they are from the truth, renderers, scene to spikes, and whether the flow
     is right (some minutes).  renderers: how fast and how exact each back-end of this machine is.  dataset: frames a
     second into files."""
@@ -30,6 +32,7 @@ class Bench:
         from spikecam_env.bench.dataset import bench_dataset
         from spikecam_env.bench.effects import bench_effects
         from spikecam_env.bench.environments import bench_environments
+        from spikecam_env.bench.live import bench_live
         from spikecam_env.bench.machine import machine
         from spikecam_env.bench.online import bench_online
         from spikecam_env.bench.renderers import bench_renderers
@@ -46,6 +49,7 @@ class Bench:
             "sensor": bench_sensor,
             "effects": bench_effects,
             "online": bench_online,
+            "live": bench_live,
             "env": bench_environments,
             "scenes": bench_scenes,
             "renderers": bench_renderers,

@@ -23,6 +23,7 @@ from spikecam_env.cli.export import Export
 from spikecam_env.cli.film_to_spikes import FilmToSpikes
 from spikecam_env.cli.first_words import START, check_words
 from spikecam_env.cli.ladder import Ladder
+from spikecam_env.cli.live_stream import Live
 from spikecam_env.cli.options import check_options
 from spikecam_env.cli.play import Play
 from spikecam_env.cli.record import Record
@@ -54,6 +55,7 @@ COMMANDS: dict[str, Any] = {
     "dataset": Dataset,
     "export": Export,
     "denoise": Denoise,
+    "live": Live,
     "train": Train,
     "train-agent": TrainAgent,
     "evaluate": Evaluate,

@@ -15,6 +15,7 @@ import made_up
 import numpy as np
 from pytest import MonkeyPatch
 
+from denoiser.live.session import Session
 from scenes import VideoScene
 from scenes.catalogue import make_scene
 from spikecam_env.calibration import calibrate
@@ -117,6 +118,7 @@ TRUTH: Work = {
     "denoiser.evaluate.truth:report": lambda _: "figures\n" * 200,
 }
 TASKS: Work = {"spikecam_env.envs.score:evaluate": lambda *_, **__: [{"task": "x" * 9000}]}
+LIVE: Work = {"denoiser.live.session:Session": Session}
 PLAYED: Work = {"spikecam_env.cli.live.filming:pictures": _film}
 VIEWED: Work = {"spikecam_env.cli.live.rerun_log:recorded": lambda *_: bytes(9000)}
 CALIBRATION: Work = {"spikecam_env.calibration:calibrate": cache(calibrate)}
@@ -141,6 +143,7 @@ WRITINGS: dict[str, Writing] = {
     "scenes mp4": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.mp4", SCENE),
     "scenes gif": Writing(f"scenes disk --film {{out}} --frames 640 {' '.join(SMALL)}", "disk.gif", SCENE),
     "scenes png": Writing(f"scenes disk --out {{out}} {' '.join(SMALL)}", "disk.png", SCENE),
+    "live": Writing("live {recording} --film {out}", "live.mp4", LIVE),
     "play": Writing("play Catch-v1 --film {out}", "catch.mp4", PLAYED),
     "view": Writing("view Catch-v1 --frames 80 --save {out}", "catch.rrd", VIEWED),
     "dataset": Writing(f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}),

@@ -1,0 +1,240 @@
+"""A stream taken in as it comes by one thread, and denoised picture by picture by another.
+
+    source ──reader──▶ ring of LiveDnSS ──denoiser──▶ newest picture ──▶ whoever shows it
+
+The reader takes a source that waits, a file, at the pace of a camera that sends it: what it has not taken BUFFER_S
+after it was due is lost, and counted.  Other sources are read as fast as they bring frames, and wait where that is too
+slow.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denoiser.live.online import LiveDnSS
+from spikecam_env.streams.sources import Source
+
+PICTURES_S = 30.0
+"""Pictures a second: what an eye sees as motion."""
+BUFFER_S = 0.1
+"""For which frames wait for a reader that is late [s]: 50 MB of a camera of 250 x 400 at 40 kHz."""
+LEAVE_S = 0.5
+"""For which a reader is waited for at the end [s]; one that waits for a sender may never come back."""
+BLOCK = 256
+"""Frames that are read at a time, at most."""
+TICK_S = 0.002
+"""After which a thread looks again whether there is work [s]; at 40 kHz 80 frames come meanwhile."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A picture: denoised rate and noisy spikes over the window it was made from, (H, W) float32 [spikes/frame]; which
+    frame it shows; the time [s] from that frame's coming to the picture."""
+
+    rate: NDArray[np.float32]
+    noisy: NDArray[np.float32]
+    frame: int
+    latency_s: float
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Since the first frame: seconds; frames that came, and that were lost; pictures, and the latency of all [s]."""
+
+    seconds: float
+    frames: int
+    lost: int
+    pictures: int
+    latency_s: float
+
+    def since(self, before: Figures) -> Figures:
+        """What has been added to earlier ones."""
+        return Figures(*(now - then for now, then in zip(vars(self).values(), vars(before).values(), strict=True)))
+
+    @property
+    def frames_per_s(self) -> float:
+        return self.frames / self.seconds if self.seconds else 0.0
+
+    @property
+    def pictures_per_s(self) -> float:
+        return self.pictures / self.seconds if self.seconds else 0.0
+
+    @property
+    def latency_ms(self) -> float | None:
+        """Of a picture, on average [ms]."""
+        return 1e3 * self.latency_s / self.pictures if self.pictures else None
+
+    def __str__(self) -> str:
+        latency = "-" if self.latency_ms is None else f"{self.latency_ms:.0f} ms"
+        return (
+            f"{self.frames_per_s:.0f} frames/s   {self.pictures_per_s:.1f} pictures/s   {self.lost} lost   "
+            f"latency {latency}"
+        )
+
+
+NOTHING = Figures(0.0, 0, 0, 0, 0.0)
+
+
+class Session:
+    """Takes a source in and denoises it inside its `with` block.  The denoiser forgets what it had before.
+
+    speed: of a source that waits, 1 being its frame rate.  pictures: a second, at most.  frames, seconds: after which
+    the session is over; None: when its source is.
+    What a thread raised, InputError for a stream that breaks, `over` and `newest` raise.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        live: LiveDnSS,
+        *,
+        speed: float = 1.0,
+        pictures: float = PICTURES_S,
+        frames: int | None = None,
+        seconds: float | None = None,
+    ) -> None:
+        self.live = live
+        self._source, self._period_s = source, 1.0 / pictures
+        self._rate = speed * source.frame_rate_hz if source.waits else None
+        self._most, self._seconds = frames, seconds
+        self._reader = threading.Thread(target=self._run, args=(self._read,), daemon=True)
+        self._denoiser = threading.Thread(target=self._run, args=(self._denoise,), daemon=True)
+        self._reading = self._denoising = True
+        self._stop = threading.Event()
+        self._changed = threading.Condition()
+        self._shown: Shown | None = None
+        self._error: BaseException | None = None
+        self._arrivals: deque[tuple[int, float]] = deque(maxlen=4096)
+        self._begun_s = self._ended_s = 0.0
+        self._taken = self._lost = self._pictures = 0
+        self._latency_s = 0.0
+
+    def __enter__(self) -> Session:
+        self.live.warm_up()  # else frames would be lost meanwhile
+        self._reader.start()
+        self._denoiser.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop.set()
+        if error is None:
+            self._denoiser.join()
+            self._reader.join(LEAVE_S)
+
+    @property
+    def over(self) -> bool:
+        """Whether there will be no other picture."""
+        if self._error is not None:
+            raise self._error
+        return not self._denoising
+
+    @property
+    def figures(self) -> Figures:
+        until = time.perf_counter() if self._denoising else self._ended_s
+        seconds = until - self._begun_s if self._begun_s else 0.0
+        return Figures(seconds, self._taken, self._lost, self._pictures, self._latency_s)
+
+    def newest(self, after: Shown | None, timeout_s: float) -> Shown | None:
+        """The newest picture, once it is another than `after`, waited for so long; None where there is none."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._shown is not after or self.over, timeout_s)
+            return None if self._shown is after else self._shown
+
+    def _run(self, work: Callable[[], object]) -> None:
+        try:
+            work()
+        except BaseException as error:
+            self._error = error
+            self._stop.set()
+        with self._changed:
+            self._changed.notify_all()
+
+    def _read(self) -> None:
+        try:
+            while not self._is_time_up() and (left := self._left()):
+                due = min(left, self._due())
+                if not due:
+                    time.sleep(TICK_S)
+                elif count := self._source.read(self.live.ring.lend(due)):
+                    self._take(count)
+                else:
+                    return
+        finally:
+            self._reading = False
+
+    def _is_time_up(self) -> bool:
+        taken_s = time.perf_counter() - self._begun_s if self._begun_s else 0.0
+        return self._stop.is_set() or (self._seconds is not None and taken_s > self._seconds)
+
+    def _left(self) -> int:
+        """Frames until there were enough."""
+        return BLOCK if self._most is None else self._most - self._taken
+
+    def _due(self) -> int:
+        """Frames that may be read now; those that are overdue are skipped."""
+        if self._rate is None:
+            return BLOCK
+        now = time.perf_counter()
+        self._begun_s = self._begun_s or now
+        due = int((now - self._begun_s) * self._rate) - self._taken - self._lost
+        late = due - int(BUFFER_S * self._rate)
+        if late > 0:
+            self._source.skip(late)
+            self.live.skip(late)
+            self._lost += late
+            due -= late
+        return min(due, BLOCK)
+
+    def _take(self, count: int) -> None:
+        now = time.perf_counter()
+        self._begun_s = self._begun_s or now
+        self.live.ring.took(count)
+        self._taken += count
+        self._arrivals.append((self.live.count, now))
+
+    def _denoise(self) -> None:
+        due_s = 0.0
+        try:
+            while not self._is_time_up():
+                now = time.perf_counter()
+                if now >= due_s and self.live.ready():
+                    self._show()
+                    due_s = max(due_s + self._period_s, now)
+                elif self._reading or self.live.ready():
+                    time.sleep(TICK_S)
+                else:
+                    return
+        finally:
+            self._ended_s = time.perf_counter()
+            self._denoising = False
+
+    def _show(self) -> None:
+        rate = self.live.picture()
+        window, frame = self.live.window, self.live.frame
+        assert window is not None and frame is not None
+        noisy = window.spikes.sum(axis=0, dtype=np.uint16) / np.float32(len(window.spikes))
+        latency_s = time.perf_counter() - self._came_at(frame)
+        self._latency_s += latency_s
+        self._pictures += 1
+        with self._changed:
+            self._shown = Shown(rate, noisy, frame, latency_s)
+            self._changed.notify_all()
+
+    def _came_at(self, frame: int) -> float:
+        """When a frame was taken in [s]."""
+        came = time.perf_counter()
+        for count, at in reversed(list(self._arrivals)):
+            if count <= frame:
+                break
+            came = at
+        return came

@@ -1,0 +1,121 @@
+"""`spikecam live`: a stream as it comes, denoised, in a window, as a film, or as figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from spikecam_env.checked import checked_number
+from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.options import Checked, Count, Positive, Rpm, Seed, Size
+from spikecam_env.cli.reading import Reading
+from spikecam_env.errors import InputError, unknown_name
+
+if TYPE_CHECKING:
+    from spikecam_env.streams.sources import Source
+
+MOST_PICTURES_S = 1000.0
+
+
+@dataclass
+class Live:
+    """Watch a spike stream as it comes, denoised: every frame is taken in, the network runs for the pictures shown.
+
+    In a window where there is a display (Esc ends), as a film with --film; else the figures alone: frames a second that
+    came, pictures a second, frames that were lost, and the latency.
+
+    example:  spikecam live disk
+              spikecam live recording.dat --flip --loop --seconds 60
+              spikecam live tcp://camera:5000 --film live.mp4 --seconds 20
+              cat recording.dat | spikecam live - --frames 40000
+    """
+
+    source: tyro.conf.Positional[str]
+    """A scene of `spikecam scenes`; a file as `spikecam denoise` takes it; packed frames from standard input (-), a
+    server (tcp://HOST:PORT, unix://PATH), a named pipe or a socket by its path."""
+    film: Path | None = None
+    """Write a film (.mp4) of what a window would show; it is kept when the stream, or --seconds, is over."""
+    frames: Count | None = None
+    """End after so many frames."""
+    seconds: Positive | None = None
+    """End after so long."""
+    speed: Positive | None = None
+    """Of a file or a scene: 1, real time, is the camera's frame rate, 40 000 frames a second."""
+    loop: bool = False
+    """Begin a file again when it is over."""
+    pictures: Annotated[float, Checked(checked_number, least=0.01, most=MOST_PICTURES_S)] = 30.0
+    """Pictures a second, at most."""
+    mode: Literal["best", "paper"] = "best"
+    """Which DnSS."""
+    weights: Path | None = None
+    """A checkpoint of `spikecam train` instead of the mode's shipped weights."""
+    passes: Count = 1
+    """Passes of the network for a picture: more know more of what was before it, and take longer."""
+    calibration: Path | None = None
+    """`best` only: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
+    size: Size = (250, 400)
+    """Rows and columns of a scene."""
+    rpm: Rpm | None = None
+    """Speed of the scene `disk`; default 2000."""
+    seed: Seed = 0
+    """Of a scene, its camera unit and noise."""
+    camera: Camera = field(default_factory=Camera)
+    reading: Reading = field(default_factory=Reading)
+
+    def run(self) -> None:
+        from denoiser.live import LiveDnSS
+        from denoiser.live.session import Session
+        from spikecam_env.cli.live.watching import Watching
+        from spikecam_env.cli.live.window import has_display
+        from spikecam_env.cli.table import table
+
+        self._check_film()
+        with self._source() as source:
+            live = LiveDnSS(source.shape, self.weights or self.mode, passes=self.passes, unit=self.calibration)
+            pace = {"speed": self.speed or 1.0, "pictures": self.pictures}
+            with Session(source, live, **pace, frames=self.frames, seconds=self.seconds) as session:
+                watching = Watching(session, source, str(self.weights or self.mode))
+                if self.film is not None:
+                    watching.as_a_film(self.film)
+                elif has_display():
+                    watching.in_a_window()
+                else:
+                    watching.as_figures()
+            print(table([watching.summary()]))
+        if self.film is not None:
+            print(f"wrote {self.film}")
+
+    def _check_film(self) -> None:
+        from spikecam_env.whole import check_file
+
+        if self.film is None:
+            return
+        if self.film.suffix.lower() != ".mp4":
+            raise InputError(f"--film {self.film}: unknown file type {self.film.suffix!r}; use .mp4")
+        check_file(self.film)
+
+    @contextmanager
+    def _source(self) -> Iterator[Source]:
+        from scenes.catalogue import SCENES
+        from spikecam_env.cli.live.simulated import Simulated
+        from spikecam_env.cli.named_scene import scene_named
+        from spikecam_env.sensor import SpikeSensor
+        from spikecam_env.streams.sources import is_flow, open_source
+
+        if self.source in SCENES:
+            model = self.camera.load()
+            scene = scene_named(self.source, self.size, self.seed, model.frame_rate_hz, self.rpm)
+            sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
+            yield Simulated(self.source, scene, sensor, self.speed or 1.0)
+            return
+        if not Path(self.source).suffix and not is_flow(self.source):
+            raise unknown_name("scene, file or address", self.source, SCENES)
+        with open_source(self.source, loop=self.loop, **self.reading.options()) as source:
+            if not source.waits and self.speed is not None:
+                raise InputError(f"--speed {self.speed:g}: {source.title} has a pace of its own; leave --speed")
+            yield source

@@ -1,0 +1,235 @@
+"""Pictures of a stream that is watched, against the denoiser of the whole stream."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from denoiser.live import LiveDnSS
+from denoiser.live.past import Past
+from denoiser.online import OnlineDnSS
+from denoiser.recipe import RECIPES, recipe_of
+from denoiser.window import RollingWindow
+from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.streams.packing import pack_frames
+
+SHAPE = (9, 13)
+"""117 pixels: the last byte of a packed frame has three unused bits."""
+PLANES = 16
+HISTORY = 64
+
+
+def stream(frames: int, shape: tuple[int, int] = SHAPE, seed: int = 0) -> np.ndarray:
+    """(frames, H, W) spikes of pixels of all rates, some of which hardly ever fire."""
+    rng = np.random.default_rng(seed)
+    return (rng.random((frames, *shape)) < rng.random(shape) ** 4).astype(np.uint8)
+
+
+def live(mode: str = "best", **options) -> LiveDnSS:
+    return LiveDnSS(SHAPE, mode, precision="float32", **options)
+
+
+def online(mode: str = "best", **options) -> OnlineDnSS:
+    return OnlineDnSS.pretrained(mode, output="rate", precision="float32", **options)
+
+
+@pytest.mark.parametrize("mode", RECIPES)
+def test_pictures_of_every_pass_have_the_bits_of_the_whole_streams_denoiser(mode: str) -> None:
+    spikes, watching = stream(150), live(mode)
+    rates, step = online(mode).push(spikes), recipe_of(mode).layout.planes
+    seen = 0
+    for first in range(0, len(spikes), step):
+        watching.push(pack_frames(spikes[first : first + step]))
+        if watching.ready():
+            np.testing.assert_array_equal(watching.picture(), rates[watching.frame])
+            seen += 1
+    assert seen == len(rates) // step > 6
+
+
+def test_a_calibrated_unit_is_used_as_by_the_whole_streams_denoiser() -> None:
+    rng = np.random.default_rng(1)
+    unit = rng.uniform(0.8, 1.2, SHAPE).astype(np.float32), rng.uniform(0, 0.01, SHAPE).astype(np.float32)
+    spikes, watching = stream(64), live(unit=unit)
+    watching.push(pack_frames(spikes[:32]))
+    first = watching.picture()
+    rates = online(unit=unit).push(spikes)
+    np.testing.assert_array_equal(first, rates[watching.frame])
+    assert not np.array_equal(rates, online().push(spikes))
+    with pytest.raises(InputError, match="calibration map has shape"):
+        LiveDnSS((8, 8), unit=unit)
+
+
+@pytest.mark.parametrize("mode", RECIPES)
+def test_after_a_long_gap_a_picture_is_that_of_a_stream_that_began_shortly_before(mode: str) -> None:
+    """The window and its planes are those of a new stream of HISTORY frames before it; ring and gap do not matter."""
+    layout, spikes, watching = recipe_of(mode).layout, stream(1400), live(mode, room=700)
+    for first in range(0, 1400, 70):
+        watching.push(pack_frames(spikes[first : first + 70]))
+    watching.picture()
+    start = watching.window.start
+    begun = start - layout.past - HISTORY
+    fresh = RollingWindow(layout, SHAPE)
+    (window,) = fresh.push(spikes[begun : start + layout.planes + layout.future], {start - begun})
+    assert start > 1300
+    np.testing.assert_array_equal(watching.window.spikes, window.spikes)
+    np.testing.assert_array_equal(watching.window.planes, window.planes)
+
+
+def test_more_passes_a_picture_know_what_the_whole_streams_denoiser_knows() -> None:
+    """As many passes as there are give its bits however seldom a picture is asked for; two give others than one."""
+    spikes = stream(240)
+    rates, shown = online().push(spikes), {}
+    for passes in (1, 2, 100):
+        watching = live(passes=passes)
+        for first in range(0, 240, 80):
+            watching.push(pack_frames(spikes[first : first + 80]))
+            shown[passes] = watching.picture()
+    np.testing.assert_array_equal(shown[100], rates[watching.frame])
+    errors = [np.abs(shown[passes] - shown[100]).mean() for passes in (1, 2)]
+    print(f"1 pass errs by {errors[0]:.3g}, 2 by {errors[1]:.3g} spikes/frame")
+    assert errors[0] > 1.2 * errors[1] > 0
+
+
+def test_gain_and_carried_pictures_go_on_over_a_gap() -> None:
+    spikes, watching, forgetful = stream(600), live(), live()
+    watching.push(pack_frames(spikes[:48]))
+    watching.picture()
+    watching.push(pack_frames(spikes[48:]))
+    forgetful.push(pack_frames(spikes))
+    assert np.abs(watching.picture() - forgetful.picture()).max() > 0.01
+    assert watching.frame == forgetful.frame
+    assert np.any(watching.window.planes[-2]) and not np.any(forgetful.window.planes[-2])
+
+
+def test_after_lost_frames_the_stream_begins_anew() -> None:
+    spikes, watching = stream(200), live()
+    watching.push(pack_frames(spikes[:100]))
+    watching.picture()
+    watching.skip(57)
+    assert watching.count == 157 and not watching.ready()
+    with pytest.raises(NotReadyError, match="0 frames have come"):
+        watching.picture()
+    watching.push(pack_frames(spikes[157:]))
+    watching.picture()
+    (window,) = RollingWindow(recipe_of("best").layout, SHAPE).push(spikes[157:189])
+    np.testing.assert_array_equal(watching.window.spikes, window.spikes)
+    np.testing.assert_array_equal(watching.window.planes[:-2] > 0, window.planes[:-2] > 0)
+    assert watching.frame == 157 + PLANES // 2
+
+
+@pytest.mark.parametrize(("plane", "latency"), [(0, 31), (None, 23), (15, 16)])
+def test_a_picture_shows_the_frame_that_its_latency_says(plane: int | None, latency: int) -> None:
+    spikes, watching = stream(48), live(plane=plane)
+    assert watching.latency == latency and watching.step == PLANES and watching.frame is None
+    with pytest.raises(NotReadyError, match="needs 32"):
+        watching.picture()
+    ages = []
+    for frame in spikes:
+        watching.push(pack_frames(frame[None]))
+        if watching.count >= 32:
+            watching.picture()
+            ages.append(watching.count - 1 - watching.frame)
+    assert (min(ages), max(ages)) == (latency, latency + PLANES - 1)
+
+
+def test_a_stream_of_hours_is_denoised_as_a_young_one() -> None:
+    """Frame numbers beyond 2^24 have no exact float32, and beyond 2^31 no int32."""
+    spikes = stream(16 * 20)
+    pictures = {}
+    for begun in (0, 16 * (1 << 30)):
+        watching = live()
+        if begun:
+            watching.skip(begun)
+        for first in range(0, len(spikes), 16):
+            watching.push(pack_frames(spikes[first : first + 16]))
+            if watching.ready():
+                pictures.setdefault(begun, []).append(watching.picture())
+        assert watching.frame == begun + 296
+    np.testing.assert_array_equal(*pictures.values())
+
+
+def test_an_old_past_is_that_of_a_young_one_but_for_its_age() -> None:
+    packed = pack_frames(stream(96))
+    shares = np.array([1 / 64], np.float32)
+    young, old = (Past.nothing(begun, 117, 1) for begun in (0, 96 * 10**8))
+    for past in (young, old):
+        past.advance(packed, past.begun + 96, shares)
+    np.testing.assert_array_equal(young.means, old.means)
+    np.testing.assert_array_equal(young.last_since(0), old.last_since(old.begun))
+    assert np.all(old.last_since(old.stop) <= 0)
+
+
+def test_frames_that_are_overwritten_while_a_picture_reads_them_are_not_shown() -> None:
+    """The writer overtakes the reader once, in the middle of its reading; the picture is then of newer frames."""
+    spikes, watching = stream(1400), live(room=700)
+    packed = pack_frames(spikes)
+    watching.push(packed[:400])
+    unpacked, calls = watching.ring.unpacked, []
+
+    def overtaken(first: int, stop: int) -> np.ndarray:
+        calls.append(first)
+        if len(calls) == 1:
+            watching.push(packed[400:])
+        return unpacked(first, stop)
+
+    watching.ring.unpacked = overtaken
+    watching.picture()
+    assert len(calls) == 2 and watching.frame > 1300
+    np.testing.assert_array_equal(watching.window.spikes, spikes[watching.window.start - 16 :][:48])
+
+
+def test_one_thread_pushes_while_another_asks_for_pictures() -> None:
+    spikes, watching = stream(20_000), live(room=700)
+    packed = pack_frames(spikes)
+    watching.push(packed[:64])
+
+    def push() -> None:
+        for first in range(64, len(packed), 50):
+            watching.push(packed[first : first + 50])
+
+    pushing = threading.Thread(target=push)
+    pushing.start()
+    shown = 0
+    while pushing.is_alive() or watching.ready():
+        watching.picture()
+        begin = watching.window.start - min(16, watching.window.start)
+        np.testing.assert_array_equal(watching.window.spikes[-48:][-32:], spikes[begin:][:48][-32:])
+        shown += 1
+    pushing.join()
+    assert shown > 1 and watching.count == 20_000
+
+
+@pytest.mark.parametrize(
+    "packed",
+    [
+        np.zeros((4, 16), np.uint8),
+        np.zeros((4, 15), np.int8),
+        np.zeros(15, np.uint8),
+        np.zeros((4, 9, 13), np.uint8),
+        b"\x00" * 15,
+        [[0] * 15],
+    ],
+    ids=["wide", "int8", "flat", "unpacked", "bytes", "list"],
+)
+def test_frames_that_are_not_packed_as_the_stream_are_refused(packed: object) -> None:
+    with pytest.raises(InputError, match=r"9 x 13 pixels need uint8 of shape \(frames, 15\)"):
+        live().push(packed)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"mode": "bets"}, "bets"),
+        ({"mode": "none.pt"}, "none.pt"),
+        ({"plane": 16}, "plane = 16"),
+        ({"plane": -1}, "plane = -1"),
+        ({"room": 223}, "room is 223"),
+        ({"shape": (0, 4)}, "shape"),
+        ({"precision": "float16"}, "precision"),
+    ],
+)
+def test_unusable_options_are_named(options: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        LiveDnSS(**{"shape": SHAPE, **options})

@@ -1,0 +1,146 @@
+"""A stream taken in by one thread and denoised by another, at the pace of a source that is made up."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from denoiser.live import LiveDnSS
+from denoiser.live.session import NOTHING, Figures, Session
+from spikecam_env.errors import InputError
+from spikecam_env.streams.packing import pack_frames
+
+SHAPE = (8, 16)
+RATE_HZ = 2000.0
+"""Of the made-up camera: slow, so that a busy machine is on time."""
+
+
+class MadeUp:
+    """Frames of random bits.  stall_s: what the third read takes.  broken: what the read after 200 frames raises."""
+
+    title, shape, frame_rate_hz, cut = "made up", SHAPE, RATE_HZ, ""
+
+    def __init__(
+        self, frames: int, *, waits: bool = True, stall_s: float = 0.0, broken: Exception | None = None
+    ) -> None:
+        rng = np.random.default_rng(0)
+        self.packed = pack_frames((rng.random((frames, *SHAPE)) < 0.2).astype(np.uint8))
+        self.waits, self.stall_s, self.broken = waits, stall_s, broken
+        self.at = self.reads = self.skipped = 0
+
+    def read(self, rows: np.ndarray) -> int:
+        self.reads += 1
+        if self.broken is not None and self.at >= 200:
+            raise self.broken
+        if self.reads == 3:
+            time.sleep(self.stall_s)
+        count = max(0, min(len(rows), len(self.packed) - self.at, 64))
+        rows[:count] = self.packed[self.at : self.at + count]
+        self.at += count
+        return count
+
+    def skip(self, frames: int) -> None:
+        self.at += frames
+        self.skipped += frames
+
+
+@pytest.fixture(scope="module")
+def live() -> LiveDnSS:
+    return LiveDnSS(SHAPE, precision="float32")
+
+
+def watched(session: Session) -> list:
+    """All pictures that were seen until the session was over."""
+    seen = [None]
+    while not session.over:
+        seen.append(session.newest(seen[-1], 0.2) or seen[-1])
+    return [shown for shown, before in zip(seen[1:], seen, strict=False) if shown is not before]
+
+
+def test_a_file_is_taken_in_at_its_pace_and_nothing_is_lost(live: LiveDnSS) -> None:
+    source = MadeUp(1000)
+    with Session(source, live, pictures=20.0) as session:
+        seen = watched(session)
+    figures = session.figures
+    assert (figures.frames, figures.lost) == (1000, 0)
+    assert figures.seconds >= 0.45
+    assert figures.pictures <= 20.0 * figures.seconds + 2
+    frames = [shown.frame for shown in seen]
+    assert frames == sorted(set(frames)) and frames[-1] == live.frame
+    assert live.count == 1000 and 1000 - live.frame <= live.latency + live.step
+    print(f"{figures}")
+
+
+@pytest.mark.parametrize("speed", [0.5, 4.0])
+def test_speed_stretches_the_time_that_a_file_takes(live: LiveDnSS, speed: float) -> None:
+    with Session(MadeUp(800), live, speed=speed, pictures=5.0) as session:
+        watched(session)
+    assert 800 / RATE_HZ / speed <= session.figures.seconds + 0.05
+    assert session.figures.frames == 800
+
+
+def test_a_reader_that_is_late_loses_frames_and_counts_them(live: LiveDnSS) -> None:
+    """It stands still for 0.5 s, of which frames of 0.1 s wait: 0.4 s of 2000 frames/s are lost, and no others."""
+    source = MadeUp(2000, stall_s=0.5)
+    with Session(source, live, pictures=10.0) as session:
+        watched(session)
+    figures = session.figures
+    print(f"{figures.lost} frames lost")
+    assert figures.lost == source.skipped >= 0.4 * RATE_HZ - 64
+    assert figures.frames + figures.lost == live.count <= 2000 + figures.lost
+    assert live.ring.extent[0] > 0
+
+
+def test_a_stream_with_a_pace_of_its_own_is_taken_as_it_comes_and_loses_nothing(live: LiveDnSS) -> None:
+    with Session(MadeUp(4000, waits=False, stall_s=0.3), live, pictures=5.0) as session:
+        watched(session)
+    assert (session.figures.frames, session.figures.lost) == (4000, 0)
+    assert session.figures.seconds < 4000 / RATE_HZ
+
+
+@pytest.mark.parametrize("limit", [{"frames": 300}, {"seconds": 0.2}], ids=["frames", "seconds"])
+def test_it_ends_after_so_many_frames_or_so_long(live: LiveDnSS, limit: dict) -> None:
+    with Session(MadeUp(100_000), live, **limit) as session:
+        watched(session)
+    assert session.figures.frames == 300 if "frames" in limit else session.figures.frames < 2000
+
+
+def test_a_time_limit_holds_for_a_sender_that_has_fallen_silent(live: LiveDnSS) -> None:
+    with Session(MadeUp(1000, waits=False, stall_s=5.0), live, seconds=0.3) as session:
+        begun = time.perf_counter()
+        watched(session)
+    assert time.perf_counter() - begun < 2.5
+
+
+def test_a_stream_that_breaks_says_so_to_whoever_watches(live: LiveDnSS) -> None:
+    with pytest.raises(InputError, match="broken"), Session(MadeUp(1000, broken=InputError("broken")), live) as session:
+        watched(session)
+
+
+def test_leaving_ends_its_threads(live: LiveDnSS) -> None:
+    before = set(threading.enumerate())
+    with Session(MadeUp(100_000), live) as session:
+        session.newest(None, 1.0)
+        assert set(threading.enumerate()) - before
+    assert not set(threading.enumerate()) - before
+
+
+def test_latency_is_the_time_from_a_frames_coming(live: LiveDnSS) -> None:
+    """At least that of the frames that the network looks ahead, 23 of 2000 a second."""
+    with Session(MadeUp(1000), live, pictures=20.0) as session:
+        seen = watched(session)
+    latencies = [shown.latency_s for shown in seen]
+    print(f"latency {1e3 * min(latencies):.1f} to {1e3 * max(latencies):.1f} ms")
+    assert min(latencies) >= (live.latency - 4) / RATE_HZ
+    assert session.figures.latency_ms == pytest.approx(1e3 * session.figures.latency_s / session.figures.pictures)
+
+
+def test_figures_of_a_stretch_are_differences() -> None:
+    stretch = Figures(3.0, 90, 4, 6, 1.2).since(Figures(1.0, 30, 4, 2, 0.4))
+    assert (stretch.frames_per_s, stretch.pictures_per_s, stretch.lost) == (30.0, 2.0, 0)
+    assert stretch.latency_ms == pytest.approx(200.0)
+    assert NOTHING.latency_ms is None and NOTHING.frames_per_s == 0.0
+    assert "latency -" in str(NOTHING)
