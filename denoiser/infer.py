@@ -22,7 +22,7 @@ from denoiser.window import Window
 class StreamPasses(Protocol):
     """A network of many planes a pass: `StreamDnSS`, or the same elsewhere than in torch."""
 
-    def passed(self, seen: Tensor, hidden: Tensor, planes: Tensor | None) -> tuple[Tensor, Tensor]:
+    def passed(self, seen: Tensor, beside: Tensor, hidden: Tensor, planes: Tensor | None) -> tuple[Tensor, Tensor]:
         """As `StreamDnSS.passed`."""
 
 
@@ -107,7 +107,9 @@ def _side_by_side(
     if any(w.planes[-1].any() for w in windows):
         planes = pad_to_multiple(torch.from_numpy(np.stack([w.planes for w in windows])), MULTIPLE).to(device)
     hidden = hidden.to(device, number_type).contiguous(memory_format=torch.channels_last)
-    rate, kept = network.passed(seen.to(device), hidden, planes)
+    seen = seen.to(device)
+    beside = seen[:, len(windows[0].spikes) :]
+    rate, kept = network.passed(seen, beside, hidden, planes)
     height, width = windows[0].planes.shape[1:]
     rate = rate[..., :height, :width]
     return rate, (rate[:, -1:].clamp(0.0, 1.0), kept)

@@ -78,7 +78,7 @@ def _spikes(spikes, one, begin, stop, out):  # pragma: no cover - compiled
 
 @njit(cache=True, nogil=True, boundscheck=False)
 def _layers(values, channel, begin, stop, out):  # pragma: no cover - compiled
-    """Bits (n, H, W) of float32 -> channels from `channel` on of rows begin .. stop, to 16 bits rounded half to even."""
+    """Bits (n, H, W) of float32 -> channels from `channel` on; to 16 bits rounded half to even."""
     half = out.itemsize == 2
     for y in range(begin, stop):
         for c in range(values.shape[0]):
