@@ -14,7 +14,7 @@ from torch import Tensor
 
 from denoiser.window import Window
 from spikecam_env.compiled import njit
-from spikecam_env.threads import share_out
+from spikecam_env.threads import as_many_as_pay, share_out
 
 ROWS = 16
 """Rows that a thread takes at a time."""
@@ -33,9 +33,9 @@ def side_by_side(
 
     last: (1, H, W) each; None is 0.  H', W': H and W extended to a multiple by repeating the border.
     """
-    count, height, width = windows[0].planes.shape
+    layers, height, width = windows[0].planes.shape
     span, one = len(windows[0].spikes), _ONE[number_type]
-    size = len(windows), height + -height % multiple, width + -width % multiple, span + count + 1
+    size = len(windows), height + -height % multiple, width + -width % multiple, span + layers + 1
     bits = np.empty(size, one.dtype)
     strips = -(-height // ROWS)
     nothing = np.zeros((1, height, width), np.float32)
@@ -45,9 +45,10 @@ def side_by_side(
         stop, window, before = min(begin + ROWS, height), windows[n], last[n]
         _spikes(window.spikes, one, begin, stop, bits[n])
         _layers(window.planes.view(np.uint32), span, begin, stop, bits[n])
-        _layers((nothing if before is None else before).view(np.uint32), span + count, begin, stop, bits[n])
+        _layers((nothing if before is None else before).view(np.uint32), span + layers, begin, stop, bits[n])
 
-    share_out(strip, len(windows) * strips, torch.get_num_threads())
+    count = len(windows) * strips
+    share_out(strip, count, as_many_as_pay(torch.get_num_threads(), count, bits.size))
     bits[:, :height, width:] = bits[:, :height, width - 1 : width]
     bits[:, height:] = bits[:, height - 1 : height]
     signed = bits.view(np.int16 if one.dtype == np.uint16 else np.int32)

@@ -88,7 +88,7 @@ class StreamDnSS(nn.Module):
     def passed(self, seen: Tensor, beside: Tensor, hidden: Tensor, planes: Tensor | None) -> tuple[Tensor, Tensor]:
         """The rate (N, planes, H, W) and what is to be hidden, float32, of sizes that 4 divides.
 
-        seen: (N, span + layers + 1, H, W) spikes, planes and `last`.  beside: the same without the spikes, for the head.
+        seen: (N, span + layers + 1, H, W) spikes, planes and `last`.  beside: without the spikes, for the head.
         planes: as float32; None where no unit of these is calibrated, so that the means have no share: the same bits
         for less work.
         """
