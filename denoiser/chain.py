@@ -34,7 +34,7 @@ class Chain:
     def __init__(
         self,
         recipe: Recipe,
-        network: nn.Module,
+        network: nn.Module | infer.StreamPasses,
         number_type: torch.dtype,
         shape: tuple[int, int],
         *,

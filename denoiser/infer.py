@@ -4,14 +4,26 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import nn
+from torch import Tensor, nn
 
+from denoiser.network import pad_to_multiple
+from denoiser.side_by_side import side_by_side
+from denoiser.stream_network import CARRY, MULTIPLE
 from denoiser.threads import where_torch_can
 from denoiser.window import Window
+
+
+@runtime_checkable
+class StreamPasses(Protocol):
+    """A network of many planes a pass: `StreamDnSS`, or the same elsewhere than in torch."""
+
+    def passed(self, seen: Tensor, beside: Tensor, hidden: Tensor, planes: Tensor | None) -> tuple[Tensor, Tensor]:
+        """As `StreamDnSS.passed`."""
 
 
 def prepared(network: nn.Module, number_type: torch.dtype) -> nn.Module:
@@ -32,34 +44,75 @@ Carried = tuple[NDArray[np.float32], ...]
 
 
 def rates(
-    network: nn.Module, window: Window, number_type: torch.dtype, carried: Carried = ()
+    network: nn.Module | StreamPasses, window: Window, number_type: torch.dtype, carried: Carried = ()
 ) -> tuple[NDArray[np.float32], Carried]:
     """Rates (count, H, W) float32 of the frames that the window covers, in [0, 1] [spikes/frame]; what is carried."""
     return rates_of_many(network, [window], number_type, [carried])[0]
 
 
 def rates_of_many(
-    network: nn.Module, windows: Sequence[Window], number_type: torch.dtype, carried: Sequence[Carried]
+    network: nn.Module | StreamPasses, windows: Sequence[Window], number_type: torch.dtype, carried: Sequence[Carried]
 ) -> list[tuple[NDArray[np.float32], Carried]]:
     """`rates` of windows of one size, of as many streams, in one pass of the network."""
     return where_torch_can(lambda: _rates(network, windows, number_type, carried))
 
 
 def _rates(
-    network: nn.Module, windows: Sequence[Window], number_type: torch.dtype, carried: Sequence[Carried]
+    network: nn.Module | StreamPasses,
+    windows: Sequence[Window],
+    number_type: torch.dtype,
+    carried: Sequence[Carried],
 ) -> list[tuple[NDArray[np.float32], Carried]]:
-    layout, device = torch.channels_last, next(network.parameters()).device
+    device = next(network.parameters()).device if isinstance(network, nn.Module) else torch.device("cpu")
+    with torch.inference_mode(), torch.autocast(device.type, number_type, enabled=number_type != torch.float32):
+        if isinstance(network, StreamPasses):
+            rate, kept = _side_by_side(network, windows, number_type, carried, device)
+        else:
+            rate, kept = _as_in_training(network, windows, number_type, carried, device)
+    left = [k.float().contiguous().cpu().numpy() for k in kept]
+    whole = rate.float().clamp(0.0, 1.0).contiguous().cpu().numpy()
+    return [(whole[i, : w.count], tuple(k[i] for k in left)) for i, w in enumerate(windows)]
+
+
+def _as_in_training(
+    network: nn.Module,
+    windows: Sequence[Window],
+    number_type: torch.dtype,
+    carried: Sequence[Carried],
+    device: torch.device,
+) -> tuple[Tensor, tuple[Tensor, ...]]:
+    """Rates (N, planes, H, W), and what is carried on."""
+    layout = torch.channels_last
     spikes = torch.from_numpy(np.stack([w.spikes for w in windows])).to(device, number_type)
     planes = torch.from_numpy(np.stack([w.planes for w in windows])).to(device)
     before = tuple(torch.from_numpy(array).to(device) for array in _stacked(carried)) or None
-    with torch.inference_mode(), torch.autocast(device.type, number_type, enabled=number_type != torch.float32):
-        rate, kept = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout), before)
-    whole = rate.float().clamp(0.0, 1.0).cpu().numpy()
-    left = [k.float().cpu().numpy() for k in kept or ()]
-    return [
-        (np.ascontiguousarray(whole[i, : w.count]), tuple(np.ascontiguousarray(k[i]) for k in left))
-        for i, w in enumerate(windows)
-    ]
+    rate, kept = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout), before)
+    return rate, kept or ()
+
+
+def _side_by_side(
+    network: StreamPasses,
+    windows: Sequence[Window],
+    number_type: torch.dtype,
+    carried: Sequence[Carried],
+    device: torch.device,
+) -> tuple[Tensor, tuple[Tensor, ...]]:
+    """The same bits, with one array of all that the network sees instead of three, and no work for means that no
+    unit's map lets it use."""
+    seen = side_by_side(windows, [c[0] if c else None for c in carried], number_type, MULTIPLE)
+    before = _stacked(carried)
+    nothing = (len(windows), CARRY, seen.shape[2] // 2, seen.shape[3] // 2)
+    hidden = torch.from_numpy(before[1]) if before else torch.zeros(nothing)
+    planes = None
+    if any(w.planes[-1].any() for w in windows):
+        planes = pad_to_multiple(torch.from_numpy(np.stack([w.planes for w in windows])), MULTIPLE).to(device)
+    hidden = hidden.to(device, number_type).contiguous(memory_format=torch.channels_last)
+    seen = seen.to(device)
+    beside = seen[:, len(windows[0].spikes) :]
+    rate, kept = network.passed(seen, beside, hidden, planes)
+    height, width = windows[0].planes.shape[1:]
+    rate = rate[..., :height, :width]
+    return rate, (rate[:, -1:].clamp(0.0, 1.0), kept)
 
 
 def _stacked(carried: Sequence[Carried]) -> Carried:

@@ -35,11 +35,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from denoiser.pixel_map import PixelMap
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
+from spikecam_env.threads import as_many_as_pay, share_out
+
+ROWS = 16
+"""Rows that a thread takes at a time."""
 
 WINDOW_PRIOR = 2.0
 """Spikes that a pixel's gain of 1 weighs against what the sums say."""
@@ -157,15 +162,15 @@ class RollingWindow:
         known = self._frames[known_first - held : known_stop - held]
         self._average(known_stop)
         planes = np.empty((layout.layers, *self.shape), np.float32)
-        _interval_planes(
-            known,
-            self._last,
-            known_first,
-            self.start,
-            layout.planes,
-            np.asarray(layout.half_widths, np.int64),
-            planes,
-        )
+        widths = np.asarray(layout.half_widths, np.int64)
+
+        def strip(number: int) -> None:
+            rows = slice(ROWS * number, ROWS * (number + 1))
+            last, out = self._last[rows], planes[:, rows]
+            _interval_planes(known[:, rows], last, known_first, self.start, layout.planes, widths, out)
+
+        strips = -(-self.shape[0] // ROWS)
+        share_out(strip, strips, as_many_as_pay(torch.get_num_threads(), strips, known.size))
         for i, memory in enumerate(layout.memories):
             weight = 1.0 - (1.0 - 1.0 / memory) ** self._averaged
             planes[layout.planes + len(layout.half_widths) + i] = self._means[i] * np.float32(1.0 / weight)

@@ -26,6 +26,8 @@ class Denoise:
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Literal["best", "paper"] = "best"
     """Which DnSS: `best`, or `paper` (the paper's network; slower)."""
+    engine: Literal["torch", "openvino"] = "torch"
+    """What computes the network; `openvino` (pip install 'spikecam-env[openvino]') takes `best` only."""
     window: Count = 41
     """Frames averaged in the pictures (TFP window); odd."""
     overlap: bool = False
@@ -55,7 +57,8 @@ class Denoise:
         noisy = recording.spikes
         frames = picture_frames(len(noisy), self.window)
         with out_folder(self.out) as folder:
-            clean, rates = restore(noisy, self.mode, self.window, frames, overlap=self.overlap, unit=self.calibration)
+            options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
+            clean, rates = restore(noisy, self.mode, self.window, frames, **options)
 
             attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
             attributes |= {"denoiser": self.mode, "source": self.file.name}

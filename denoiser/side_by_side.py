@@ -1,0 +1,90 @@
+"""What a pass of the network sees, pixel by pixel: its spikes, planes and last rate lie side by side in memory.
+
+Convolutions want their input so (channels last).  Torch would make it in four copies, a fifth of a pass; this is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from denoiser.window import Window
+from spikecam_env.compiled import njit
+from spikecam_env.threads import as_many_as_pay, share_out
+
+ROWS = 16
+"""Rows that a thread takes at a time."""
+
+_ONE = {torch.bfloat16: np.uint16(0x3F80), torch.float32: np.uint32(0x3F800000)}
+"""1.0 as bits."""
+
+
+def side_by_side(
+    windows: Sequence[Window],
+    last: Sequence[NDArray[np.float32] | None],
+    number_type: torch.dtype,
+    multiple: int,
+) -> Tensor:
+    """(N, channels, H', W') of spikes, planes and last rate, in bfloat16 or float32, channels last in memory.
+
+    last: (1, H, W) each; None is 0.  H', W': H and W extended to a multiple by repeating the border.
+    """
+    layers, height, width = windows[0].planes.shape
+    span, one = len(windows[0].spikes), _ONE[number_type]
+    size = len(windows), height + -height % multiple, width + -width % multiple, span + layers + 1
+    bits = np.empty(size, one.dtype)
+    strips = -(-height // ROWS)
+    nothing = np.zeros((1, height, width), np.float32)
+
+    def strip(number: int) -> None:
+        n, begin = number // strips, ROWS * (number % strips)
+        stop, window, before = min(begin + ROWS, height), windows[n], last[n]
+        _spikes(window.spikes, one, begin, stop, bits[n])
+        _layers(window.planes.view(np.uint32), span, begin, stop, bits[n])
+        _layers((nothing if before is None else before).view(np.uint32), span + layers, begin, stop, bits[n])
+
+    count = len(windows) * strips
+    share_out(strip, count, as_many_as_pay(torch.get_num_threads(), count, bits.size))
+    bits[:, :height, width:] = bits[:, :height, width - 1 : width]
+    bits[:, height:] = bits[:, height - 1 : height]
+    signed = bits.view(np.int16 if one.dtype == np.uint16 else np.int32)
+    return torch.from_numpy(signed).view(number_type).permute(0, 3, 1, 2)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _spikes(spikes, one, begin, stop, out):  # pragma: no cover - compiled
+    """Frames (span, H, W) -> channels 0 .. span of rows begin .. stop; eight frames at a time as the bits of a byte."""
+    span, _, width = spikes.shape
+    byte = np.empty(width, np.uint8)
+    for y in range(begin, stop):
+        for first in range(0, span, 8):
+            count = min(8, span - first)
+            byte[:] = 0
+            for t in range(count):
+                for x in range(width):
+                    byte[x] |= spikes[first + t, y, x] << np.uint8(t)
+            if count == 8:  # a length that the compiler knows: twice as fast
+                for x in range(width):
+                    for t in range(8):
+                        out[y, x, first + t] = ((byte[x] >> np.uint8(t)) & np.uint8(1)) * one
+            else:
+                for x in range(width):
+                    for t in range(count):
+                        out[y, x, first + t] = ((byte[x] >> np.uint8(t)) & np.uint8(1)) * one
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _layers(values, channel, begin, stop, out):  # pragma: no cover - compiled
+    """Bits (n, H, W) of float32 -> channels from `channel` on; to 16 bits rounded half to even."""
+    half = out.itemsize == 2
+    for y in range(begin, stop):
+        for c in range(values.shape[0]):
+            for x in range(values.shape[2]):
+                bits = values[c, y, x]
+                if half:
+                    bits = (bits + np.uint32(0x7FFF) + ((bits >> np.uint32(16)) & np.uint32(1))) >> np.uint32(16)
+                out[y, x, channel + c] = bits

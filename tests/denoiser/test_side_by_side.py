@@ -1,0 +1,54 @@
+"""The input of a pass as one array: what it holds, and that a pass over it gives the bits of the call of training."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from denoiser import infer
+from denoiser.pixel_map import PixelMap
+from denoiser.recipe import RECIPES
+from denoiser.side_by_side import ROWS, side_by_side
+from denoiser.window import RollingWindow, Window
+
+BEST = RECIPES["best"]
+
+
+def window(span: int, layers: int, shape: tuple[int, int], seed: int = 0) -> Window:
+    rng = np.random.default_rng(seed)
+    spikes = (rng.random((span, *shape)) < 0.3).astype(np.uint8)
+    return Window(0, 1, spikes, rng.normal(size=(layers, *shape)).astype(np.float32))
+
+
+@pytest.mark.parametrize("number_type", [torch.bfloat16, torch.float32])
+@pytest.mark.parametrize("span", [48, 13])
+def test_channels_are_spikes_planes_and_last_rate_and_the_border_is_repeated(number_type, span):
+    shape = (ROWS + 3, 9)
+    windows = [window(span, 5, shape), window(span, 5, shape, seed=1)]
+    last = np.random.default_rng(2).random((1, *shape)).astype(np.float32)
+    found = side_by_side(windows, [last, None], number_type, 4)
+    assert found.shape == (2, span + 6, ROWS + 4, 12) and found.stride(1) == 1
+    for one, w, rate in zip(found, windows, (last, np.zeros_like(last)), strict=True):
+        wanted = np.pad(np.concatenate([w.spikes.astype(np.float32), w.planes, rate]), ((0, 0), (0, 1), (0, 3)), "edge")
+        assert torch.equal(one, torch.from_numpy(wanted).to(number_type))
+
+
+@pytest.mark.parametrize("number_type", [torch.bfloat16, torch.float32])
+@pytest.mark.parametrize("shape", [(9, 14), (16, 32)])
+@pytest.mark.parametrize("mapped", [False, True])
+def test_a_pass_gives_the_bits_of_the_call_of_training(number_type, shape, mapped):
+    torch.manual_seed(1)
+    network = infer.prepared(BEST.network(), number_type)
+    unit = PixelMap(np.full(shape, 1.1, np.float32), np.full(shape, 0.002, np.float32)) if mapped else None
+    rolling = RollingWindow(BEST.layout, shape, unit)
+    spikes = (np.random.default_rng(0).random((64, *shape)) < 0.3).astype(np.uint8)
+    carried: infer.Carried = ()
+    for w in rolling.push(spikes):
+        before = tuple(torch.from_numpy(k)[None] for k in carried) or None
+        arrays = torch.from_numpy(w.spikes)[None].to(number_type), torch.from_numpy(w.planes)[None]
+        with torch.inference_mode(), torch.autocast("cpu", number_type, enabled=number_type != torch.float32):
+            rate, kept = network(*(a.contiguous(memory_format=torch.channels_last) for a in arrays), before)
+        found, carried = infer.rates(network, w, number_type, carried)
+        assert found.any() and np.array_equal(found, rate[0].float().clamp(0, 1).numpy())
+        assert all(np.array_equal(a, b[0].numpy()) for a, b in zip(carried, kept, strict=True))
