@@ -71,6 +71,17 @@ def prefetch(typing_context: Any, address: Any) -> Any:
     return types.void(types.int64), ask
 
 
+@intrinsic  # type: ignore[untyped-decorator]
+def two_at(typing_context: Any, address: Any) -> Any:
+    """The two uint32 at an address, the first in the lower half of a uint64 (little-endian processors): one read."""
+
+    def read(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        return builder.load(builder.inttoptr(arguments[0], word.as_pointer()), align=4)
+
+    return types.uint64(types.int64), read
+
+
 def address_of(array: NDArray[Any]) -> int:
     """Where an array begins in memory."""
     return int(array.__array_interface__["data"][0])
