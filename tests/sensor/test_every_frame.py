@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import zlib
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -69,7 +70,7 @@ def test_threads_and_cameras_of_both_kinds_in_a_call_change_no_bit() -> None:
     """Bits packed and not; light that changes every frame beside light that stays."""
     unit, phase = SensorModel.preset("scsim").draw_unit((1, 5000), 1), np.linspace(0.0, 0.99, 5000)
     light = random_film(5, (1, 5000), 64).radiance.reshape(64, -1)
-    quick = [Segment(a, b, 1, 0, 1) for a, b in zip(light[:40], light[1:41], strict=True)]
+    quick = [Segment(a, b, 1, 0, 1) for a, b in pairwise(light[:41])]
     steady = [Segment(light[0], light[1], 64, 0, 40)]
     alone = []
     for parts in (quick, steady):
