@@ -93,6 +93,40 @@ def grains(light: Any, gain: Any, dark: Any) -> Any:
 
 
 @njit(inline="always")
+def is_chain(pieces: Any, k: Any, stop: Any, known: Any) -> Any:
+    """Whether the next AT_ONCE pieces are of one frame each, every one beginning in the light in which the one before
+    ended; known: address of the light of which row LEVEL is."""
+    chain = k + AT_ONCE <= stop
+    for piece in range(k, min(k + AT_ONCE, stop)):
+        chain &= pieces[piece, LENGTH] == 1 and pieces[piece, LIGHT0] == known
+        known = pieces[piece, LIGHT1]
+    return chain
+
+
+@njit(inline="always")
+def chain(s: Any, light1: Any, light2: Any, light3: Any, light4: Any, gain: Any, dark: Any) -> Any:
+    """Rows CHARGE of four such frames, and as `reach`; light1 to light4: at their ends."""
+    most = _I(0)
+    for j in range(len(light1)):
+        i0 = s[LEVEL + j]
+        i1, i2 = grains(light1[j], gain[j], dark[j]), grains(light2[j], gain[j], dark[j])
+        i3, i4 = grains(light3[j], gain[j], dark[j]), grains(light4[j], gain[j], dark[j])
+        s[LEVEL + j] = i4
+        c0, c1, c2, c3 = (
+            _I(_I(i0 + i1) >> _I(1)),
+            _I(_I(i1 + i2) >> _I(1)),
+            _I(_I(i2 + i3) >> _I(1)),
+            _I(_I(i3 + i4) >> _I(1)),
+        )
+        s[_CHARGE + j], s[_CHARGE1 + j], s[_CHARGE2 + j], s[_CHARGE3 + j] = c0, c1, c2, c3
+        left = _I(s[_REACH + j] - _I(_I(c0 + c1) + _I(c2 + c3)))
+        s[_REACH + j] = left
+        s[_LACKS + j] = _I(left <= _I(0))
+        most = max(most, max(max(c0, c1), max(c2, c3)))
+    return most
+
+
+@njit(inline="always")
 def reach(s: Any) -> Any:
     """Rows REACH, the charge that four frames leave of all that is ready, and LACKS, whether they leave none; returns
     the most charge of a frame."""
@@ -269,35 +303,45 @@ def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ig
                 for soon in range(k + AT_ONCE, min(k + 2 * AT_ONCE, camera[STOP_PIECE])):
                     for line in range(4 * p0, 4 * (p0 + n), 64):
                         prefetch(pieces[soon, LIGHT1] + line)
-                for u in range(AT_ONCE):
-                    charge = s[_CHARGE + u * TILE : _CHARGE + (u + 1) * TILE]
-                    if done + u == frames:
-                        break
-                    light0 = carray(pointer_to(pieces[k, LIGHT0], np.float32), (pixels,))[p0 : p0 + n]
+                if calm and is_chain(pieces, k, camera[STOP_PIECE], known):
                     light1 = carray(pointer_to(pieces[k, LIGHT1], np.float32), (pixels,))[p0 : p0 + n]
-                    charge[n:] = 0
-                    if pieces[k, LENGTH] == 1:
-                        if pieces[k, LIGHT0] != known:
+                    light2 = carray(pointer_to(pieces[k + 1, LIGHT1], np.float32), (pixels,))[p0 : p0 + n]
+                    light3 = carray(pointer_to(pieces[k + 2, LIGHT1], np.float32), (pixels,))[p0 : p0 + n]
+                    light4 = carray(pointer_to(pieces[k + 3, LIGHT1], np.float32), (pixels,))[p0 : p0 + n]
+                    calm = chain(s, light1, light2, light3, light4, gains, darks) < _GRAINS
+                    known = pieces[k + AT_ONCE - 1, LIGHT1]
+                    k = min(k + AT_ONCE, camera[STOP_PIECE] - 1)
+                    at = pieces[k, FIRST]
+                else:
+                    for u in range(AT_ONCE):
+                        charge = s[_CHARGE + u * TILE : _CHARGE + (u + 1) * TILE]
+                        if done + u == frames:
+                            break
+                        light0 = carray(pointer_to(pieces[k, LIGHT0], np.float32), (pixels,))[p0 : p0 + n]
+                        light1 = carray(pointer_to(pieces[k, LIGHT1], np.float32), (pixels,))[p0 : p0 + n]
+                        charge[n:] = 0
+                        if pieces[k, LENGTH] == 1:
+                            if pieces[k, LIGHT0] != known:
+                                for j in range(n):
+                                    s[LEVEL + j] = grains(light0[j], gains[j], darks[j])
                             for j in range(n):
-                                s[LEVEL + j] = grains(light0[j], gains[j], darks[j])
-                        for j in range(n):
-                            i1 = grains(light1[j], gains[j], darks[j])
-                            charge[j] = _I(_I(s[LEVEL + j] + i1) >> _I(1))
-                            s[LEVEL + j] = i1
-                        known = pieces[k, LIGHT1]
-                    else:
-                        if (done == 0 and u == 0) or at == pieces[k, FIRST]:
-                            integrate(s, light0, light1, gains, darks, n, _I(pieces[k, LENGTH]))
-                        for j in range(n):
-                            a, b, d = s[LEVEL + j], s[CURVE + j], s[REST + j]
-                            charge[j] = _I(collected(a, b, d, _I(at + 1)) - collected(a, b, d, _I(at)))
-                        known = 0
-                    at += 1
-                    if at == pieces[k, FIRST] + pieces[k, COUNT] and k + 1 < camera[STOP_PIECE]:
-                        k += 1
-                        at = pieces[k, FIRST]
-                if calm:
-                    calm = reach(s) < _GRAINS
+                                i1 = grains(light1[j], gains[j], darks[j])
+                                charge[j] = _I(_I(s[LEVEL + j] + i1) >> _I(1))
+                                s[LEVEL + j] = i1
+                            known = pieces[k, LIGHT1]
+                        else:
+                            if (done == 0 and u == 0) or at == pieces[k, FIRST]:
+                                integrate(s, light0, light1, gains, darks, n, _I(pieces[k, LENGTH]))
+                            for j in range(n):
+                                a, b, d = s[LEVEL + j], s[CURVE + j], s[REST + j]
+                                charge[j] = _I(collected(a, b, d, _I(at + 1)) - collected(a, b, d, _I(at)))
+                            known = 0
+                        at += 1
+                        if at == pieces[k, FIRST] + pieces[k, COUNT] and k + 1 < camera[STOP_PIECE]:
+                            k += 1
+                            at = pieces[k, FIRST]
+                    if calm:
+                        calm = reach(s) < _GRAINS
                 if calm:
                     groups = find(s, flags, live)
                     sleepers: Any = 0
