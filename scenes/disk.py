@@ -103,7 +103,7 @@ class RotatingDisk(PlanarScene):
         self._disk = Texels.of(prefiltered(light[0] + (light[1] - light[0]) * values, self.radius))
         self._tile = _background_tile(background, backgrounds, self.shape, light)
         self._background = np.empty(self.shape, np.float32)
-        paint_tile(self._tile, 0.0, 0.0, self._background)
+        paint_tile(self._tile, 0.0, 0.0, 0, self._background)
 
     def __repr__(self) -> str:
         return (

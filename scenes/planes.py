@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.keys import threads_for
-from scenes.painted_disk import Texels, paint_scenes, places_of
+from scenes.painted_disk import Texels, paint_scenes, parts_of, places_of
 from scenes.protocol import Gaze
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.kernels.intrinsics import address_of
@@ -81,22 +81,23 @@ def paint_planes(planes: Sequence[Plane], light: Sequence[NDArray[np.float32]], 
     if not planes:
         return
     discs = [disc for plane in planes for disc in plane.discs]
-    done = keys = rows = 0
+    done = keys = rows = parts = 0
     scenes, textures, numbers = [], [], []
     for plane, pictures in zip(planes, light, strict=True):
         unmoved = 0 if plane.unmoved is None else address_of(plane.unmoved)
-        into = address_of(pictures), pictures.strides[0], keys
+        into = address_of(pictures), pictures.strides[0], len(pictures), keys
         of_scene = done, done + len(plane.discs)
-        scenes.append((address_of(plane.tile), *plane.tile.shape, *plane.shape, unmoved, *into, *of_scene))
+        scenes.append((address_of(plane.tile), *plane.tile.shape, *plane.shape, unmoved, *into, *of_scene, parts))
         for disc in plane.discs:
             texels = disc.texels
             textures.append((address_of(texels.pairs), texels.side, rows))
             numbers.append((disc.radius, float(texels.low), float(texels.step)))
             rows += len(pictures)
         keys, done = keys + len(pictures), of_scene[1]
+        parts += parts_of(len(pictures), plane.shape[0])
     work = (
         np.zeros((1, 8), np.int64),
-        keys,
+        parts,
         np.array(scenes, np.int64),
         np.concatenate([plane.pan for plane in planes]),
         np.concatenate([plane.tilt for plane in planes]),

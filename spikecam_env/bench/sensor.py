@@ -6,7 +6,8 @@ spikecam bench sensor
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -24,10 +25,34 @@ from spikecam_env.sensor.unit import Unit
 
 Array = NDArray[np.float64]
 
-REAL_TIME = SHAPE[0] * SHAPE[1] * FRAME_RATE_HZ
+
+@dataclass(frozen=True)
+class Camera:
+    """shape: (rows, columns).  rate_hz: frames a second."""
+
+    shape: tuple[int, int]
+    rate_hz: int
+
+    def __str__(self) -> str:
+        return f"{self.shape[0]} x {self.shape[1]}, {self.rate_hz / 1000:g} kHz"
+
+    @property
+    def real_time(self) -> int:
+        """Pixel-steps a second."""
+        return self.shape[0] * self.shape[1] * self.rate_hz
+
+
+VIDAR = Camera(SHAPE, FRAME_RATE_HZ)
+REAL_TIME = VIDAR.real_time
 """Pixel-steps a second of a Vidar camera."""
 
+MEGAPIXEL = Camera((1000, 1000), 20_000)
+"""A spike camera of the next generation: five times the pixel-steps."""
+
 BLOCK = 64
+SLOW = 16
+"""Frames in a call of the slow engines."""
+
 SMOOTH = "smooth, moving"
 LIGHTS: tuple[float | str, ...] = (5.0, 20.0, 100.0, SMOOTH)
 
@@ -39,46 +64,47 @@ def bench_sensor(
 
     scenes: mean intervals [frames] of steady light, and SMOOTH.  seconds: time spent on each measurement.  Compiling is
     not timed.
-    Columns: scene, engine, threads, frames (in one call), Gpx-steps/s (median of the repeats), from and to (their
-    quartiles), x numpy (same scene), x real time (Vidar).
+    Columns: camera, scene, engine, threads, frames (in one call), Gpx-steps/s (median of the repeats), from and to
+    (their quartiles), x numpy (same scene), x real time (of that camera).  All scenes are for a Vidar camera; the last
+    of them for one of a megapixel too.
     Engine "fast" gives one byte a pixel, "fast, packed" one bit.  "bytes written, no more" fills the same frames with a
-    constant: what memory alone allows.  One frame at a time, "fast" is what `SpikeSensor.step` does on keys 64 frames
-    apart; with light that is new in every frame nothing can be looked ahead (`kernels.ahead`).
+    constant: what memory alone allows.  "light new in every frame" has a key at each frame; what follows from 64 of
+    them goes in one call, or one frame at a time, when nothing can be looked ahead (`kernels.ahead`).  One frame at a
+    time, "fast" is what `SpikeSensor.step` does on keys 64 frames apart.
     """
-    unit = SensorModel.preset("scsim").draw_unit(SHAPE, seed)
-    phase = generator(seed, "phase").random(SHAPE).reshape(-1)
     rows: list[dict[str, Any]] = []
-    for scene in tqdm(list(scenes), desc="bench", unit="scene", leave=False):
-        blocks = list(segments(scene_light(scene), 0, 8 * BLOCK))
-        frames = [_one_frame(blocks[i // BLOCK], i % BLOCK) for i in range(8 * BLOCK)]
+    scenes, threads = list(scenes), tuple(threads)
+    cases = [(VIDAR, scene) for scene in scenes] + [(MEGAPIXEL, scene) for scene in scenes[-1:]]
+    for camera, scene in tqdm(cases, desc="bench", unit="scene", leave=False):
         base = 0.0
-        for name, count, parts, run in _contestants(unit, phase, seed, blocks, frames, tuple(threads)):
-            rates = _rates(run, parts, seconds)
+        for name, count, frames, parts, run in _contestants(camera, scene, seed, threads):
+            rates = _rates(run, parts, frames * len(parts) * camera.shape[0] * camera.shape[1], seconds)
             low, rate, high = (float(q) for q in np.percentile(rates, (25, 50, 75)))
             base = base or rate
             rows.append(
                 {
+                    "camera": str(camera),
                     "scene": scene if isinstance(scene, str) else f"interval {scene:g}",
                     "engine": name,
                     "threads": count,
-                    "frames": parts[0].count,
+                    "frames": frames,
                     "Gpx-steps/s": rate / 1e9,
                     "from": low / 1e9,
                     "to": high / 1e9,
                     "x numpy": rate / base,
-                    "x real time": rate / REAL_TIME,
+                    "x real time": rate / camera.real_time,
                 }
             )
     return rows
 
 
-def scene_light(scene: float | str) -> Keyframes:
+def scene_light(scene: float | str, shape: tuple[int, int] = SHAPE) -> Keyframes:
     """Keys 64 frames apart: steady light of one mean interval, or soft blobs that drift, of mean rate 1/10."""
     key = BLOCK * np.arange(9, dtype=np.float64)
     if scene != SMOOTH:
         level = np.float32(1.0 / float(scene))
-        return Keyframes(key, np.full((key.size, *SHAPE), level, dtype=np.float32))
-    y, x = np.indices(SHAPE, dtype=np.float64)
+        return Keyframes(key, np.full((key.size, *shape), level, dtype=np.float32))
+    y, x = np.indices(shape, dtype=np.float64)
     pictures = []
     for frame in key:
         drift = 0.05 * frame
@@ -88,31 +114,39 @@ def scene_light(scene: float | str) -> Keyframes:
     return Keyframes(key, (np.array(pictures) * (0.1 / scene_mean)).astype(np.float32))
 
 
-Contestant = tuple[str, int, list[Segment], Callable[[Segment], object]]
+Contestant = tuple[str, int, int, Sequence[Any], Callable[[Any], object]]
+"""Engine, threads, frames in one call, parts of the light, and what takes one of them."""
 
 
-def _contestants(
-    unit: Unit, phase: Array, seed: int, blocks: list[Segment], frames: list[Segment], threads: tuple[int, ...]
-) -> Iterable[Contestant]:
+def _contestants(camera: Camera, scene: float | str, seed: int, threads: tuple[int, ...]) -> Iterable[Contestant]:
+    unit = SensorModel.preset("scsim").draw_unit(camera.shape, seed)
+    phase = generator(seed, "phase").random(camera.shape).reshape(-1)
+    light = scene_light(scene, camera.shape)
+    blocks = list(segments(light, 0, 8 * BLOCK))
+    frames = [_one_frame(blocks[i // BLOCK], i % BLOCK) for i in range(8 * BLOCK)]
+    few = [replace(blocks[0], count=SLOW)]
     rng = generator(seed, "bench")
     charge = np.floor(phase * GRAINS)
-    yield "numpy, exact Poisson", 1, blocks[:1], lambda part: numpy_step(unit, charge, part, rng)
-    first = Exposure(0, 40_000.0, SHAPE, unit)
+    yield "numpy, exact Poisson", 1, SLOW, few, lambda part: numpy_step(unit, charge, part, rng)
+    first = Exposure(0, float(camera.rate_hz), camera.shape, unit)
     state = reference.start(first, (), phase, seed)
-    yield "reference", 1, blocks[:1], lambda part: reference.run(first, (), state, part)
+    yield "reference", 1, SLOW, few, lambda part: reference.run(first, (), state, part)
     pixels = fast.start(unit, phase, seed)
     out = np.empty((BLOCK, unit.gain.size), dtype=np.uint8)
+    new = Keyframes(np.arange(BLOCK + 1.0), np.array([light.at(k) for k in range(BLOCK + 1)]))
+    every = [fast.Stretch.of(pixels, list(segments(new, 0, BLOCK)), out)]
 
     def bytes_out(part: Segment, threads: int) -> object:
         return fast.run(pixels, part, out[: part.count], threads=threads)
 
     for count in threads:
-        yield "fast", count, blocks, partial(bytes_out, threads=count)
-        yield "fast, packed", count, blocks, partial(fast.run_packed, pixels, threads=count)
-        yield "fast, light new in every frame", count, frames[:8], partial(bytes_out, threads=count)
+        yield "fast", count, BLOCK, blocks, partial(bytes_out, threads=count)
+        yield "fast, packed", count, BLOCK, blocks, partial(fast.run_packed, pixels, threads=count)
+        yield "fast, light new in every frame", count, BLOCK, [every], partial(fast.run_together, threads=count)
+        yield "fast, light new in every frame", count, 1, frames[:8], partial(bytes_out, threads=count)
         looking = ahead.start(unit, phase, seed)
-        yield "fast", count, frames, partial(ahead.run, looking, out=out[:1], threads=count)
-    yield "bytes written, no more", 1, blocks, lambda part: out[: part.count].fill(1)
+        yield "fast", count, 1, frames, partial(ahead.run, looking, out=out[:1], threads=count)
+    yield "bytes written, no more", 1, BLOCK, blocks, lambda part: out[: part.count].fill(1)
 
 
 def numpy_step(unit: Unit, charge: Array, segment: Segment, rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -136,12 +170,10 @@ def _one_frame(block: Segment, first: int) -> Segment:
     return Segment(block.radiance0, block.radiance1, block.length, first, 1)
 
 
-def _rates(run: Callable[[Segment], object], parts: list[Segment], seconds: float) -> list[float]:
-    """Pixel-steps a second of every repeat over `parts`; slow engines get one repeat after a short warm-up."""
-    first = parts[0]
-    run(_one_frame(first, 0))
-    run(first)
-    work = sum(part.count for part in parts) * first.radiance0.size
+def _rates(run: Callable[[Any], object], parts: Sequence[Any], work: int, seconds: float) -> list[float]:
+    """Pixel-steps a second of every repeat over `parts`, `work` of them; slow engines get one repeat after a short
+    warm-up."""
+    run(parts[0])
     rates = []
     until = time.perf_counter() + seconds
     while True:

@@ -203,3 +203,14 @@ def test_bad_options_are_named(option: dict, message: str) -> None:
 
 def sample(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return cv2.remap(image, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR)
+
+
+@pytest.mark.parametrize("centre", [(-20.0, 50.0), (60.5, 16.0), (20.0, -31.0), (23.0, 20.0)])
+def test_a_disk_beyond_the_border_is_seen_as_in_a_larger_picture(centre: tuple[float, float]) -> None:
+    """On rows that are no multiple of those painted at a time; places of texels are float32, so not to the bit."""
+    beyond, texture = 64, np.random.default_rng(0).random((64, 64), np.float32)
+    wide = (centre[0] + beyond, centre[1] + beyond)
+    given = {"radius": 40.0, "texture": texture, "background": 0.3}
+    seen = RotatingDisk((33, 47), centre=centre, **given).radiance(3, 7).radiance
+    larger = RotatingDisk((33 + 2 * beyond, 47 + 2 * beyond), centre=wide, **given).radiance(3, 7).radiance
+    np.testing.assert_allclose(seen, larger[:, beyond : beyond + 33, beyond : beyond + 47], atol=1e-4)

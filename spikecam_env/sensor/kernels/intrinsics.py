@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -52,6 +53,33 @@ def pointer_to(typing_context: Any, address: Any, kind: Any) -> Any:
         return builder.inttoptr(arguments[0], context.get_value_type(pointer))
 
     return pointer(address, kind), cast
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def prefetch(typing_context: Any, address: Any) -> Any:
+    """Ask for the line of cache at an address, which will soon be read; any address will do."""
+
+    def ask(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        byte = ir.IntType(8).as_pointer()
+        flag = ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag])
+        function = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+        pointer = builder.inttoptr(arguments[0], byte)
+        builder.call(function, [pointer, flag(0), flag(3), flag(1)])  # to read, into the nearest cache, of data
+        return context.get_dummy_value()
+
+    return types.void(types.int64), ask
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def two_at(typing_context: Any, address: Any) -> Any:
+    """The two uint32 at an address, the first in the lower half of a uint64 (little-endian processors): one read."""
+
+    def read(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        return builder.load(builder.inttoptr(arguments[0], word.as_pointer()), align=4)
+
+    return types.uint64(types.int64), read
 
 
 def address_of(array: NDArray[Any]) -> int:

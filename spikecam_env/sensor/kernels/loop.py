@@ -37,7 +37,7 @@ BAND = 8
 
 WIDTH = BAND * TILE
 
-_GROUP = 32
+GROUP = 32
 """Pixels that are live or idle together: LLVM makes vector instructions of it (16 it would unroll to scalars)."""
 
 _U = np.uint32
@@ -48,16 +48,16 @@ _Q = np.uint64
 
 _GRAINS = _F(GRAINS)
 _LEAST = _F(1.0)  # grain to the next spike: no draw takes a pixel back in time
-_CAP = _F(MAX_GRAINS_PER_FRAME)
+CAP = _F(MAX_GRAINS_PER_FRAME)
 _LONGEST = _F(MAX_SEGMENT)
-_GOLDEN_SIGNED = _I(0x9E3779B9 - (1 << 32))
+GOLDEN_SIGNED = _I(0x9E3779B9 - (1 << 32))
 GOLDEN = _U(0x9E3779B9)  # 2^32 / golden ratio: the counter's step from spike to spike
 
 # Rows of a tile's scratch array: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
-_LEVEL, _CURVE, _REST, _X, _END, _COUNTER, _KEY, _SPREAD = (r * TILE for r in range(8))
-_SPIKES, _LOW, _HIGH, _FRAME, _DRAW, _WORD, _BELL = (r * TILE for r in range(8, 15))
-_SCRATCH = 15 * TILE
-_INSIDE = TILE - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
+LEVEL, CURVE, REST, X, END, COUNTER, KEY, SPREAD = (r * TILE for r in range(8))
+SPIKES, LOW, HIGH, FRAME, DRAW, WORD, BELL = (r * TILE for r in range(8, 15))
+SCRATCH = 15 * TILE
+INSIDE = TILE - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
 
 
 @njit(inline="always")
@@ -147,8 +147,8 @@ def transpose_bits(words: Any) -> None:
 @njit(inline="always")
 def ramp_of(light0: Any, light1: Any, gain: Any, dark: Any, twice: Any, per_twice: Any, per: Any) -> Any:
     """(level, curve, rest) of one pixel: `light.ramp`."""
-    i0 = _I(min(light0 * gain + dark, _CAP) + _F(0.5))
-    rise = _I(_I(min(light1 * gain + dark, _CAP) + _F(0.5)) - i0)
+    i0 = _I(min(light0 * gain + dark, CAP) + _F(0.5))
+    rise = _I(_I(min(light1 * gain + dark, CAP) + _F(0.5)) - i0)
     curve = _I(np.floor(_F(rise) * per_twice))
     return i0, curve, _I(_I(rise - _I(curve * twice)) * per)
 
@@ -171,39 +171,37 @@ def integrate(s: Any, light0: Any, light1: Any, gain: Any, dark: Any, n: Any, le
     per_twice = _F(1.0 / twice)
     per = _I(((1 << 18) + twice - 1) // twice)
     for j in range(n, TILE):
-        s[_LEVEL + j] = 0
-        s[_CURVE + j] = 0
-        s[_REST + j] = 0
+        s[LEVEL + j] = 0
+        s[CURVE + j] = 0
+        s[REST + j] = 0
     for j in range(n):
-        s[_LEVEL + j], s[_CURVE + j], s[_REST + j] = ramp_of(
-            light0[j], light1[j], gain[j], dark[j], twice, per_twice, per
-        )
+        s[LEVEL + j], s[CURVE + j], s[REST + j] = ramp_of(light0[j], light1[j], gain[j], dark[j], twice, per_twice, per)
 
 
 @njit(inline="always")
 def expected(s: Any, first: Any, stop: Any) -> Any:
     """Spikes that a tile's light will bring, all pixels together."""
     total = _F(0.0)
-    for q in range(0, TILE, _GROUP):
-        j = q + _GROUP // 2
-        a, b, c = s[_LEVEL + j], s[_CURVE + j], s[_REST + j]
+    for q in range(0, TILE, GROUP):
+        j = q + GROUP // 2
+        a, b, c = s[LEVEL + j], s[CURVE + j], s[REST + j]
         total += _F(_I(collected(a, b, c, stop) - collected(a, b, c, first)))
-    return total * (_F(_GROUP) / _GRAINS)
+    return total * (_F(GROUP) / _GRAINS)
 
 
 @njit(inline="always")
 def find_live(s: Any, flags: Any, end: Any, live: Any) -> Any:
     """Fill row END with F(end); list the groups in which a pixel fires before; returns their number."""
     for j in range(TILE):
-        s[_END + j] = collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], end)
-        flags[j] = _B(s[_X + j] <= s[_END + j])
+        s[END + j] = collected(s[LEVEL + j], s[CURVE + j], s[REST + j], end)
+        flags[j] = _B(s[X + j] <= s[END + j])
     eights = flags.view(np.uint64)
     groups: Any = 0
-    for i in range(TILE // _GROUP):
+    for i in range(TILE // GROUP):
         go = _Q(0)
-        for word in range(i * (_GROUP // 8), (i + 1) * (_GROUP // 8)):
+        for word in range(i * (GROUP // 8), (i + 1) * (GROUP // 8)):
             go |= eights[word]
-        live[groups] = i * _GROUP
+        live[groups] = i * GROUP
         groups += _I(go != _Q(0))
     return groups
 
@@ -212,41 +210,41 @@ def find_live(s: Any, flags: Any, end: Any, live: Any) -> Any:
 def wake(s: Any, f: Any, live: Any, groups: Any, p0: Any, number: Any, spread: Any, low: Any, high: Any) -> None:
     """Rows COUNTER, KEY, SPREAD of the live groups; number: spikes before those of row SPIKES; low, high: the seed."""
     for i in range(groups):
-        q = live[i] & _INSIDE
-        for j in range(q, q + _GROUP):
+        q = live[i] & INSIDE
+        for j in range(q, q + GROUP):
             key = first_key(p0 + j, low)
-            s[_COUNTER + j] = _I(_U(key + _U(_U(number[j] + _U(s[_SPIKES + j])) * GOLDEN)))
-            s[_KEY + j] = _I(second_key(key, high))
-            f[_SPREAD + j] = spread[j]
+            s[COUNTER + j] = _I(_U(key + _U(_U(number[j] + _U(s[SPIKES + j])) * GOLDEN)))
+            s[KEY + j] = _I(second_key(key, high))
+            f[SPREAD + j] = spread[j]
 
 
 @njit(inline="always")
 def draw(s: Any, f: Any, live: Any, groups: Any) -> None:
     """Row BELL of the live groups: the draw of each pixel's next spike."""
     for i in range(groups):
-        q = live[i] & _INSIDE
-        for j in range(q, q + _GROUP):
-            s[_WORD + j] = _I(scramble(_U(s[_COUNTER + j])))
+        q = live[i] & INSIDE
+        for j in range(q, q + GROUP):
+            s[WORD + j] = _I(scramble(_U(s[COUNTER + j])))
     for i in range(groups):
-        q = live[i] & _INSIDE
-        for j in range(q, q + _GROUP):
-            s[_BELL + j] = _I(scramble(_U(_U(s[_WORD + j]) ^ _U(s[_KEY + j]))))
+        q = live[i] & INSIDE
+        for j in range(q, q + GROUP):
+            s[BELL + j] = _I(scramble(_U(_U(s[WORD + j]) ^ _U(s[KEY + j]))))
     for i in range(groups):
-        q = live[i] & _INSIDE
-        for j in range(q, q + _GROUP):
-            f[_BELL + j] = bell_of(_U(s[_WORD + j]), _U(s[_BELL + j]))
+        q = live[i] & INSIDE
+        for j in range(q, q + GROUP):
+            f[BELL + j] = bell_of(_U(s[WORD + j]), _U(s[BELL + j]))
 
 
 @njit(inline="always")
 def reset(s: Any, j: Any, active: Any, charge: Any, low: Any, high: Any) -> Any:
     """Note an active pixel's spike (active: -1, else 0) in the frame of this bit; whether it fires again."""
-    s[_LOW + j] |= _I(low & active)
-    s[_HIGH + j] |= _I(high & active)
-    s[_SPIKES + j] = _I(s[_SPIKES + j] - active)
-    s[_COUNTER + j] = _I(s[_COUNTER + j] + _I(_GOLDEN_SIGNED & active))
-    x = _I(s[_X + j] + _I(charge & active))
-    s[_X + j] = x
-    return _I(x <= s[_END + j])
+    s[LOW + j] |= _I(low & active)
+    s[HIGH + j] |= _I(high & active)
+    s[SPIKES + j] = _I(s[SPIKES + j] - active)
+    s[COUNTER + j] = _I(s[COUNTER + j] + _I(GOLDEN_SIGNED & active))
+    x = _I(s[X + j] + _I(charge & active))
+    s[X + j] = x
+    return _I(x <= s[END + j])
 
 
 @njit(inline="always")
@@ -256,26 +254,26 @@ def jump(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, first: Any) ->
     first: frame of the key interval that bit 0 stands for.
     """
     for i in range(groups):
-        q = live[i] & _INSIDE
-        for j in range(q, q + _GROUP):
-            s[_DRAW + j] = charge_of(f[_BELL + j], f[_SPREAD + j], polynomial)
+        q = live[i] & INSIDE
+        for j in range(q, q + GROUP):
+            s[DRAW + j] = charge_of(f[BELL + j], f[SPREAD + j], polynomial)
     for i in range(groups):
-        q = live[i] & _INSIDE
-        for j in range(q, q + _GROUP):
-            s[_FRAME + j] = nearest_frame(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], s[_X + j])
+        q = live[i] & INSIDE
+        for j in range(q, q + GROUP):
+            s[FRAME + j] = nearest_frame(s[LEVEL + j], s[CURVE + j], s[REST + j], s[X + j])
     still: Any = 0
     for i in range(groups):
-        q = live[i] & _INSIDE
+        q = live[i] & INSIDE
         go = _I(0)
-        for j in range(q, q + _GROUP):
-            x = s[_X + j]
-            active = _I(-_I(x <= s[_END + j]))
-            k = s[_FRAME + j]
-            before = _I(collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], k) >= x)
+        for j in range(q, q + GROUP):
+            x = s[X + j]
+            active = _I(-_I(x <= s[END + j]))
+            k = s[FRAME + j]
+            before = _I(collected(s[LEVEL + j], s[CURVE + j], s[REST + j], k) >= x)
             at = _I(_I(k - first) - before)
             late = _I(-_I(at >= _I(32)))
             bit = _I(_I(1) << _I(at & _I(31)))
-            go = _I(go | reset(s, j, active, s[_DRAW + j], _I(bit & _I(~late)), _I(bit & late)))
+            go = _I(go | reset(s, j, active, s[DRAW + j], _I(bit & _I(~late)), _I(bit & late)))
         live[still] = q
         still += go
     return still
@@ -289,11 +287,11 @@ def stream(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, at: Any) -> 
     high = _I(bit * _I(at >= _I(32)))
     still: Any = 0
     for i in range(groups):
-        q = live[i] & _INSIDE
+        q = live[i] & INSIDE
         go = _I(0)
-        for j in range(q, q + _GROUP):
-            active = _I(-_I(s[_X + j] <= s[_END + j]))
-            charge = charge_of(f[_BELL + j], f[_SPREAD + j], polynomial)
+        for j in range(q, q + GROUP):
+            active = _I(-_I(s[X + j] <= s[END + j]))
+            charge = charge_of(f[BELL + j], f[SPREAD + j], polynomial)
             go = _I(go | reset(s, j, active, charge, low, high))
         live[still] = q
         still += go
@@ -327,8 +325,8 @@ def write_bytes(eights: Any, start: Any, words: Any, out: Any) -> None:
 
 # Columns of a table of cameras: addresses of arrays, then numbers.
 CAMERA_COLUMNS = 13
-_GAIN, _DARK, _SPREAD_OF, _POLYNOMIAL, _REMAINING, _FIRED, _OUT = range(7)
-_SEED_LOW, _SEED_HIGH, _PIXELS, _FRAMES, _FIRST_PIECE, _STOP_PIECE = range(7, 13)
+GAIN, DARK, SPREAD_OF, POLYNOMIAL, REMAINING, FIRED, OUT = range(7)
+SEED_LOW, SEED_HIGH, PIXELS, FRAMES, FIRST_PIECE, STOP_PIECE = range(7, 13)
 
 # Columns of a table of pieces: addresses of the light at both ends of a key interval, then which frames of it.
 PIECE_COLUMNS = 5
@@ -354,9 +352,9 @@ def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ig
         uint64 (F, ceil(P/8)), pixel p is byte p % 8 of word p // 8, 0 or 1.
     """
     use_widest_vectors()  # type: ignore[call-arg]
-    s = np.empty(_SCRATCH, np.int32)
+    s = np.empty(SCRATCH, np.int32)
     f = s.view(np.float32)
-    live = np.empty(TILE // _GROUP + 1, np.int64)
+    live = np.empty(TILE // GROUP + 1, np.int64)
     flags = np.empty(TILE, np.uint8)
     planes = np.empty(8 * WIDTH, np.uint8)
     eights = planes.view(np.uint64)
@@ -370,27 +368,27 @@ def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ig
                 return
             ticket = take_ticket(tickets, share)
         camera, band = cameras[bands[ticket, 0]], bands[ticket, 1]
-        pixels, frames = camera[_PIXELS], camera[_FRAMES]
-        low, high = _U(camera[_SEED_LOW]), _U(camera[_SEED_HIGH])
+        pixels, frames = camera[PIXELS], camera[FRAMES]
+        low, high = _U(camera[SEED_LOW]), _U(camera[SEED_HIGH])
         whole = (pixels + TILE - 1) // TILE * TILE
-        gain = carray(pointer_to(camera[_GAIN], np.float32), (whole,))
-        dark = carray(pointer_to(camera[_DARK], np.float32), (whole,))
-        spread = carray(pointer_to(camera[_SPREAD_OF], np.float32), (whole,))
-        remaining = carray(pointer_to(camera[_REMAINING], np.int32), (whole,))
-        fired = carray(pointer_to(camera[_FIRED], np.uint32), (whole,))
-        c = carray(pointer_to(camera[_POLYNOMIAL], np.float32), (8,))
+        gain = carray(pointer_to(camera[GAIN], np.float32), (whole,))
+        dark = carray(pointer_to(camera[DARK], np.float32), (whole,))
+        spread = carray(pointer_to(camera[SPREAD_OF], np.float32), (whole,))
+        remaining = carray(pointer_to(camera[REMAINING], np.int32), (whole,))
+        fired = carray(pointer_to(camera[FIRED], np.uint32), (whole,))
+        c = carray(pointer_to(camera[POLYNOMIAL], np.float32), (8,))
         polynomial = (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7])
         for p0 in range(band * WIDTH, min(pixels, (band + 1) * WIDTH), TILE):
             n = min(TILE, pixels - p0)
             left = remaining[p0 : p0 + TILE]
             number = fired[p0 : p0 + TILE]
             for j in range(TILE):
-                s[_X + j] = left[j]
-                s[_SPIKES + j] = 0
-                s[_LOW + j] = 0
-                s[_HIGH + j] = 0
+                s[X + j] = left[j]
+                s[SPIKES + j] = 0
+                s[LOW + j] = 0
+                s[HIGH + j] = 0
             done: Any = 0
-            for k in range(camera[_FIRST_PIECE], camera[_STOP_PIECE]):
+            for k in range(camera[FIRST_PIECE], camera[STOP_PIECE]):
                 first, count = _I(pieces[k, FIRST]), _I(pieces[k, COUNT])
                 stop = _I(first + count)
                 light0 = carray(pointer_to(pieces[k, LIGHT0], np.float32), (pixels,))
@@ -405,7 +403,7 @@ def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ig
                     _I(pieces[k, LENGTH]),
                 )
                 for j in range(TILE):
-                    s[_X + j] = _I(s[_X + j] + collected(s[_LEVEL + j], s[_CURVE + j], s[_REST + j], first))
+                    s[X + j] = _I(s[X + j] + collected(s[LEVEL + j], s[CURVE + j], s[REST + j], first))
                 groups = find_live(s, flags, stop, live)
                 wake(s, f, live, groups, p0, number, spread[p0 : p0 + TILE], low, high)
                 if count == 1 or expected(s, first, stop) >= dense * count * TILE:
@@ -420,13 +418,13 @@ def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ig
                         draw(s, f, live, groups)
                         groups = jump(s, f, live, groups, polynomial, _I(first - done))
                 for j in range(TILE):
-                    s[_X + j] = _I(s[_X + j] - s[_END + j])
+                    s[X + j] = _I(s[X + j] - s[END + j])
                 done += count
             for j in range(TILE):
-                left[j] = s[_X + j]
-                number[j] = _U(number[j] + _U(s[_SPIKES + j]))
+                left[j] = s[X + j]
+                number[j] = _U(number[j] + _U(s[SPIKES + j]))
             for plane in range((frames + 7) // 8):
-                word = _HIGH if plane >= 4 else _LOW
+                word = HIGH if plane >= 4 else LOW
                 shift = _U(8 * (plane & 3))
                 column = plane * WIDTH + (p0 - band * WIDTH)
                 of_tile = planes[column : column + TILE]
@@ -435,9 +433,9 @@ def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ig
         start, words = band * (WIDTH // 8), (pixels + 7) // 8
         wide = min(WIDTH // 8, words - start)
         if packed:
-            write_bits(eights, start, wide, carray(pointer_to(camera[_OUT], np.uint8), (frames, words)))
+            write_bits(eights, start, wide, carray(pointer_to(camera[OUT], np.uint8), (frames, words)))
         else:
-            write_bytes(eights, start, wide, carray(pointer_to(camera[_OUT], np.uint64), (frames, words)))
+            write_bytes(eights, start, wide, carray(pointer_to(camera[OUT], np.uint64), (frames, words)))
         ticket = take_ticket(tickets, share)
 
 
