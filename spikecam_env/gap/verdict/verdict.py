@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual, robust_squares
-from spikecam_env.gap.compare.prediction import Null, Prediction
+from spikecam_env.gap.compare.distance import adjusted, deviates, residual
+from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.result import Conclusion, NamedEffect, Statistic
+from spikecam_env.gap.result import Conclusion, NamedEffect, Remainder, Statistic
 from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of, usable_floor
-from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search
+from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, patched_model
 from spikecam_env.gap.verdict.notes import notes_of
 from spikecam_env.gap.verdict.ranking import ranking
+from spikecam_env.gap.verdict.remainder import explains, remainder_of
 from spikecam_env.gap.verdict.structure import structure
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel
@@ -34,13 +35,6 @@ Array = NDArray[np.float64]
 CHANCE_P = 0.002
 """Adjusted p-value from which what no candidate explains may be chance; set on the trial's part `tune`."""
 
-MOST_DEVIANCE_LEFT = 0.02
-"""Share of the deviance beyond chance that may be left when something is named; set on the trial's part `tune`."""
-
-MOST_DEVIATE_LEFT = 0.1
-"""Largest deviate that may be left, over the largest before; set on the trial's part `tune`.  The misfit, whose loss is
-heavy-tailed, counts a single statistic by its logarithm alone."""
-
 
 def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> Conclusion:
     """From a search to a verdict.  rounds: with stand-ins where they explain nothing; floor: of the gap, by halves."""
@@ -48,10 +42,12 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
     last = rounds[-1].prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
     explained = explains(null, comparison.residuals, left, last)
-    found = kept(rounds)
-    off = parameters_off(comparison, rounds)
-    verdict = verdict_of(comparison, rounds, found, explained) or ("parameter" if off else "none")
-    model = rounds[-1].model if rounds else comparison.model
+    remainder = remainder_of(null, comparison.residuals, left, last, where(case), when(case)) if explained else None
+    found = kept(comparison, rounds)
+    unexplained = (not explained or remainder is not None) and not may_be_chance(comparison, found)
+    off = {} if unexplained else parameters_off(comparison, rounds)
+    verdict = verdict_of(comparison, rounds, found, explained, remainder) or ("parameter" if off else "none")
+    model = patched_model(comparison, rounds)
     return Conclusion(
         verdict=verdict,
         effects=() if verdict == "unknown" else named(comparison, rounds, found, explained),
@@ -64,21 +60,26 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
         ranking=ranking(rounds, found),
         not_testable=comparison.not_testable,
         patched=with_strengths(model, off),
+        remainder=remainder if verdict == "named" else None,
     )
 
 
 def verdict_of(
-    comparison: Comparison, rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], explained: bool
+    comparison: Comparison,
+    rounds: Sequence[Round],
+    found: Sequence[tuple[Fit, Round]],
+    explained: bool,
+    remainder: Remainder | None = None,
 ) -> str:
     """The verdict on effects, empty where none is missing.  found: those that were kept; explained: whether the last
-    round leaves chance."""
+    round leaves chance, or a remainder.  Of several that explain as much, none has a law that differs in details."""
     enough = found and explained and not second_left_out(comparison.case)
     if comparison.contradictions:
         return "data"
     if rounds and not may_be_chance(comparison, found) and not enough:
         return "unknown"
     if any(r.rivals for _, r in found) and not comparison.missing:
-        return "class"
+        return "unknown" if remainder else "class"
     return "named" if found or comparison.missing else ""
 
 
@@ -104,16 +105,6 @@ def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) ->
 def second_left_out(case: Case) -> bool:
     """Whether a second effect was not looked for, to save time."""
     return SECOND in case.budget.left_out
-
-
-def explains(null: Null, before: Array, left: Array, predicted: Prediction) -> bool:
-    """Whether residuals (S,) `left` of a prediction are chance; or, beside (S,) those of the null model, few and small,
-    and none that agreed before, which would contradict what was added."""
-    by_chance = float(np.sum(null.weight * np.ones(len(left))))
-    share = (robust_squares(left, null.weight) - by_chance) / max(robust_squares(before, null.weight) - by_chance, 1.0)
-    small = np.abs(left).max() < MOST_DEVIATE_LEFT * np.abs(before).max()
-    contradicted = is_significant(null, np.where(np.abs(left) > np.abs(before), left, 0.0), predicted)
-    return not is_significant(null, left, predicted) or bool(share < MOST_DEVIANCE_LEFT and small and not contradicted)
 
 
 def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
