@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from typing import Any
@@ -41,8 +41,8 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
     case, null = comparison.case, comparison.null
     last = rounds[-1].prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
-    explained = explains(null, comparison.residuals, left, last)
-    remainder = remainder_of(null, comparison.residuals, left, last, where(case), when(case)) if explained else None
+    explained = explains(null, comparison.values, last)
+    remainder = remainder_of(null, comparison.values, last, where(case), when(case)) if explained else None
     found = kept(comparison, rounds)
     unexplained = (not explained or remainder is not None) and not may_be_chance(comparison, found)
     off = {} if unexplained else parameters_off(comparison, rounds)
@@ -85,11 +85,25 @@ def verdict_of(
 
 def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str, dict[str, float]]:
     """Effects of the tested model that are there in another amount, as `Off.parameters`: judged by the unit in which
-    the search ended, beside the patterns that it found."""
+    the search ended, beside the patterns that it found; none that these effects scatter more than it is off."""
     if not rounds or comparison.missing:
         return comparison.off.parameters
     last = rounds[-1]
-    return off_nominal(comparison.case, with_patterns_of(comparison.tested, last.model), last.base).parameters
+    model = with_patterns_of(comparison.tested, last.model)
+    off = off_nominal(comparison.case, model, last.base).parameters
+    refits = [d.refit for d in last.prediction.draws if d.refit is not None]
+    as_read = [off_nominal(comparison.case, model, refit).parameters for refit in refits[-1:]] if off else []
+    return {name: row for name, row in off.items() if not any(is_scattered(name, row, read) for read in as_read)}
+
+
+def is_scattered(name: str, unit: Mapping[str, float], as_read: Mapping[str, Mapping[str, float]]) -> bool:
+    """Whether effects move what a refit reads of a parameter by more than the unit's own is off: rare false spikes add
+    a hundred times a unit's jitter, of which a small error is as much as the model has.
+
+    unit: the parameter's row.  as_read: rows of a refit of the unit's twin with the effects; none is nominal.
+    """
+    read = as_read[name]["ratio"] if name in as_read else 1.0
+    return abs(math.log(read / unit["ratio"])) >= abs(math.log(unit["ratio"]))
 
 
 def with_patterns_of(model: SensorModel, found: SensorModel) -> SensorModel:
@@ -111,8 +125,7 @@ def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round
     """The rounds; where what they found does not explain the data, they end where they came nearest to recordings held
     out: an empirical patch has to be of use in recordings that took no part."""
     *before, last = rounds
-    given, left = residual(null, values, null.prediction), residual(null, values, last.prediction)
-    if explains(null, given, left, last.prediction):
+    if explains(null, values, last.prediction):
         return list(rounds)
     gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
     return [*before, replace(rounds[int(np.argmin(gaps))], fits=())]
