@@ -405,6 +405,41 @@ def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int,
     assert len(asked) == 1 + begun and case.budget.left_out == ([] if begun else ["a second effect"])
 
 
+@pytest.mark.parametrize("strength, added", [(0.2, True), (0.0, False)])
+def test_an_effect_that_fades_to_nothing_is_not_added(strength: float, added: bool, monkeypatch):
+    n, change, values, _ = campaign()
+    model = MODEL.with_effect(effect("dead_time", tau_us=strength))
+    found = replace(a_fit(n, "dead_time", change, values), model=model)
+    monkeypatch.setattr(search, "with_candidates", lambda *given: replace(given[-1], fits=(found,)))
+    monkeypatch.setattr(search, "joined", lambda *given: given[1])
+    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
+    case = OfAll(budget=Budget(), conditions=())
+    rounds = search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    assert (rounds[-1].model is model) == added
+
+
+def test_a_second_effect_is_looked_for_beside_one_that_takes_little(monkeypatch):
+    """The first removes a twentieth of what is beyond chance."""
+    n, change, values, _ = campaign()
+    asked = []
+
+    def compared(*given):
+        turn = given[-1]
+        asked.append(turn.misfit)
+        found = replace(a_fit(n, "dead_time", change, values), misfit=turn.misfit - 0.05 * (turn.misfit - COUNT))
+        return replace(turn, fits=(found,) if len(asked) == 1 else ())
+
+    monkeypatch.setattr(search, "with_candidates", compared)
+    monkeypatch.setattr(search, "has_candidate", lambda *_: True)
+    monkeypatch.setattr(search, "is_improvement", lambda *_: True)
+    monkeypatch.setattr(search, "is_significant", lambda *_: True)
+    monkeypatch.setattr(search, "joined", lambda *given: given[1])
+    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
+    case = OfAll(budget=Budget(), conditions=())
+    search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    assert len(asked) == 2
+
+
 @pytest.mark.parametrize("removed, tried", [(0.4, False), (0.6, True)])
 def test_a_runner_up_of_an_earlier_round_has_to_have_removed_half_of_what_its_effect_did(removed: float, tried: bool):
     n, change, values, seen = campaign()
