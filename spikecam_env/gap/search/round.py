@@ -73,8 +73,10 @@ def is_visible(here: Null, found: Fit) -> bool:
 
 
 def absent(case: Case, given: SensorModel, model: SensorModel) -> set[str]:
-    """Effects that a model has beside the one given, and that do nothing: of strength 0, or of less than LEAST_EVENTS."""
-    there = {e.name: e.parameters() for e in model.effects if e.name not in {g.name for g in given.effects}}
+    """Effects that a model has beside the one given, and that do nothing: of no strength, or of less than
+    LEAST_EVENTS."""
+    has = {e.name for e in given.effects}
+    there = {e.name: e.parameters() for e in model.effects if e.name not in has}
     return {
         name
         for name, parameters in there.items()

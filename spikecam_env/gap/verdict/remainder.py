@@ -31,9 +31,7 @@ def explains(null: Null, values: Array, predicted: Prediction) -> bool:
     return bool(np.all(little, where=is_left(null, values, predicted)))
 
 
-def remainder_of(
-    null: Null, values: Array, predicted: Prediction, where: str = "", when: str = ""
-) -> Remainder | None:
+def remainder_of(null: Null, values: Array, predicted: Prediction, where: str = "", when: str = "") -> Remainder | None:
     """What a prediction leaves of measured statistics (S,) beyond chance; None where it leaves none.  where, when: as
     of `Remainder`."""
     off = is_left(null, values, predicted)
@@ -41,7 +39,9 @@ def remainder_of(
         return None
     left = np.where(off, np.abs(residual(null, values, predicted)), 0.0)
     keys = [null.keys[j] for j in np.argsort(-left, kind="stable")[: int(off.sum())]]
-    groups = {g: float(np.sum(left[[k.group == g for k in null.keys]] ** 2)) for g in dict.fromkeys(k.group for k in keys)}
+    groups = {
+        g: float(np.sum(left[[k.group == g for k in null.keys]] ** 2)) for g in dict.fromkeys(k.group for k in keys)
+    }
     before, after = (beyond_chance(null, distance(null, values, mean)) for mean in (null.mean, predicted.mean))
     return Remainder(
         noises=float(left.max()),

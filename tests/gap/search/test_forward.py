@@ -41,6 +41,7 @@ class OfAll:
     conditions: tuple[None, ...]
     base: BaseFit = field(default_factory=unit)
     observations: tuple[None, ...] = ()
+    scenes_only: bool = False
 
     def to_fit(self, keys):
         return np.ones(len(keys), bool)
@@ -403,6 +404,22 @@ def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int,
     monkeypatch.setattr(search, "CAMPAIGNS_PER_EFFECT", 17)
     search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
     assert len(asked) == 1 + begun and case.budget.left_out == ([] if begun else ["a second effect"])
+
+
+@pytest.mark.parametrize("share, opened", [(0.5, True), (0.8, True), (0.95, False)])
+def test_dark_levels_are_open_beside_the_noise_of_an_effect(share: float, opened: bool, monkeypatch):
+    """share: of the refit's s^2 that is the unit's own.  Slow pixels lock to a ripple, whatever the severity."""
+    n, change, values, _ = campaign()
+    found = replace(a_fit(n, "dead_time", change, values), model=MODEL.with_effect(DEAD_TIME))
+    found = replace(found, base=replace(unit(), white=share * unit().white))
+    asked = []
+    monkeypatch.setattr(search, "with_candidates", lambda *given: replace(given[-1], fits=(found,)))
+    monkeypatch.setattr(search, "joined", lambda *given: given[1])
+    monkeypatch.setattr(search, "with_dark_levels_open", lambda *given: asked.append(given) or given[-1])
+    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
+    case = OfAll(budget=Budget(), conditions=())
+    search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    assert bool(asked) == opened
 
 
 @pytest.mark.parametrize("strength, added", [(0.2, True), (0.0, False)])

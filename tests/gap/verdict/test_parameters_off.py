@@ -68,6 +68,8 @@ def test_one_that_the_effect_scatters_is_not():
     assert conclusion(read=100.0).parameters == {}
 
 
-@pytest.mark.parametrize("ratio, read, scattered", [(1.6, 160.0, True), (1.6, 1.7, False), (5.0, 10.0, False), (5.0, 26.0, True)])
+@pytest.mark.parametrize(
+    "ratio, read, scattered", [(1.6, 160.0, True), (1.6, 1.7, False), (5.0, 10.0, False), (5.0, 26.0, True)]
+)
 def test_an_effect_scatters_what_a_refit_of_its_twins_reads_further_off(ratio: float, read: float, scattered: bool):
     assert is_scattered("reset_noise", {"ratio": ratio}, {"reset_noise": {"ratio": read}}) == scattered
