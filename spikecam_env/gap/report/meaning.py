@@ -42,10 +42,10 @@ def named_meaning(d: Diagnosis) -> Iterator[str]:
             f"to {after:.1f}."
         )
     yield element("p", said)
-    if d.remainder:
-        yield from remainder_card(d.remainder)
     for effect in d.effects:
         yield from effect_card(effect)
+    if d.remainder:
+        yield from remainder_card(d.remainder)
 
 
 def remainder_card(left: Remainder) -> Iterator[str]:
