@@ -69,6 +69,24 @@ class NamedEffect:
 
 
 @dataclass(frozen=True)
+class Remainder:
+    """What is left beyond chance beside effects that are named: where their law differs from the catalogue's.
+
+    noises: largest deviate left.  share: of the sum of squares beyond chance, of all recordings.  worst: the statistic
+    that is left off most, recordings: those of statistics left off, the worst first.  groups: share of each group of
+    statistics in what is left, largest first.  where, when: as of `NamedEffect`.
+    """
+
+    noises: float
+    share: float
+    worst: str
+    groups: dict[str, float]
+    recordings: tuple[str, ...]
+    where: str = ""
+    when: str = ""
+
+
+@dataclass(frozen=True)
 class Statistic:
     """One number of the bank, measured and simulated.
 
@@ -210,6 +228,7 @@ class Conclusion:
     ranking: tuple[Ranked, ...]
     not_testable: tuple[tuple[str, str], ...]
     patched: SensorModel
+    remainder: Remainder | None = None
 
 
 @dataclass(frozen=True)
@@ -218,6 +237,7 @@ class Diagnosis:
 
     not_bounded: (name, what is needed) of effects that were not found and that no bound can be stated of.
     class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
+    remainder: for verdict "named": what is left beyond chance, None where nothing is.
     candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
     simulated.  simulated: recordings that were, but for the page's own.  effect_files: of a user's own effects, among
     the model's and those that were tried.  motion: of recordings said to be static; static_only: whether the pixels
@@ -250,6 +270,7 @@ class Diagnosis:
     effect_files: tuple[str, ...] = ()
     motion: tuple[Motion, ...] = ()
     static_only: bool = False
+    remainder: Remainder | None = None
 
     @property
     def static_share(self) -> float:
@@ -266,6 +287,7 @@ class Diagnosis:
             "effects": [e.to_json() for e in self.effects],
             "unknown": self.unknown,
             "class": self.class_,
+            "remainder": asdict(self.remainder) if self.remainder else None,
             "parameters": self.parameters,
             "data": list(self.data),
             "gap": asdict(self.gap) if self.gap else None,

@@ -9,7 +9,7 @@ import numpy as np
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation, observe
-from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Statistic
+from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Remainder, Statistic
 from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.unit.refit import free_refit
 from spikecam_env.gap.verdict.named_effects import estimates
@@ -152,6 +152,14 @@ def named(effect: str = "photodiode_lag") -> Diagnosis:
         "named", words[effect], effects=(e,), gap=gap(41.0, 2.2), statistics=statistics(loud),
         ranking=_ranking(effect, found), patched=model, evidence=evidence(effect),
     )  # fmt: skip
+
+
+def with_remainder() -> Diagnosis:
+    """One effect found, whose law differs in details from the catalogue's."""
+    left = Remainder(8.1, 0.0042, "step: up 16-32", {"step": 0.86, "moving": 0.14}, ("step", "bars"))
+    d = named()
+    words = "Its law differs in details from the catalogue's: 0.4 % of the sum of squares is left."
+    return replace(d, remainder=left, sentence=f"{d.sentence} {words}")
 
 
 def none() -> Diagnosis:

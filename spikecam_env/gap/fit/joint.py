@@ -63,7 +63,7 @@ def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, E
     """
     null, seen = problem.null, problem.seen
     free = to_refine(problem, found, names)
-    free += [WHITE] if 0 < found.base.white < OWN_SHARE * problem.case.base.white else []
+    free += [WHITE] if is_noisy(problem, found.base) else []
     now, base = found.model, found.base
     columns, covariance, exact = np.zeros((len(seen), 0)), np.zeros((0, 0)), np.zeros((0, 0))
     if free:
@@ -85,6 +85,11 @@ def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, E
     own: Mapping[str, float] = values[found.name]
     best = replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name])
     return best, errors, np.einsum("sn,nm,sm->s", columns, exact, columns)
+
+
+def is_noisy(problem: Problem, base: BaseFit) -> bool:
+    """Whether effects take so much of the refit's s^2 that the unit `base` has less than OWN_SHARE of it."""
+    return 0 < base.white < OWN_SHARE * problem.case.base.white
 
 
 def to_refine(problem: Problem, found: Fit, names: Sequence[str]) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ from spikecam_env.gap.report.parameters_off import parameters_off
 from spikecam_env.gap.report.quantities import interval, quantity
 from spikecam_env.gap.report.tables import bounds_tables
 from spikecam_env.gap.report.words import bare, equation_of, human, meaning_of, parameter_unit, sheet
-from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect
+from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect, Remainder
 from spikecam_env.page import element, table
 
 
@@ -44,6 +44,31 @@ def named_meaning(d: Diagnosis) -> Iterator[str]:
     yield element("p", said)
     for effect in d.effects:
         yield from effect_card(effect)
+    if d.remainder:
+        yield from remainder_card(d.remainder)
+
+
+def remainder_card(left: Remainder) -> Iterator[str]:
+    """What is left beside effects that are named, and what to make of it."""
+    yield '<div class="do">'
+    yield element("h3", "What is left")
+    yield element(
+        "p",
+        "The name takes nearly all of the difference wherever there was one. What it leaves is more than chance, and "
+        "small beside what was there: the law of this camera differs in details from the catalogue's, or a much weaker "
+        "effect hides beside it. Parameters may be off by more than their errors; the patched model holds for light "
+        "like that of these recordings.",
+    )
+    rows = [
+        ("Largest deviation left, in noise", f"{left.noises:.1f} ({human(left.worst)})"),
+        ("Share of the sum of squares left", percent(left.share)),
+        ("Statistics, by their share in it", "; ".join(f"{human(g)} {percent(s)}" for g, s in left.groups.items())),
+        ("Recordings, the furthest off first", ", ".join(left.recordings)),
+        ("Where", left.where or "no part of the array stands out"),
+        ("When", left.when or "no part of the recordings stands out"),
+    ]
+    yield table(("", ""), rows)
+    yield "</div>"
 
 
 def class_meaning(d: Diagnosis) -> Iterator[str]:

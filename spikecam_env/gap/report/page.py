@@ -12,7 +12,7 @@ from pathlib import Path
 from spikecam_env.gap.report import figures, meaning, reproduce, tables
 from spikecam_env.gap.report.panels import shape_of
 from spikecam_env.gap.report.style import STYLE
-from spikecam_env.gap.report.words import HEADINGS
+from spikecam_env.gap.report.words import HEADINGS, WITH_REMAINDER
 from spikecam_env.gap.result import Diagnosis
 from spikecam_env.page import element, page
 from spikecam_env.whole import write_text_whole
@@ -32,7 +32,7 @@ def report(diagnosis: Diagnosis, campaign_command: str = "") -> str:
     links = " · ".join(f'<a href="#{anchor}">{element("span", title)}</a>' for anchor, title, _ in present)
     parts = [
         f'<header class="verdict {d.verdict}">',
-        element("p", HEADINGS[d.verdict], class_="badge"),
+        element("p", WITH_REMAINDER if d.remainder else HEADINGS[d.verdict], class_="badge"),
         element("h1", d.sentence),
         element("p", subject(d), class_="subject"),
         "</header>",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+from spikecam_env.gap.report.cells import percent
 from spikecam_env.gap.report.parameters_off import parameters_off
 from spikecam_env.gap.report.quantities import plain_sizes, rough, three_digits
 from spikecam_env.gap.report.words import human, listed
-from spikecam_env.gap.result import CHANCE, Conclusion, Gap
+from spikecam_env.gap.result import CHANCE, Conclusion, Gap, Remainder
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import gap_is_fitted
 
@@ -28,7 +29,18 @@ def none_sentence(found: Conclusion, model_name: str) -> str:
 def named_sentence(found: Conclusion, model_name: str) -> str:
     """Effects with their sizes."""
     named = [f"{human(e.name)} ({plain_sizes(e)})" if e.parameters else human(e.name) for e in found.effects]
-    return f"Your camera has {listed(named, 'and')}{removed_phrase(found, 'it' if len(named) == 1 else 'them')}."
+    said = f"Your camera has {listed(named, 'and')}{removed_phrase(found, 'it' if len(named) == 1 else 'them')}."
+    return f"{said} {remainder_sentence(found.remainder, len(named))}" if found.remainder else said
+
+
+def remainder_sentence(left: Remainder, names: int) -> str:
+    """What effects that are named leave beyond chance."""
+    whose = "Its law differs" if names == 1 else "Their laws differ"
+    groups = listed([human(group) for group in list(left.groups)[:MOST_GROUPS]], "and")
+    return (
+        f"{whose} in details from the catalogue's: {percent(left.share)} of the sum of squares is left, "
+        f"{left.noises:.1f} noises at most, in {groups}."
+    )
 
 
 def class_sentence(found: Conclusion, model_name: str) -> str:
@@ -100,6 +112,9 @@ def gap_line(gap: Gap) -> str:
     removed = f"{100 * min(gap.removed, 1.0):.0f} % of the gap is removed"
     return f"{said} With the patched model they are {three_digits(gap.after)} off: {removed}."
 
+
+MOST_GROUPS = 2
+"""Groups of statistics that a sentence lists of those in which something is left."""
 
 HARDLY_A_GAP = 1.2
 """Times its floor up to which a gap is hardly one, and no share of it is stated to be removed."""

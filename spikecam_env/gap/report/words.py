@@ -22,6 +22,9 @@ HEADINGS = {
 }
 """Verdicts as a heading says them."""
 
+WITH_REMAINDER = "Effect named, with a remainder"
+"""The heading where what is named leaves something beyond chance."""
+
 
 def human(name: str) -> str:
     """A name of the catalogue in plain words."""

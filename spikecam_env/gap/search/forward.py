@@ -23,7 +23,7 @@ from spikecam_env.gap.compare.thresholds import TO_ADD, TO_JOIN
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import TWINS_IN_THE_END, confirmed, with_dark_levels_open, with_prediction
 from spikecam_env.gap.fit.gauss_newton import PROBES
-from spikecam_env.gap.fit.joint import Errors, no_smaller, refined_together, simulated_for
+from spikecam_env.gap.fit.joint import Errors, is_noisy, no_smaller, refined_together, simulated_for
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.screen.screen import screen
@@ -41,6 +41,7 @@ from spikecam_env.gap.search.neighbours import (
 )
 from spikecam_env.gap.search.round import (
     Round,
+    absent,
     has_candidate,
     is_improvement,
     is_second_bend,
@@ -101,12 +102,12 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         weak = turn.misfit - turn.fits[0].misfit < TO_ADD
         if not is_improvement(null, problem.misfit(prediction), best, len(rounds) > 1, weak):
             break
+        if best.name in absent(problem.case, given.model, best.model):
+            break
         rounds = together
         now, base, prediction = best.model, best.base, best.prediction
-        if prediction.own is not None:
+        if prediction.own is not None or (is_noisy(problem, base) and not problem.case.scenes_only):
             prediction = with_dark_levels_open(problem, now, base, prediction)
-        if is_small_share(turn, turn.fits[0].misfit, chance, len(rounds) > 1):
-            break
     rho, left_over = problem.residual_and_misfit(prediction)
     return try_cancelling_pair(problem, names, [*rounds, Round(now, base, prediction, rho, left_over)])
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.candidates.table import candidate, expected_events
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.compare.thresholds import TO_ADD
 from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 
@@ -20,6 +21,9 @@ Array = NDArray[np.float64]
 LEAST_SHARE = (0.2, 0.5)
 """Share of what is beyond chance that the first effect, and each later one of what the others left, has to remove for
 another to be looked for beside them: less is a stand-in's."""
+
+LEAST_EVENTS = 0.5
+"""Pixels, spikes or frames that an effect of such has to be expected to change, to be there: fewer round to none."""
 
 LEAST_CHANGE = 2.0
 """Noises by which an effect has to change a statistic to be added: twins of nothing may be luckier than others."""
@@ -66,6 +70,19 @@ def is_visible(here: Null, found: Fit) -> bool:
     there = found.prediction
     change = np.hypot(there.mean - here.mean, np.sqrt(np.maximum(there.spread**2 - here.sd**2, 0.0))) / here.noise
     return candidate(found.name).random_course or bool(change.max() > LEAST_CHANGE)
+
+
+def absent(case: Case, given: SensorModel, model: SensorModel) -> set[str]:
+    """Effects that a model has beside the one given, and that do nothing: of no strength, or of less than
+    LEAST_EVENTS."""
+    has = {e.name for e in given.effects}
+    there = {e.name: e.parameters() for e in model.effects if e.name not in has}
+    return {
+        name
+        for name, parameters in there.items()
+        if parameters[candidate(name).strength] == 0
+        or expected_events(name, parameters, case.conditions, case.observations) < LEAST_EVENTS
+    }
 
 
 def is_improvement(null: Null, before: float, best: Fit, later: bool, weak: bool = False) -> bool:

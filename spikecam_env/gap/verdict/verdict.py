@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from typing import Any
@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual, robust_squares
-from spikecam_env.gap.compare.prediction import Null, Prediction
+from spikecam_env.gap.compare.distance import adjusted, deviates, residual
+from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.result import Conclusion, NamedEffect, Statistic
+from spikecam_env.gap.result import Conclusion, NamedEffect, Remainder, Statistic
 from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of, usable_floor
-from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search
+from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, patched_model
 from spikecam_env.gap.verdict.notes import notes_of
 from spikecam_env.gap.verdict.ranking import ranking
+from spikecam_env.gap.verdict.remainder import explains, remainder_of
 from spikecam_env.gap.verdict.structure import structure
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel
@@ -34,24 +35,19 @@ Array = NDArray[np.float64]
 CHANCE_P = 0.002
 """Adjusted p-value from which what no candidate explains may be chance; set on the trial's part `tune`."""
 
-MOST_DEVIANCE_LEFT = 0.02
-"""Share of the deviance beyond chance that may be left when something is named; set on the trial's part `tune`."""
-
-MOST_DEVIATE_LEFT = 0.1
-"""Largest deviate that may be left, over the largest before; set on the trial's part `tune`.  The misfit, whose loss is
-heavy-tailed, counts a single statistic by its logarithm alone."""
-
 
 def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> Conclusion:
     """From a search to a verdict.  rounds: with stand-ins where they explain nothing; floor: of the gap, by halves."""
     case, null = comparison.case, comparison.null
     last = rounds[-1].prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
-    explained = explains(null, comparison.residuals, left, last)
-    found = kept(rounds)
-    off = parameters_off(comparison, rounds)
-    verdict = verdict_of(comparison, rounds, found, explained) or ("parameter" if off else "none")
-    model = rounds[-1].model if rounds else comparison.model
+    explained = explains(null, comparison.values, last)
+    remainder = remainder_of(null, comparison.values, last, where(case), when(case)) if explained else None
+    found = kept(comparison, rounds)
+    unexplained = (not explained or remainder is not None) and not may_be_chance(comparison, found)
+    off = {} if unexplained else parameters_off(comparison, rounds)
+    verdict = verdict_of(comparison, rounds, found, explained, remainder) or ("parameter" if off else "none")
+    model = patched_model(comparison, rounds)
     return Conclusion(
         verdict=verdict,
         effects=() if verdict == "unknown" else named(comparison, rounds, found, explained),
@@ -64,31 +60,50 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
         ranking=ranking(rounds, found),
         not_testable=comparison.not_testable,
         patched=with_strengths(model, off),
+        remainder=remainder if verdict == "named" else None,
     )
 
 
 def verdict_of(
-    comparison: Comparison, rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], explained: bool
+    comparison: Comparison,
+    rounds: Sequence[Round],
+    found: Sequence[tuple[Fit, Round]],
+    explained: bool,
+    remainder: Remainder | None = None,
 ) -> str:
     """The verdict on effects, empty where none is missing.  found: those that were kept; explained: whether the last
-    round leaves chance."""
+    round leaves chance, or a remainder.  Of several that explain as much, none has a law that differs in details."""
     enough = found and explained and not second_left_out(comparison.case)
     if comparison.contradictions:
         return "data"
     if rounds and not may_be_chance(comparison, found) and not enough:
         return "unknown"
     if any(r.rivals for _, r in found) and not comparison.missing:
-        return "class"
+        return "unknown" if remainder else "class"
     return "named" if found or comparison.missing else ""
 
 
 def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str, dict[str, float]]:
     """Effects of the tested model that are there in another amount, as `Off.parameters`: judged by the unit in which
-    the search ended, beside the patterns that it found."""
+    the search ended, beside the patterns that it found; none that these effects scatter more than it is off."""
     if not rounds or comparison.missing:
         return comparison.off.parameters
     last = rounds[-1]
-    return off_nominal(comparison.case, with_patterns_of(comparison.tested, last.model), last.base).parameters
+    model = with_patterns_of(comparison.tested, last.model)
+    off = off_nominal(comparison.case, model, last.base).parameters
+    refits = [d.refit for d in last.prediction.draws if d.refit is not None]
+    as_read = [off_nominal(comparison.case, model, refit).parameters for refit in refits[-1:]] if off else []
+    return {name: row for name, row in off.items() if not any(is_scattered(name, row, read) for read in as_read)}
+
+
+def is_scattered(name: str, unit: Mapping[str, float], as_read: Mapping[str, Mapping[str, float]]) -> bool:
+    """Whether effects move what a refit reads of a parameter by more than the unit's own is off: rare false spikes add
+    a hundred times a unit's jitter, of which a small error is as much as the model has.
+
+    unit: the parameter's row.  as_read: rows of a refit of the unit's twin with the effects; none is nominal.
+    """
+    read = as_read[name]["ratio"] if name in as_read else 1.0
+    return abs(math.log(read / unit["ratio"])) >= abs(math.log(unit["ratio"]))
 
 
 def with_patterns_of(model: SensorModel, found: SensorModel) -> SensorModel:
@@ -106,22 +121,11 @@ def second_left_out(case: Case) -> bool:
     return SECOND in case.budget.left_out
 
 
-def explains(null: Null, before: Array, left: Array, predicted: Prediction) -> bool:
-    """Whether residuals (S,) `left` of a prediction are chance; or, beside (S,) those of the null model, few and small,
-    and none that agreed before, which would contradict what was added."""
-    by_chance = float(np.sum(null.weight * np.ones(len(left))))
-    share = (robust_squares(left, null.weight) - by_chance) / max(robust_squares(before, null.weight) - by_chance, 1.0)
-    small = np.abs(left).max() < MOST_DEVIATE_LEFT * np.abs(before).max()
-    contradicted = is_significant(null, np.where(np.abs(left) > np.abs(before), left, 0.0), predicted)
-    return not is_significant(null, left, predicted) or bool(share < MOST_DEVIANCE_LEFT and small and not contradicted)
-
-
 def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
     """The rounds; where what they found does not explain the data, they end where they came nearest to recordings held
     out: an empirical patch has to be of use in recordings that took no part."""
     *before, last = rounds
-    given, left = residual(null, values, null.prediction), residual(null, values, last.prediction)
-    if explains(null, given, left, last.prediction):
+    if explains(null, values, last.prediction):
         return list(rounds)
     gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
     return [*before, replace(rounds[int(np.argmin(gaps))], fits=())]

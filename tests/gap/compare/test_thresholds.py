@@ -135,7 +135,13 @@ def test_a_later_effect_has_to_remove_4_to_be_fitted_with_those_before_it(remove
 
     monkeypatch.setattr(forward, "with_candidates", with_candidates)
     monkeypatch.setattr(forward, "joined", lambda problem, rounds, chance: asked.append(len(rounds)) or list(rounds))
-    case = SimpleNamespace(base=unit(), conditions=(), budget=SimpleNamespace(allows=lambda *_, **__: True))
+    case = SimpleNamespace(
+        base=unit(),
+        conditions=(),
+        observations=(),
+        scenes_only=False,
+        budget=SimpleNamespace(allows=lambda *_, **__: True),
+    )
     n = null()
     forward.forward_selection(Problem(case, MODEL, n, n.mean, n.mean), [], None)
     assert asked == joined

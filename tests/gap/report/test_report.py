@@ -116,6 +116,13 @@ def test_a_page_fetches_nothing_runs_nothing_and_is_small(verdict: str) -> None:
     assert not re.search(r"https?://|url\(|@import", text)
 
 
+def test_a_page_says_what_a_name_leaves() -> None:
+    page = Page(report(made_up.with_remainder())).text
+    assert "Effect named, with a remainder" in page and "What is left" in page
+    assert "8.1 (step: up 16-32)" in page and "step 86 %; moving 14 %" in page and "step, bars" in page
+    assert "What is left" not in Page(written("named")).text
+
+
 def test_the_page_says_what_the_diagnosis_says() -> None:
     d = made_up.named()
     text = Page(written("named")).text

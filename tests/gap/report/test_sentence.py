@@ -61,6 +61,16 @@ def test_parameters_that_are_off_beside_an_effect_are_said() -> None:
     )
 
 
+def test_a_remainder_is_said_with_its_size_and_place() -> None:
+    said = sentence_of(made_up.with_remainder())
+    assert said.endswith(
+        "not used. Its law differs in details from the catalogue's: 0.4 % of the sum of squares is left, 8.1 noises at "
+        "most, in step and moving."
+    )
+    both = (*made_up.named().effects, *made_up.named("dead_time").effects)
+    assert "Their laws differ in details" in sentence_of(replace(made_up.with_remainder(), effects=both))
+
+
 def test_two_effects_are_named_together() -> None:
     d = made_up.named()
     both = replace(d, effects=(*d.effects, *made_up.named("dead_time").effects))

@@ -6,17 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small import MODEL, unit
+from small import MODEL, SHAPE, effect, recorded, unit
 
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.search.neighbours import runner_up
-from spikecam_env.gap.search.round import Round, is_small_share, is_visible
+from spikecam_env.gap.search.round import Round, absent, is_small_share, is_visible
 from spikecam_env.gap.statistics import Key
 
 KEYS = tuple(Key("rates", "r", str(i)) for i in range(10))
 NULL = Null(KEYS, np.zeros(10), np.ones(10), np.zeros(10), 1_000_000, 11.0)
 NOTHING = Prediction(np.zeros(10), np.zeros(10), np.ones(10))
+PIXELS = SHAPE[0] * SHAPE[1]
 TURN = Round(MODEL, unit(), NOTHING, np.zeros(10), 1000.0)
 
 
@@ -40,6 +41,21 @@ def test_an_effect_of_random_course_changes_no_mean():
 )
 def test_less_than_a_fifth_of_what_is_beyond_chance_is_little_and_later_less_than_half(later, removed, small):
     assert is_small_share(TURN, 1000.0 - removed * 800.0, 200.0, later) == small
+
+
+@pytest.mark.parametrize(
+    "name, parameters, there",
+    [
+        ("dead_time", {"tau_us": 0.0}, False),
+        ("dead_time", {"tau_us": 1e-4}, True),
+        ("hot_pixels", {"fraction": 0.3 / PIXELS, "mean_pA": 3.0}, False),
+        ("hot_pixels", {"fraction": 0.8 / PIXELS, "mean_pA": 3.0}, True),
+    ],
+)
+def test_an_effect_of_no_strength_or_of_less_than_half_a_pixel_is_absent(name, parameters, there):
+    model = MODEL.with_effect(effect(name, **parameters))
+    assert absent(recorded(), MODEL, model) == (set() if there else {name})
+    assert absent(recorded(), model, model) == set(), "of the model given"
 
 
 @pytest.mark.parametrize("removed, tried", [(0.7, []), (0.9, ["supply_ripple"])])

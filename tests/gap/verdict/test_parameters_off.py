@@ -1,0 +1,75 @@
+"""A parameter of the model is not called off beside what is unexplained, nor for what a named effect scatters."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small
+from small import effect, recorded
+
+from spikecam_env.gap.baseline.off_nominal import OffNominal
+from spikecam_env.gap.compare.distance import residual
+from spikecam_env.gap.compare.prediction import Prediction, values_of
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.verdict.comparison import Comparison
+from spikecam_env.gap.verdict.verdict import conclude, is_scattered
+
+LITTLE = 0.15
+"""Of the largest deviate of the rates of a recording, left of a statistic that hardly moved."""
+
+
+def conclusion(left: float = 0.0, read: float = 1.0):
+    """Of a unit whose s^2 is five times nominal, beside a dead time that leaves such a share of the largest deviate in
+    the quietest statistic beside it, and of whose twins the refit reads `read` times the unit's s^2."""
+    found = effect("dead_time", tau_us=0.5)
+    null, model, case = small.null(), small.MODEL.with_effect(found), recorded(found)
+    values = values_of(case.bank, null.keys)
+    before = np.nan_to_num((values - null.mean) / null.noise)
+    size = Counter((k.group, k.recording) for k in null.keys)
+    several = np.array([size[k.group, k.recording] > 5 for k in null.keys])
+    loudest = null.keys[int(np.argmax(np.abs(before) * several))]
+    beside = [j for j, k in enumerate(null.keys) if (k.group, k.recording) == (loudest.group, loudest.recording)]
+    quietest = min(beside, key=lambda j: abs(before[j]))
+    mean = values.copy()
+    largest = np.abs(before[beside]).max()
+    mean[quietest] -= left * largest * null.noise[quietest]
+    print(f"{loudest}: {largest:.0f} noises before; {before[quietest]:.1f} in {null.keys[quietest].name}")
+    noisy = replace(case.base, white=5.0 * case.base.white)
+    draws = (replace(null.draws[0], refit=replace(noisy, white=read * noisy.white)),)
+    close = Prediction(mean, null.noise, null.sd, draws)
+    fit = Fit("dead_time", {"tau_us": 0.5}, {"tau_us": 0.01}, close, noisy, np.zeros(len(values)), 1.0, model)
+    first = Round(small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0, (fit,))
+    rounds = [first, Round(model, noisy, close, fit.rho, 1.0)]
+    off = OffNominal({}, case.base)
+    return conclude(Comparison(case, small.MODEL, small.MODEL, null, values, null.mean, (), off, ()), rounds, floor=1.0)
+
+
+def test_beside_a_name_that_leaves_nothing_a_parameter_is_called_off():
+    said = conclusion()
+    assert said.verdict == "named" and said.remainder is None and list(said.parameters) == ["reset_noise"]
+
+
+def test_beside_a_remainder_none_is():
+    said = conclusion(left=LITTLE)
+    print(said.remainder)
+    assert said.verdict == "named" and said.remainder is not None and said.parameters == {}
+
+
+def test_nor_beside_what_no_name_takes():
+    said = conclusion(left=4 * LITTLE)
+    assert said.verdict == "unknown" and said.remainder is None and said.parameters == {}
+
+
+def test_one_that_the_effect_scatters_is_not():
+    assert conclusion(read=100.0).parameters == {}
+
+
+@pytest.mark.parametrize(
+    "ratio, read, scattered", [(1.6, 160.0, True), (1.6, 1.7, False), (5.0, 10.0, False), (5.0, 26.0, True)]
+)
+def test_an_effect_scatters_what_a_refit_of_its_twins_reads_further_off(ratio: float, read: float, scattered: bool):
+    assert is_scattered("reset_noise", {"ratio": ratio}, {"reset_noise": {"ratio": read}}) == scattered
