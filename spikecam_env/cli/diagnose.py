@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
@@ -42,6 +42,8 @@ class Diagnose:
     """Times the campaign may be simulated before nothing more is begun that an answer can do without; inf: no end."""
     static_only: bool = False
     """Of unknown scenes in which something moves, look at the pixels that stand still."""
+    search: Literal["forward", "race"] = "forward"
+    """How effects are looked for: one after another, or as a race over sets of them, which is experimental."""
     outside: bool = False
     """Read files of the campaign that lie outside of its folder too."""
 
@@ -66,6 +68,7 @@ class Diagnose:
                 jobs=self.jobs,
                 effort=self.effort,
                 static_only=self.static_only,
+                search=self.search,
                 progress=True,
             )
             diagnosis.write(folder)
