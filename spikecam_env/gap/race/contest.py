@@ -40,23 +40,31 @@ def contest(problem: Problem, one: Hypothesis, starts: Sequence[Start]) -> tuple
     best = one
     for heat in sorted(heats, key=lambda heat: heat.runners[0].score):
         for runner in heat.runners:
-            if best is not one and not leaves_something(problem, best):
-                break
-            if runner.hope >= best.score or not may_be_joint(problem, runner, first=best is one):
+            settled = best is not one and not leaves_something(problem, best)
+            if settled or not may_beat(problem, runner, best):
                 continue
-            best = min((best, jointly_fitted(problem, runner)), key=lambda h: h.score)
+            if may_be_joint(problem, runner, first=best is one):
+                best = min((best, jointly_fitted(problem, runner)), key=lambda h: h.score)
     return best, [*heats, Heat(tuple(h for h in ready if h.fidelity < Fidelity.SHAPED), ())]
 
 
+def may_beat(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether a hypothesis may leave less than another when all of its parameters are fitted: against one that leaves
+    nothing but chance they promise no more than a tie."""
+    if one.effects == other.effects:
+        return False
+    return one.hope < other.score if leaves_something(problem, other) else one.score < other.score + TIE
+
+
 def shaped_while_open(problem: Problem, one: Hypothesis, waiting: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The hypotheses; of those that may still win against the best and against `one`, all parameters are fitted."""
+    """The hypotheses; of those that may beat `one`, and are no more than a tie behind the best, all parameters are
+    fitted."""
     done = [h for h in waiting if h.fidelity >= Fidelity.SHAPED]
     left = sorted((h for h in waiting if h.fidelity < Fidelity.SHAPED), key=lambda h: h.score)
     while left:
-        best = min(done, key=lambda h: h.score, default=None)
-        least = one.score if best is None else min(best.score + TIE, one.score)
-        explained = best is not None and not leaves_something(problem, best)
-        open_ = [h for h in left if (h.score if explained else h.hope) < least]
+        best = min(done, key=lambda h: h.score, default=one)
+        near = replace(best, misfit=best.misfit + TIE) if leaves_something(problem, best) else best
+        open_ = [h for h in left if may_beat(problem, h, one) and (best is one or may_beat(problem, h, near))]
         if not open_ or not problem.allows(f"{open_[0].newest[-1]} of finer shape", needed=True):
             break
         left.remove(open_[0])

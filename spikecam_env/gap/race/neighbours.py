@@ -75,9 +75,11 @@ class Field:
         return [*dropped, *swapped]
 
     def swapped(self, problem: Problem, one: Hypothesis, name: str, rest: Hypothesis) -> list[Start]:
-        """Another effect in the place of one, whose template removes SHARE of what that does beside the rest."""
+        """Another effect in the place of one, whose template removes SHARE of what that does beside the rest; and that
+        one, to run against them."""
         least = SHARE * (rest.misfit - one.misfit)
-        return [s for s in self.added(problem, rest) if s.removed >= least and s.what != name]
+        others = [s for s in self.added(problem, rest) if s.removed >= least and s.what != name]
+        return [Start(name, 0, partial(incumbent, one, name, rest)), *others] if others else []
 
     def reshaped(self, problem: Problem, one: Hypothesis) -> list[Start]:
         """The newest effect from others of its shapes, which remove SHARE of what its best does."""
@@ -160,6 +162,12 @@ def deviance(here: Problem) -> float:
 def identity(one: Hypothesis) -> Hypothesis:
     """What is simulated already."""
     return one
+
+
+def incumbent(one: Hypothesis, name: str, rest: Hypothesis) -> Hypothesis:
+    """A hypothesis as one that came from the rest of its effects."""
+    own = replace(one.fit, name=name)
+    return replace(one, fit=own, newest=(name,), parent=rest, fidelity=Fidelity.SHAPED)
 
 
 def without(problem: Problem, one: Hypothesis, name: str) -> Hypothesis:

@@ -72,8 +72,10 @@ def may_go_on(problem: Problem, best: Hypothesis) -> bool:
 
 
 def is_better(problem: Problem, found: Hypothesis, best: Hypothesis) -> bool:
-    """Whether a neighbour takes another's place: better by TO_ACCEPT, or by anything where it alone leaves nothing."""
-    if found is best:
+    """Whether a neighbour takes another's place: better by TO_ACCEPT, or by anything where it alone leaves nothing, or
+    has fewer effects.  None that leaves something takes the place of one that leaves nothing."""
+    left, before = leaves_something(problem, found), leaves_something(problem, best)
+    if left and not before:
         return False
-    explains = leaves_something(problem, best) and not leaves_something(problem, found)
-    return found.score < best.score - (0.0 if explains else TO_ACCEPT)
+    by_anything = left < before or len(found.effects) < len(best.effects)
+    return found.score < best.score - (0.0 if by_anything else TO_ACCEPT)

@@ -201,6 +201,16 @@ def test_a_neighbour_is_better_by_more_than_its_price_unless_it_alone_leaves_not
         assert is_better(problem, replace(loud, misfit=best.score - PRICE - margin), best) is better
     assert is_better(problem, replace(silent, misfit=best.score - PRICE - 1.0), best)
     assert not is_better(problem, best, best)
+    assert not is_better(problem, replace(loud, misfit=0.0), silent), "it leaves something, and the other does not"
+
+
+@pytest.mark.parametrize(("worse", "better"), [(PRICE - 1.0, True), (PRICE + 1.0, False)])
+def test_an_effect_is_left_out_where_it_removes_less_than_it_costs(worse, better):
+    problem = problem_of(dead_time=20.0)
+    field_of = Truths(dead_time=20.0, crosstalk=0.0)
+    one = field_of.make(problem, nothing_added(problem), "dead_time")
+    both = field_of.make(problem, one, "crosstalk")
+    assert is_better(problem, replace(one, misfit=both.misfit + worse), both) is better
 
 
 def test_what_predicts_the_same_beside_the_same_parent_is_a_rival():
@@ -229,5 +239,5 @@ def test_an_effect_that_took_anothers_place_is_a_round_without_a_parent():
 
 
 def test_a_search_of_another_name_is_refused():
-    with pytest.raises(InputError, match="blind.*forward.*race"):
+    with pytest.raises(InputError, match=r"blind.*forward.*race"):
         diagnose("nowhere", search="blind")
