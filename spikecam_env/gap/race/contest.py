@@ -49,11 +49,13 @@ def contest(problem: Problem, one: Hypothesis, starts: Sequence[Start]) -> tuple
 
 
 def may_beat(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether a hypothesis may leave less than another when all of its parameters are fitted: against one that leaves
-    nothing but chance they promise no more than a tie."""
+    """Whether a hypothesis may be better than another when all of its parameters are fitted: by what these may remove,
+    where the other leaves something, and by no more than chance where it leaves nothing, or `one` does."""
     if one.effects == other.effects:
         return False
-    return one.hope < other.score if leaves_something(problem, other) else one.score < other.score + TIE
+    something = leaves_something(problem, other)
+    tied = one.score < other.score + TIE and not (something and leaves_something(problem, one))
+    return tied or (something and one.hope < other.score)
 
 
 def shaped_while_open(problem: Problem, one: Hypothesis, waiting: Sequence[Hypothesis]) -> list[Hypothesis]:
