@@ -41,8 +41,9 @@ def ancestor(problem: Problem, one: Hypothesis, effects: tuple[str, ...]) -> Hyp
 
 
 def heat_of(heats: Sequence[Heat], name: str) -> Heat:
-    """The last heat that an effect ran in, an empty one where it never ran as the newest."""
-    return next((h for h in reversed(heats) if any(name in runner.newest for runner in h.runners)), Heat((), ()))
+    """The last heat that an effect ran in as the newest, against others; an empty one where there was none."""
+    ran = [h for h in heats if len(h.runners) > 1 and any(name in runner.newest for runner in h.runners)]
+    return ran[-1] if ran else Heat((), ())
 
 
 def as_round(one: Hypothesis) -> Round:

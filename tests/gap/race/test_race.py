@@ -232,7 +232,9 @@ def test_an_effect_that_took_anothers_place_is_a_round_without_a_parent():
     first = field_of.make(problem, nothing_added(problem), "dead_time")
     orphan = replace(first, parent=None)
     both = field_of.make(problem, orphan, "crosstalk")
-    rounds = rounds_of(problem, both, [Heat((both,), ("photodiode_lag",))], motion_alone=False)
+    other = replace(both, newest=("photodiode_lag",))
+    heats = [Heat((both, other), ("photodiode_lag",)), Heat((both,), ())]
+    rounds = rounds_of(problem, both, heats, motion_alone=False)
     assert [f.name for f, _ in kept(rounds)] == ["dead_time", "crosstalk"]
     assert [r.rivals for r in rounds] == [(), ("photodiode_lag",), ()]
     assert rounds[-1].model is both.fit.model and rounds[1].model is first.fit.model
