@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from spikecam_env.gap.baseline.off_nominal import off_nominal
 from spikecam_env.gap.compare.thresholds import TO_CONFIRM
 from spikecam_env.gap.fit.confirm import confirmed, with_dark_levels_open
 from spikecam_env.gap.fit.joint import refined_together
@@ -43,7 +44,9 @@ def contest(problem: Problem, one: Hypothesis, starts: Sequence[Start]) -> tuple
             settled = best is not one and not leaves_something(problem, best)
             if settled or not may_beat(problem, runner, best):
                 continue
-            if may_be_joint(problem, runner, first=best is one):
+            if runner.fidelity == Fidelity.JOINT:
+                best = min((best, runner), key=lambda h: h.score)
+            elif may_be_joint(problem, runner, first=best is one):
                 best = min((best, jointly_fitted(problem, runner)), key=lambda h: h.score)
     return best, [*heats, Heat(tuple(h for h in ready if h.fidelity < Fidelity.SHAPED), ())]
 
@@ -51,7 +54,7 @@ def contest(problem: Problem, one: Hypothesis, starts: Sequence[Start]) -> tuple
 def may_beat(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
     """Whether a hypothesis may be better than another when all of its parameters are fitted: by what these may remove,
     where the other leaves something, and by no more than chance where it leaves nothing, or `one` does."""
-    if one.effects == other.effects:
+    if one.fit.prediction is other.fit.prediction:
         return False
     something = leaves_something(problem, other)
     tied = one.score < other.score + TIE and not (something and leaves_something(problem, one))
@@ -115,5 +118,13 @@ def jointly_fitted(problem: Problem, one: Hypothesis) -> Hypothesis:
     fit = try_more_draws(problem, fit)
     if fit.prediction.own is not None:
         fit = replace(fit, prediction=with_dark_levels_open(problem, fit.model, fit.base, fit.prediction))
-    misfit = problem.misfit(fit.prediction)
-    return replace(one, fit=fit, misfit=misfit, errors=errors, used_held_out=used_held_out, fidelity=Fidelity.JOINT)
+    misfit, off = problem.misfit(fit.prediction), off_nominal(problem.case, fit.model, fit.base).parameters
+    return replace(
+        one,
+        fit=fit,
+        misfit=misfit,
+        errors=errors,
+        off=tuple(off),
+        used_held_out=used_held_out,
+        fidelity=Fidelity.JOINT,
+    )

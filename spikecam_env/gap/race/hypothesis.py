@@ -44,8 +44,9 @@ class Hypothesis:
     """fit: of all its effects, under the name of the newest.  effects: their names, in the order they were added in.
 
     newest: those that its parent has not.  parent: what they were added to; None of the null model.
-    misfit: deviance under the null model.  errors: of parameters, where they were fitted together.
-    used_held_out: whether the recordings held out were fitted too.
+    misfit: deviance under the null model.  errors: of parameters, where they were fitted together.  off: parameters of
+    the null model that its unit has in another amount, by effect.  used_held_out: whether the recordings held out were
+    fitted too.
     """
 
     fit: Fit
@@ -55,12 +56,18 @@ class Hypothesis:
     parent: Hypothesis | None = None
     fidelity: Fidelity = Fidelity.JOINT
     errors: Errors = field(default_factory=dict)
+    off: tuple[str, ...] = ()
     used_held_out: bool = False
+
+    @property
+    def parameters(self) -> int:
+        """How many it has that the null model has not."""
+        return parameters_of(self.effects) + len(self.off)
 
     @property
     def score(self) -> float:
         """Deviance, and the price of its parameters."""
-        return self.misfit + PRICE * parameters_of(self.effects)
+        return self.misfit + PRICE * self.parameters
 
     @property
     def hope(self) -> float:

@@ -1,4 +1,4 @@
-"""Neighbours of a hypothesis: one effect more, one fewer, one for another, another shape, or two more at once.
+"""Neighbours of a hypothesis: an effect more or fewer, one for another, another shape, two at once, its unit as given.
 
 Each is a function (problem, hypothesis) -> starts.  What they try is of the `Field`: candidates and their templates.
 """
@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.baseline.off_nominal import off_nominal
 from spikecam_env.gap.candidates.table import acting_through, candidate
 from spikecam_env.gap.compare.distance import robust_squares
 from spikecam_env.gap.fit.confirm import confirmed, resettled
@@ -65,6 +66,16 @@ class Field:
         yield self.standing_out(problem, one)
 
     def no_larger(self, problem: Problem, one: Hypothesis) -> list[Start]:
+        """Neighbours with no more parameters."""
+        return [*self.as_given(problem, one), *self.without_one(problem, one)]
+
+    def as_given(self, problem: Problem, one: Hypothesis) -> list[Start]:
+        """The null model's parameters as they are, where the unit has them in another amount: beside an effect that
+        scatters what they are known by, they may be open."""
+        cost = len(one.fit.prediction.draws) * len(problem.case.conditions)
+        return [Start("parameters as given", cost, partial(nominal, problem, one))] if one.off else []
+
+    def without_one(self, problem: Problem, one: Hypothesis) -> list[Start]:
         """One effect left out, and in the place of each but the newest, whose place was run for, another."""
         if len(one.effects) < 2:
             return []
@@ -162,6 +173,13 @@ def deviance(here: Problem) -> float:
 def identity(one: Hypothesis) -> Hypothesis:
     """What is simulated already."""
     return one
+
+
+def nominal(problem: Problem, one: Hypothesis) -> Hypothesis:
+    """A hypothesis with the null model's parameters in its unit, by as many twins."""
+    unit = off_nominal(problem.case, one.fit.model, one.fit.base).nominal
+    fit = confirmed(problem, replace(one.fit, base=unit), len(one.fit.prediction.draws))
+    return replace(one, fit=fit, misfit=problem.misfit(fit.prediction), off=())
 
 
 def incumbent(one: Hypothesis, name: str, rest: Hypothesis) -> Hypothesis:

@@ -73,9 +73,9 @@ def may_go_on(problem: Problem, best: Hypothesis) -> bool:
 
 def is_better(problem: Problem, found: Hypothesis, best: Hypothesis) -> bool:
     """Whether a neighbour takes another's place: better by TO_ACCEPT, or by anything where it alone leaves nothing, or
-    has fewer effects.  None that leaves something takes the place of one that leaves nothing."""
+    has fewer parameters.  None that leaves something takes the place of one that leaves nothing."""
     left, before = leaves_something(problem, found), leaves_something(problem, best)
     if left and not before:
         return False
-    by_anything = left < before or len(found.effects) < len(best.effects)
+    by_anything = left < before or found.parameters < best.parameters
     return found.score < best.score - (0.0 if by_anything else TO_ACCEPT)

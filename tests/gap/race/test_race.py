@@ -10,11 +10,12 @@ from small import MODEL, effect, unit
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap import diagnose
+from spikecam_env.gap.baseline.off_nominal import OffNominal
 from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.race import contest, race
+from spikecam_env.gap.race import contest, neighbours, race
 from spikecam_env.gap.race.contest import TIE, Heat, heats_of, shaped_while_open
 from spikecam_env.gap.race.hypothesis import (
     OPEN,
@@ -25,7 +26,7 @@ from spikecam_env.gap.race.hypothesis import (
     leaves_something,
     nothing_added,
 )
-from spikecam_env.gap.race.neighbours import Start
+from spikecam_env.gap.race.neighbours import Field, Start
 from spikecam_env.gap.race.race import TO_ACCEPT, is_better
 from spikecam_env.gap.race.rounds import rounds_of
 from spikecam_env.gap.statistics import Key
@@ -211,6 +212,27 @@ def test_an_effect_is_left_out_where_it_removes_less_than_it_costs(worse, better
     one = field_of.make(problem, nothing_added(problem), "dead_time")
     both = field_of.make(problem, one, "crosstalk")
     assert is_better(problem, replace(one, misfit=both.misfit + worse), both) is better
+
+
+@pytest.mark.parametrize(("more", "as_given"), [(PRICE - 1.0, True), (PRICE + 1.0, False)])
+def test_a_parameter_of_the_model_is_off_where_that_removes_more_than_it_costs(more, as_given, monkeypatch):
+    problem = problem_of(dead_time=20.0)
+    noisy = replace(unit(), white=9.0 * unit().white)
+    found = Truths(dead_time=20.0).make(problem, nothing_added(problem), "dead_time")
+    off = replace(found, fit=replace(found.fit, base=noisy), off=("reset_noise",), fidelity=Fidelity.JOINT)
+    asked = []
+
+    def confirm(problem, fit, count):
+        asked.append((fit.base.white, count))
+        return replace(fit, prediction=replace(fit.prediction))
+
+    monkeypatch.setattr(neighbours, "confirmed", confirm)
+    monkeypatch.setattr(neighbours, "off_nominal", lambda case, model, base: OffNominal({}, replace(base, white=1e-5)))
+    [start] = Field((), None).no_larger(problem, off)
+    made = replace(start.make(), misfit=off.misfit + more)
+    assert asked == [(1e-5, TWINS)] and made.off == () and made.parameters == off.parameters - 1
+    assert is_better(problem, made, off) is as_given
+    assert Field((), None).no_larger(problem, made) == []
 
 
 def test_what_predicts_the_same_beside_the_same_parent_is_a_rival():
