@@ -184,8 +184,9 @@ def test_a_runner_up_is_fitted_jointly_where_the_winner_leaves_something(no_twin
         monkeypatch.setattr(contest, "heats_of", lambda p, ready: [Heat(tuple(ready), ())])
         winner = Truths(dead_time=20.0).make(problem, nothing_added(problem), "dead_time")
         both = ("dead_time", "crosstalk")
+        another = replace(winner.fit, prediction=replace(winner.fit.prediction))
         hopeful = replace(
-            winner, misfit=winner.misfit + 1.0, fidelity=Fidelity.SHAPED, effects=both, newest=("crosstalk",)
+            winner, fit=another, misfit=winner.misfit + 1.0, fidelity=Fidelity.SHAPED, effects=both, newest=both[1:]
         )
         starts = [Start("", 0, lambda h=h: h) for h in (replace(winner, fidelity=Fidelity.SHAPED), hopeful)]
         contest.contest(problem, nothing_added(problem), starts)
