@@ -125,6 +125,7 @@ def diagnose(
         effect_files=files_of((*names, *(effect.name for effect in tested.effects))),
         motion=found.motion,
         static_only=static_only,
+        search=search,
     )
 
 
