@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
@@ -42,6 +42,8 @@ class Diagnose:
     """Budget: how often the campaign may be simulated before optional steps are skipped; inf for no limit."""
     static_only: bool = False
     """In unknown scenes with motion, use only the pixels in which nothing moves."""
+    search: Literal["forward", "race"] = "forward"
+    """How effects are looked for: one after another, or as a race over sets of them, which is experimental."""
     outside: bool = False
     """Also read files of the campaign that lie outside its folder."""
 
@@ -66,6 +68,7 @@ class Diagnose:
                 jobs=self.jobs,
                 effort=self.effort,
                 static_only=self.static_only,
+                search=self.search,
                 progress=True,
             )
             diagnosis.write(folder)

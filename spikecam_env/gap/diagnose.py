@@ -17,7 +17,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
 from spikecam_env.gap.baseline.label_audit import audit, upheld
@@ -33,6 +33,7 @@ from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
+from spikecam_env.gap.race.race import race
 from spikecam_env.gap.report.evidence import evidence_for
 from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
@@ -50,6 +51,9 @@ from spikecam_env.gap.verdict.verdict import conclude, with_stand_ins
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.own_effects import files_of
 
+SEARCHES = {"forward": forward_selection, "race": race}
+"""Searches by name: (problem, names of candidates, templates) -> rounds."""
+
 
 @sums_in_one_order
 def diagnose(
@@ -64,6 +68,7 @@ def diagnose(
     twin_count: int = 12,
     templates: Templates | None = None,
     static_only: bool = False,
+    search: str = "forward",
     progress: bool = True,
 ) -> Diagnosis:
     """Find where a measured campaign and a model disagree, which effect is missing, and how large it is.
@@ -72,9 +77,12 @@ def diagnose(
     candidates: names to try, default the whole catalogue; exclude: names to leave out.  Same seed, same answer.
     jobs: threads, which change no bit.  effort: times the campaign may be simulated before nothing more is begun that
     an answer can do without, such as a third effect; infinite for whatever it takes.  static_only: of unknown scenes
-    that move, look at the pixels that do not.  Raises InputError for an
-    unreadable campaign, an unknown name, no effort, or too few static recordings of known light to refit the unit by.
+    that move, look at the pixels that do not.  search: `forward`, or `race`, which is experimental.  Raises InputError
+    for an unreadable campaign, an unknown name, no effort, or too few static recordings of known light to refit the
+    unit by.
     """
+    if search not in SEARCHES:
+        raise unknown_name("search", search, SEARCHES)
     if not effort > 0:
         raise InputError(f"effort {effort:g}: it must be above 0")
     stages = Stages(progress)
@@ -83,7 +91,7 @@ def diagnose(
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
-        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only)
+        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only, search)
         found = of_spikes(measured, tested, asked, templates, stages)
     else:
         with stages.timed("maps"):
@@ -118,6 +126,7 @@ def diagnose(
         motion=found.motion,
         static_only=static_only,
         remainder=conclusion.remainder,
+        search=search,
     )
 
 
@@ -144,6 +153,7 @@ class Asked:
     effort: float
     twin_count: int
     static_only: bool = False
+    search: str = "forward"
 
 
 def of_spikes(
@@ -166,7 +176,8 @@ def of_spikes(
         with stages.timed("templates"):
             templates = templates or templates_for(comparison, stages.progress)
         with stages.timed("candidates"):
-            rounds = forward_selection(Problem.of(case, comparison.model, null, values), comparison.names, templates)
+            problem = Problem.of(case, comparison.model, null, values)
+            rounds = SEARCHES[asked.search](problem, comparison.names, templates)
             rounds = with_stand_ins(case, null, values, rounds)
     with stages.timed("verdict"):
         conclusion = conclude(comparison, rounds, floor_of_halves(case, measured.recordings, null))

@@ -241,7 +241,7 @@ class Diagnosis:
     candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
     simulated.  simulated: recordings that were, but for the page's own.  effect_files: of a user's own effects, among
     the model's and those that were tried.  motion: of recordings said to be static; static_only: whether the pixels
-    that move were left out.
+    that move were left out.  search: by what search it was found.
     """
 
     verdict: str
@@ -271,6 +271,7 @@ class Diagnosis:
     motion: tuple[Motion, ...] = ()
     static_only: bool = False
     remainder: Remainder | None = None
+    search: str = "forward"
 
     @property
     def static_share(self) -> float:

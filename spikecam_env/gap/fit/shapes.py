@@ -42,14 +42,16 @@ def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> 
     return [f for f in fits if candidate(f.name).has_shapes and f.misfit < min(near, enough)]
 
 
-def with_fitted_shapes(problem: Problem, found: Fit) -> Fit:
-    """The fit with all that is fitted of its candidate at its best."""
-    only = problem.affected([found.name], found.prediction.mean - problem.null.mean)
+def with_fitted_shapes(problem: Problem, found: Fit, names: Sequence[str] = ()) -> Fit:
+    """The fit with all that is fitted of its candidate at its best; or of several effects `names`, at once."""
+    names = names or (found.name,)
+    only = problem.affected(names, found.prediction.mean - problem.null.mean)
+    count = max(twins_of(name) for name in names)
 
     def probe(there: SensorModel, base: BaseFit) -> Prediction:
-        return problem.predict(there, constrained_refit(there, base), twins_of(found.name), only)
+        return problem.predict(there, constrained_refit(there, base), count, only)
 
-    free = [(found.name, key) for key in candidate(found.name).fitted]
+    free = [(name, key) for name in names for key in candidate(name).fitted]
     end = descend(problem, probe, found.model, found.base, free, TO_STEP_SHAPE)
     shaped = where_ended(problem, found, end, free)
     return found if shaped.misfit > found.misfit else shaped

@@ -57,6 +57,8 @@ def command_of(d: Diagnosis) -> str:
         words.append(f"--effort {d.effort:g}")
     if d.static_only:
         words.append("--static-only")
+    if d.search != "forward":
+        words.append(f"--search {d.search}")
     return " ".join(words)
 
 
