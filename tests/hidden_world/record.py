@@ -36,7 +36,9 @@ def unpack(record: Path, out: Path, ids: Collection[str]) -> int:
     lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
     results = [_result(line, record) for line in lines]
     if others := {r["id"] for r in results} - set(ids):
-        raise ValueError(f"{record} is of another trial (other set or part): it has {min(others)}; take another file")
+        raise ValueError(
+            f"{record} is of another trial (other set, part or cases): it has {min(others)}; take another file"
+        )
     lacking = [r for r in results if not is_done(out, r["id"])]
     for result in lacking:
         write_whole(out / "results" / f"{result['id']}.json", json.dumps(result, indent=1) + "\n")

@@ -27,7 +27,7 @@ from typing import Any
 
 from tests.hidden_world.cases import GROUPS, Case, cases
 from tests.hidden_world.keys import open_key, seal, write_whole
-from tests.hidden_world.score import Figure, Scored, by_effect, confusion, figures, score_case
+from tests.hidden_world.score import Figure, Scored, by_category, by_effect, confusion, figures, score_case
 from tests.hidden_world.world import write_campaign
 
 Diagnose = Callable[[Path, str, Path, int, "tuple[str, ...]", int], "dict[str, Any]"]
@@ -163,6 +163,7 @@ def score_trial(out: Path, picked: Sequence[Case]) -> dict[str, Any]:
         "errors": sum(bool(s.error) for s in scored),
         "code": dict(by),
         "figures": [{**asdict(f), "met": f.met} for f in made],
+        "categories": by_category(scored),
         "effects": by_effect(scored),
         "confusion": confusion(scored),
         "scored": [asdict(s) for s in scored],
@@ -197,6 +198,9 @@ def as_text(trial: dict[str, Any]) -> str:
         f"Diagnosed by {', '.join(f'{name} ({count})' for name, count in trial['code'].items()) or 'nobody'}.",
         "",
         _table(rows),
+        "## By category and law",
+        "",
+        _table(trial["categories"]),
         "## By effect: right of tried, by group",
         "",
         _table(
@@ -207,9 +211,15 @@ def as_text(trial: dict[str, Any]) -> str:
         _table(matrix),
         "## Not right",
         "",
-        _table([{"id": s["id"], "group": s["group"], "true": s["what"], "said": s["answer"]} for s in wrong]),
+        _table([{"id": s["id"], "group": s["group"], "true": _hidden(s), "said": s["answer"]} for s in wrong]),
     ]
     return "\n".join(lines)
+
+
+def _hidden(scored: dict[str, Any]) -> str:
+    """What a case hides, far laws named."""
+    laws = ", ".join(law for law in scored["laws"] if law)
+    return f"{scored['what']} ({laws})" if laws else scored["what"]
 
 
 def _table(rows: Sequence[dict[str, Any]], columns: Sequence[str] = ()) -> str:
