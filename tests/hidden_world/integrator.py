@@ -143,8 +143,8 @@ class Physics:
     dead: float = 0.0
     dead_by_light: float = 0.0
     """of dead time, by charge a frame"""
-    reset_share: Array | None = None
-    """(P,) factor on the dead time, and the held charge, of each pixel"""
+    dead_share: Array | None = None
+    """(P,) factor on the dead time of each pixel"""
     delay: float = 0.0
     """c of a delay c / x^delay_power"""
     delay_power: float = 0.5
@@ -310,7 +310,7 @@ class Recording:
             quiet=ph.quiet,
             kappa=ph.kappa,
             per_mv=ph.per_mv,
-            share=np.ones(count) if ph.reset_share is None else ph.reset_share,
+            share=np.ones(count) if ph.dead_share is None else ph.dead_share,
         )
         self.dark = ph.dark.copy()
         self.late = [ph.gain * ph.key_light[0].astype(np.float64) for _ in ph.lags]

@@ -32,6 +32,10 @@ else:
 Parameters: TypeAlias = dict[str, float]
 Rng: TypeAlias = np.random.Generator
 Bits: TypeAlias = NDArray[np.uint8]
+OnCamera: TypeAlias = Callable[[Camera, Parameters, Rng], Camera]
+OnLight: TypeAlias = Callable[[Light, tuple[int, int], Parameters], Light]
+OnPhysics: TypeAlias = Callable[[Physics, Camera, int, Parameters, Rng], None]
+OnBits: TypeAlias = Callable[[Bits, Parameters, Rng], Bits]
 
 
 @dataclass(frozen=True)
@@ -44,10 +48,10 @@ class Law:
     name: str
     law: str
     shape: Callable[[Rng], Parameters] = lambda rng: {}
-    camera: Callable[[Camera, Parameters, Rng], Camera] | None = None
-    light: Callable[[Light, tuple[int, int], Parameters], Light] | None = None
-    physics: Callable[[Physics, Camera, int, Parameters, Rng], None] | None = None
-    bits: Callable[[Bits, Parameters, Rng], Bits] | None = None
+    camera: OnCamera | None = None
+    light: OnLight | None = None
+    physics: OnPhysics | None = None
+    bits: OnBits | None = None
     source: str = ""
 
 

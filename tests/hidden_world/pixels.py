@@ -29,7 +29,7 @@ class Pixels(NamedTuple):
 
     charge [thresholds]; owed: mean charge of which the noise has not been drawn; threshold: of this cycle; blind:
     frames that the node is held from now; late: whether a spike is due when it is let go; last: its last crossing;
-    ramp: sensitivity lost; parity: of its cycle.  share: of dead time and held charge, that is this pixel's.
+    ramp: sensitivity lost; parity: of its cycle.  share: of the dead time, that is this pixel's.
     """
 
     charge: Array
@@ -580,7 +580,7 @@ def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
         work.open[i] = at + held
     waits = laws.hold_loss > 0.0 and work.kept[i] == 1.0
     if waits and (laws.hold_chance >= 1.0 or _uniform(random) < laws.hold_chance):
-        work.kept[i] = 1.0 - laws.hold_loss * pixels.share[p]
+        work.kept[i] = 1.0 - laws.hold_loss
         over *= work.kept[i]
     left = laws.left_always
     if laws.left_fraction != 0.0:

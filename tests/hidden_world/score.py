@@ -16,7 +16,6 @@ Rules
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -73,8 +72,8 @@ SHOWN = 1.5
 class Scored:
     """A case and what came of it.
 
-    laws: of each hidden effect, the name of a far one, empty for the near.  answer: the label of its column in the
-    confusion matrix.  spurious: names that stand for nothing hidden; off: those of them that are parameters only.
+    laws: of each hidden effect, the name of a far one, empty for the near.  answer: what was said, in short.
+    spurious: names that stand for nothing hidden; off: those of them that are parameters only.
     """
 
     id: str
@@ -374,15 +373,6 @@ def by_category(scored: Sequence[Scored]) -> list[Json]:
                 "slowest [s]": f"{max(seconds):.0f}",
             })  # fmt: skip
     return rows
-
-
-def confusion(scored: Sequence[Scored]) -> dict[str, dict[str, int]]:
-    """True (rows) against answered (columns), counts; outside and withheld mechanisms are marked so."""
-    rows: dict[str, Counter[str]] = {}
-    mark = {"outside": " (outside)", "left_out": " (name withheld)", "tricky": " (tricky)"}
-    for s in scored:
-        rows.setdefault(s.what + mark.get(s.group, ""), Counter())[s.answer] += 1
-    return {row: dict(rows[row]) for row in sorted(rows)}
 
 
 def by_effect(scored: Sequence[Scored]) -> list[Json]:

@@ -21,7 +21,6 @@ from tests.hidden_world.score import (
     FAMILIES,
     binomial_90,
     by_category,
-    confusion,
     family_of,
     figures,
     is_covered,
@@ -299,12 +298,6 @@ def test_a_share_of_a_gap_that_is_hardly_above_its_floor_is_not_scored():
     assert [answered(case, "named", "dead_time", gap=gap).removed for gap in gaps] == [None, 0.3]
 
 
-def test_confusion_counts_true_against_answered():
-    none, strong = case_of("none"), case_of("strong", "dead_time")
-    some = [answered(none, "none"), answered(none, "named", "dead_time"), answered(strong, "named", "dead_time")]
-    assert confusion(some) == {"nothing": {"none": 1, "dead_time": 1}, "dead_time": {"dead_time": 1}}
-
-
 def test_binomial_interval_is_clopper_pearson():
     low, high = binomial_90(57, 60)
     assert low == pytest.approx(0.8761, abs=2e-3) and high == pytest.approx(0.9863, abs=2e-3)
@@ -357,7 +350,7 @@ def test_a_run_goes_on_where_it_stopped(tmp_path):
     assert not any((tmp_path / "campaigns").iterdir())
     scored = score_trial(tmp_path, picked)
     assert scored["cases"] == 4 and scored["errors"] == 0
-    assert scored["confusion"]["nothing"] == {"dead_time": 2}
+    assert [s["answer"] for s in scored["scored"] if s["what"] == "nothing"] == ["dead_time"] * 2
     page = (tmp_path / "trial.md").read_text()
     assert page == as_text(scored) and "false alarms, nothing hidden | 100 % | 22 - 100 %" in page
 

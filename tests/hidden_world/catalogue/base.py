@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 from tests.hidden_world.catalogue.drawing import Array, swung
 from tests.hidden_world.catalogue.threshold import uneven_draw, wide_draw
-from tests.hidden_world.mechanism import Law, Mechanism, Parameters, Rng
+from tests.hidden_world.mechanism import Law, Mechanism, OnCamera, Parameters, Rng
 from tests.hidden_world.unit import SWING_V, Camera
 
 SMOOTH = 1 / 16
@@ -38,7 +38,7 @@ def _shot_noise(camera: Camera, p: Parameters, rng: Rng) -> Camera:
     return replace(camera, quiet=phi0 / camera.phi_fc / p["quanta"])
 
 
-def _gain(pattern: Pattern) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _gain(pattern: Pattern) -> OnCamera:
     return lambda camera, p, rng: replace(
         camera, gain=camera.gain * np.maximum(1.0 + p["sigma"] * pattern(rng, camera.shape), 0.0)
     )
@@ -53,7 +53,7 @@ def _warmer_on_one_side(camera: Camera, p: Parameters, rng: Rng) -> Camera:
     return replace(camera, dark=camera.dark + camera.charge_of(p["mean_pA"]) * slope)
 
 
-def _dark_spread(pattern: Pattern) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _dark_spread(pattern: Pattern) -> OnCamera:
     def spread(camera: Camera, p: Parameters, rng: Rng) -> Camera:
         extra = pattern(rng, camera.shape) * camera.charge_of(p["sigma_pA"])
         return replace(camera, dark=np.maximum(camera.dark + extra, 0.0))
@@ -61,7 +61,7 @@ def _dark_spread(pattern: Pattern) -> Callable[[Camera, Parameters, Rng], Camera
     return spread
 
 
-def _capacitor(pattern: Pattern) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _capacitor(pattern: Pattern) -> OnCamera:
     def spread(camera: Camera, p: Parameters, rng: Rng) -> Camera:
         capacitance = camera.phi_fc / SWING_V
         changed = swung(camera, 1.0 + p["sigma_fF"] / capacitance * pattern(rng, camera.shape))
@@ -70,7 +70,7 @@ def _capacitor(pattern: Pattern) -> Callable[[Camera, Parameters, Rng], Camera]:
     return spread
 
 
-def _bias(pattern: Pattern) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _bias(pattern: Pattern) -> OnCamera:
     return lambda camera, p, rng: swung(camera, 1.0 + 1e3 * p["sigma_V"] * camera.per_mv * pattern(rng, camera.shape))
 
 

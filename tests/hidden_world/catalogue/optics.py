@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from scipy.ndimage import convolve1d
 from tests.hidden_world.catalogue.drawing import between, lines, shape
 from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light
-from tests.hidden_world.mechanism import Law, Mechanism, Parameters, Rng
+from tests.hidden_world.mechanism import Law, Mechanism, OnCamera, Parameters, Rng
 from tests.hidden_world.unit import FRAME_S, Camera
 from tests.hidden_world.waves import Polygon, Sine, Square
 
@@ -83,7 +82,7 @@ def _halo(light: Light, shape: tuple[int, int], p: Parameters) -> Light:
     return Light(light.key_frame, light.radiance + share * (wide - light.radiance))
 
 
-def _falls_off(power: int, centre: tuple[str, ...] = ()) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _falls_off(power: int, centre: tuple[str, ...] = ()) -> OnCamera:
     """alpha (1 - v (r / r_corner)^power), never below a twentieth.
 
     centre: parameters by which it is off along columns and rows, in half of the height and width.

@@ -21,7 +21,7 @@ from tests.hidden_world.catalogue.drawing import (
     whole,
 )
 from tests.hidden_world.integrator import Physics
-from tests.hidden_world.mechanism import Law, Mechanism, Parameters, Rng
+from tests.hidden_world.mechanism import Law, Mechanism, OnCamera, OnPhysics, Parameters, Rng
 from tests.hidden_world.unit import FRAME_S, Camera
 from tests.hidden_world.waves import Polygon, Rise
 
@@ -33,7 +33,7 @@ RARELY_UP = 0.2
 """Share of its time that a trap of unequal dwells is up."""
 
 
-def _response(law: Callable[[Array, float], Array]) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _response(law: Callable[[Array, float], Array]) -> OnPhysics:
     """The charge of a frame's light goes through a curve."""
 
     def bend(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -42,7 +42,7 @@ def _response(law: Callable[[Array, float], Array]) -> Callable[[Physics, Camera
     return bend
 
 
-def _lag(fills_at_once: bool) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _lag(fills_at_once: bool) -> OnPhysics:
     def lag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
         ph.lags, ph.substeps = ((p["fraction"], frames_of(p["tau_us"])),), max(ph.substeps, LAG_SUBSTEPS)
         ph.lag_fills_at_once = fills_at_once
@@ -50,7 +50,7 @@ def _lag(fills_at_once: bool) -> Callable[[Physics, Camera, int, Parameters, Rng
     return lag
 
 
-def _blooms(*ways: tuple[int, int]) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _blooms(*ways: tuple[int, int]) -> OnPhysics:
     """To the pixels so many rows and columns away, in equal parts."""
 
     def bloom(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -66,17 +66,21 @@ def _saturating(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rn
     ph.dark_waves += (Rise(p["rise"], p["tau_ms"] * 1e-3 / FRAME_S),)
 
 
-def _linear(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.dark_waves += (Polygon(np.array([0.0, frames]), np.array([1.0, 1.0 + p["rise"]])),)
+def _through(factor: Callable[[Array], Array]) -> OnPhysics:
+    """A factor on the dark current, of `rise` times the share of the recording that is over."""
+
+    def drift(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
+        over = np.linspace(0.0, 1.0, 65)
+        ph.dark_waves += (Polygon(frames * over, factor(p["rise"] * over)),)
+
+    return drift
 
 
 def _running_on(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
     ph.dark_waves += (Rise(p["rise"], WARM_UP_RECORDINGS * frames, begin=-ph.before),)
 
 
-def _hot(
-    where: Callable[[Camera, float, Rng], Whole], current: Callable[[float, int, Rng], Array]
-) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _hot(where: Callable[[Camera, float, Rng], Whole], current: Callable[[float, int, Rng], Array]) -> OnCamera:
     def heat(camera: Camera, p: Parameters, rng: Rng) -> Camera:
         dark, at = camera.dark.copy(), where(camera, p["fraction"], rng)
         dark.flat[at] += current(p["mean_pA"], at.size, rng) * camera.charge_of(1.0).flat[at]
@@ -93,14 +97,12 @@ def _power_law(mean: float, size: int, rng: Rng) -> Array:
     return mean * (PARETO - 1.0) / PARETO * (1.0 + rng.pareto(PARETO, size))
 
 
-def _tail(factor: Callable[[float, tuple[int, int], Rng], Array]) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _tail(factor: Callable[[float, tuple[int, int], Rng], Array]) -> OnCamera:
     """Each pixel's dark current times a factor of its own."""
     return lambda camera, p, rng: replace(camera, dark=camera.dark * factor(p["sigma"], camera.shape, rng))
 
 
-def _telegraph(
-    size: Callable[[Camera, Whole, float, Rng], Array], up_share: float = 0.5
-) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _telegraph(size: Callable[[Camera, Whole, float, Rng], Array], up_share: float = 0.5) -> OnPhysics:
     """Each trap leaves its state after exponential times, at any moment; which pixels have one is in the key."""
 
     def switch(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -177,8 +179,10 @@ MECHANISMS = (
         shape(tau_ms=log_uniform(20.0, 120.0)),
         physics=_saturating,
         far=(
-            Law("linear", "I (1 + a t / T), fresh in each recording of length T", physics=_linear,
-                source="the first order of any slow change"),
+            Law("linear", "I (1 + a t / T), fresh in each recording of length T",
+                physics=_through(lambda rise: 1.0 + rise), source="the first order of any slow change"),
+            Law("exponential", "I exp(a t / T), fresh in each recording", physics=_through(np.exp),
+                source="Janesick, Scientific CCDs (2001): dark current doubles every few kelvin"),
             Law("running on", "I (1 + a (1 - exp(-t / 3 T))), t from the first recording on", physics=_running_on,
                 source="Newton's law of cooling: a camera that warms up once"),
         ),

@@ -21,10 +21,10 @@ from tests.hidden_world.catalogue.drawing import (
     whole,
 )
 from tests.hidden_world.integrator import Physics
-from tests.hidden_world.mechanism import Bits, Law, Mechanism, Parameters, Rng
+from tests.hidden_world.mechanism import Bits, Law, Mechanism, OnBits, OnCamera, OnPhysics, Parameters, Rng
 from tests.hidden_world.unit import Camera
 
-WANDER = 0.7
+WANDER = 0.5
 """What a loop that locks to a reference keeps of its error from frame to frame."""
 FAINT = 0.05
 """What an almost dead pixel has left of its gain."""
@@ -32,7 +32,7 @@ GLITCH = 8
 """Pixels side by side that a glitch of a row's bus makes spikes of."""
 
 
-def _jitters(edges: Callable[[Rng, int, Parameters], Array]) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _jitters(edges: Callable[[Rng, int, Parameters], Array]) -> OnPhysics:
     """Edges of variance one."""
 
     def move(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -53,9 +53,7 @@ def _spur(rng: Rng, count: int, p: Parameters) -> Array:
     return np.sqrt(2.0) * np.sin(2.0 * np.pi * (np.arange(count) / p["period_frames"] + rng.random()))
 
 
-def _dies(
-    where: Callable[[Camera, float, Rng], Whole], left: float = 0.0
-) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _dies(where: Callable[[Camera, float, Rng], Whole], left: float = 0.0) -> OnCamera:
     """So much of gain and dark current left to some pixels."""
 
     def kill(camera: Camera, p: Parameters, rng: Rng) -> Camera:
@@ -66,7 +64,7 @@ def _dies(
     return kill
 
 
-def _reads(order: Callable[[NDArray[np.int64], int], Array]) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _reads(order: Callable[[NDArray[np.int64], int], Array]) -> OnPhysics:
     """`order`: 0 (the first read) .. 1 (at the frame's end) of each row; upwards where span is negative."""
 
     def read(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -127,7 +125,7 @@ def _adds_glitches(bits: Bits, p: Parameters, rng: Rng) -> Bits:
     return bits
 
 
-def _repeats(delays: Callable[[Rng, Parameters, int], Whole]) -> Callable[[Bits, Parameters, Rng], Bits]:
+def _repeats(delays: Callable[[Rng, Parameters, int], Whole]) -> OnBits:
     def again(bits: Bits, p: Parameters, rng: Rng) -> Bits:
         at = chosen(bits, p["probability"], rng)
         at = at + delays(rng, p, at.size) * bits[0].size
@@ -177,7 +175,7 @@ MECHANISMS = (
         "each read-out early or late by itself",
         physics=_jitters(_white),
         far=(
-            Law("wandering", "AR(1): 0.7 of an edge's error is in the next one's", physics=_jitters(_wandering),
+            Law("wandering", "AR(1): 0.5 of an edge's error is in the next one's", physics=_jitters(_wandering),
                 source="Gardner, Phaselock Techniques: jitter within the loop's bandwidth"),
             Law("spur", "a sine of 2.5 to 8 frames", shape(period_frames=log_uniform(2.5, 8.0)),
                 physics=_jitters(_spur), source="Gardner, Phaselock Techniques: a reference spur"),

@@ -19,12 +19,12 @@ from tests.hidden_world.catalogue.drawing import (
     swung,
 )
 from tests.hidden_world.integrator import Physics
-from tests.hidden_world.mechanism import Law, Mechanism, Parameters, Rng
+from tests.hidden_world.mechanism import Law, Mechanism, OnCamera, OnPhysics, Parameters, Rng
 from tests.hidden_world.unit import FRAME_S, SWING_V, Camera
 from tests.hidden_world.waves import Clock, Sine, SlewingClock
 
-KEPT = 0.8
-"""Of a frame's noise, in the next one, where noise has a memory: 4.5 frames."""
+KEPT = 0.6
+"""Of a frame's noise, in the next one, where noise has a memory: a time constant of two frames."""
 BURSTS = 0.05
 """Share of the frames in which noise that comes in bursts is there."""
 
@@ -48,18 +48,18 @@ def _alternating(rng: Rng, size: int) -> Array:
     return rng.choice([-1.0, 1.0]) * (-1.0) ** np.arange(size)
 
 
-def _on_swing(lines: Callable[[Camera, float, Rng], Array]) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _on_swing(lines: Callable[[Camera, float, Rng], Array]) -> OnCamera:
     return lambda camera, p, rng: swung(camera, 1.0 + lines(camera, p["sigma_mV"], rng) * camera.per_mv)
 
 
-def _on_gain(lines: Callable[[Camera, float, Rng], Array]) -> Callable[[Camera, Parameters, Rng], Camera]:
+def _on_gain(lines: Callable[[Camera, float, Rng], Array]) -> OnCamera:
     """Of light alone, relative as sigma over the swing."""
     return lambda camera, p, rng: replace(
         camera, gain=camera.gain * (1.0 + lines(camera, p["sigma_mV"], rng) * 1e-3 / SWING_V)
     )
 
 
-def _ripples(*harmonics: tuple[float, float]) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _ripples(*harmonics: tuple[float, float]) -> OnPhysics:
     """(share, multiple of the frequency) of each sine on all thresholds, in one phase."""
 
     def ripple(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -75,7 +75,7 @@ def _ripple_of_reset(ph: Physics, camera: Camera, frames: int, p: Parameters, rn
     ph.substeps = max(ph.substeps, RESET_SUBSTEPS)
 
 
-def _clock(kind: type[Clock]) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _clock(kind: type[Clock]) -> OnPhysics:
     """Just after its edge the reference is off by amplitude_mV, below 0 where it falls."""
 
     def feed(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -111,7 +111,7 @@ def _by_row_with_memory(rng: Rng, frames: int, rows: int) -> Array:
     return followed(rng.standard_normal((frames, rows)), KEPT)
 
 
-def _rows(noise: Callable[[Rng, int, int], Array]) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _rows(noise: Callable[[Rng, int, int], Array]) -> OnPhysics:
     """Noise of (frames, rows), of variance one."""
 
     def add(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -121,7 +121,7 @@ def _rows(noise: Callable[[Rng, int, int], Array]) -> Callable[[Physics, Camera,
     return add
 
 
-def _flicker(exponent: float) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _flicker(exponent: float) -> OnPhysics:
     """S(f) ~ f^-exponent from six Lorentzians two octaves apart; of 1/f (sigma^2 / ln 2) / f, two octaves each."""
 
     def add(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -146,16 +146,14 @@ def _each_its_own(rng: Rng, shape: tuple[int, int]) -> Array:
     return np.sqrt(rng.exponential(1.0, shape))
 
 
-def of_a_reset(sizes: Callable[[Rng, tuple[int, int]], Array]) -> Callable[[Camera, Parameters, Rng], Camera]:
+def of_a_reset(sizes: Callable[[Rng, tuple[int, int]], Array]) -> OnCamera:
     """A wider draw at each reset, by so much in each pixel."""
     return lambda camera, p, rng: replace(
         camera, kappa=np.hypot(camera.kappa, p["sigma_mV"] * sizes(rng, camera.shape) * camera.per_mv)
     )
 
 
-def _of_a_frame(
-    sizes: Callable[[Rng, tuple[int, int]], Array],
-) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _of_a_frame(sizes: Callable[[Rng, tuple[int, int]], Array]) -> OnPhysics:
     def add(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
         which = np.random.default_rng(int(p.get("which", 0.0)))
         ph.frame_noise_mv = p["sigma_mV"] * sizes(which, camera.shape).reshape(-1)
@@ -166,7 +164,7 @@ def _of_a_frame(
 # ---- the supply of a row
 
 
-def _drops(axis: int, rises: bool = False) -> Callable[[Physics, Camera, int, Parameters, Rng], None]:
+def _drops(axis: int, rises: bool = False) -> OnPhysics:
     """By the share of the pixel's row (axis 1) or column (axis 0) that fired in the frame before.
 
     rises: from nothing at the pad to twice the mean at the other end.
@@ -216,7 +214,7 @@ MECHANISMS = (
         "one draw a frame for all",
         physics=_rows(_common),
         far=(
-            Law("with memory", "AR(1): 0.8 of it is there in the next frame", physics=_rows(_common_with_memory),
+            Law("with memory", "AR(1): 0.6 of it is there in the next frame", physics=_rows(_common_with_memory),
                 source=f"{_NOISE}: low-pass filtered"),
             Law("bursts", "in one frame of twenty, sqrt(20) times as large", physics=_rows(_common_bursts),
                 source="impulsive interference: Middleton class A"),
@@ -228,7 +226,7 @@ MECHANISMS = (
         physics=_rows(_by_row),
         far=(
             Law("pairs of rows", "one draw a frame and two rows", physics=_rows(_by_pair_of_rows), source=_ROWS),
-            Law("with memory", "AR(1): 0.8 of it is there in the next frame", physics=_rows(_by_row_with_memory),
+            Law("with memory", "AR(1): 0.6 of it is there in the next frame", physics=_rows(_by_row_with_memory),
                 source=f"{_NOISE}: low-pass filtered"),
         ),
     ),
