@@ -40,14 +40,15 @@ OnBits: TypeAlias = Callable[[Bits, Parameters, Rng], Bits]
 
 @dataclass(frozen=True)
 class Law:
-    """One form that a mechanism may have.  law: one line.  shape: draws every parameter but the strength.
+    """One form that a mechanism may have.  law: one line.
 
-    source: where the form is from, of those that are far.
+    shape: draws every parameter but the strength; of a far law without one, that of the near.  source: of a far law,
+    where it is from.
     """
 
     name: str
     law: str
-    shape: Callable[[Rng], Parameters] = lambda rng: {}
+    shape: Callable[[Rng], Parameters] | None = None
     camera: OnCamera | None = None
     light: OnLight | None = None
     physics: OnPhysics | None = None
@@ -69,6 +70,11 @@ class Mechanism(Law):
     def by(self, law: str) -> Law:
         """Its near law for "", else the far one of this name; raises KeyError if there is none."""
         return {"": self, **{other.name: other for other in self.far}}[law]
+
+    def drawn(self, law: str, rng: Rng) -> Parameters:
+        """Every parameter but the strength, by one of its laws."""
+        shape = self.by(law).shape or self.shape
+        return shape(rng) if shape else {}
 
 
 @dataclass(frozen=True)
@@ -122,7 +128,7 @@ def draw(mechanism: Mechanism, times_limit: float, rng: Rng, law: str = "") -> H
     """The mechanism at a strength by one of its laws, its other parameters drawn."""
     limit = limits()[mechanism.name]
     strength = limit.strength(times_limit) * _sign(mechanism.signs, rng)
-    parameters = {limit.parameter: float(strength), **mechanism.by(law).shape(rng)}
+    parameters = {limit.parameter: float(strength), **mechanism.drawn(law, rng)}
     return Hidden(mechanism.name, parameters, float(times_limit), law=law)
 
 

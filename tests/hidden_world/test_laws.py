@@ -84,7 +84,7 @@ def test_every_far_law_has_a_claim():
 def test_far_law_is_as_computed_and_the_near_one_is_not(name, law):
     mechanism = MECHANISMS[name]
     p = {limits()[name].parameter: strongest(name)}
-    p |= mechanism.shape(stream(1, name)) | mechanism.by(law).shape(stream(1, name))
+    p |= mechanism.drawn("", stream(1, name)) | mechanism.drawn(law, stream(1, name))
     away = []
     for by in (law, ""):
         value, expected, sd = (np.asarray(x, float) for x in CLAIMS[name, law](Bench(name, by, p)))

@@ -365,19 +365,22 @@ def test_a_diagnosis_that_breaks_is_counted_and_tried_again(tmp_path):
 
 
 def test_a_record_holds_a_trial_to_be_scored_and_gone_on_with(tmp_path):
-    picked = [small(c) for c in chosen("full", "tune", ["none", "strong"], 1)]
+    far = next(c for c in LAWS["tune"] if c.group == "strong" and c.recipe.hidden[0].law)
+    picked = [small(c) for c in (far, next(c for c in LAWS["tune"] if c.group == "none"))]
     said, first, second = "tests.hidden_world.bench:says_dead_time", tmp_path / "first", tmp_path / "second"
     record, ids = tmp_path / "records" / "full.jsonl", {c.id for c in picked}
     assert unpack(record, first, ids) == 0
-    list(run_trial(first, "full", "tune", said, picked=picked[:1]))
+    list(run_trial(first, "laws", "tune", said, picked=picked[:1]))
     assert pack(first, record) == 1
     assert unpack(record, second, ids) == 1 and unpack(record, second, ids) == 0
-    assert list(run_trial(second, "full", "tune", said, picked=picked)) == [(1, 2), (2, 2)]
+    assert list(run_trial(second, "laws", "tune", said, picked=picked)) == [(1, 2), (2, 2)]
     assert pack(second, record) == 2
     scored = score_trial(second, picked)
     assert scored["code"] == {code() or "unknown code": 2} and scored["cases"] == 2
     assert scored["scored"][0] == score_trial(first, picked[:1])["scored"][0]
-    line = json.loads(record.read_text().splitlines()[0])
+    lines = [json.loads(line) for line in record.read_text().splitlines()]
+    assert [line["hidden"] for line in lines if line["id"] == far.id] == [[f"{far.what}/{far.recipe.hidden[0].law}"]]
+    line = lines[0]
     assert {"id", "code", "threads", "seconds", "diagnosis"} < set(line) and "statistics" not in line["diagnosis"]
 
 

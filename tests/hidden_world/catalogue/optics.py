@@ -117,7 +117,7 @@ MECHANISMS = (
         shape(frequency_hz=lines(100.0, 2000.0)),
         physics=_sine,
         far=(
-            Law("switched", "L (1 + m sgn sin)", shape(frequency_hz=lines(100.0, 2000.0)), physics=_switched,
+            Law("switched", "L (1 + m sgn sin)", physics=_switched,
                 source="Horowitz & Hill, The Art of Electronics: pulse-width dimming"),
             Law("two lamps", "two sines of m / sqrt 2, their frequencies 2 to 6 % apart",
                 shape(frequency_hz=lines(100.0, 2000.0), ratio=between(1.02, 1.06)), physics=_two_lamps,

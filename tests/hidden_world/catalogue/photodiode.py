@@ -136,9 +136,6 @@ def _unequal(camera: Camera, at: Whole, amplitude: float, traps: Rng) -> Array:
     return traps.exponential(amplitude, at.size) * camera.charge_of(1.0).flat[at]
 
 
-_TRAPS = shape(fraction=between(0.01, 0.04), dwell_ms=log_uniform(4.0, 25.0), traps=whole(0, 2**31))
-_HOT = shape(mean_pA=between(2.0, 5.0))
-
 MECHANISMS = (
     Mechanism(
         "photo_response_nonlinearity",
@@ -158,7 +155,7 @@ MECHANISMS = (
         physics=_lag(fills_at_once=False),
         far=(
             Law("after a fall", "traps fill at once and empty with tau: lag where light falls only",
-                shape(tau_us=log_uniform(150.0, 3000.0)), physics=_lag(fills_at_once=True),
+                physics=_lag(fills_at_once=True),
                 source="Janesick, Scientific CCDs (2001): capture is fast, emission slow"),
         ),
     ),
@@ -168,8 +165,7 @@ MECHANISMS = (
         shape(full=between(0.7, 1.0)),
         physics=_blooms((1, 0), (-1, 0), (0, 1), (0, -1)),
         far=(
-            Law("along columns", "it goes up and down only", shape(full=between(0.7, 1.0)),
-                physics=_blooms((1, 0), (-1, 0)),
+            Law("along columns", "it goes up and down only", physics=_blooms((1, 0), (-1, 0)),
                 source="Janesick, Scientific CCDs (2001): channel stops between columns"),
         ),
     ),
@@ -179,23 +175,23 @@ MECHANISMS = (
         shape(tau_ms=log_uniform(20.0, 120.0)),
         physics=_saturating,
         far=(
-            Law("linear", "I (1 + a t / T), fresh in each recording of length T",
+            Law("linear", "I (1 + a t / T), fresh in each recording of length T", shape(),
                 physics=_through(lambda rise: 1.0 + rise), source="the first order of any slow change"),
-            Law("exponential", "I exp(a t / T), fresh in each recording", physics=_through(np.exp),
+            Law("exponential", "I exp(a t / T), fresh in each recording", shape(), physics=_through(np.exp),
                 source="Janesick, Scientific CCDs (2001): dark current doubles every few kelvin"),
-            Law("running on", "I (1 + a (1 - exp(-t / 3 T))), t from the first recording on", physics=_running_on,
-                source="Newton's law of cooling: a camera that warms up once"),
+            Law("running on", "I (1 + a (1 - exp(-t / 3 T))), t from the first recording on", shape(),
+                physics=_running_on, source="Newton's law of cooling: a camera that warms up once"),
         ),
     ),
     Mechanism(
         "hot_pixels",
         "exponential extra current in a few pixels",
-        _HOT,
+        shape(mean_pA=between(2.0, 5.0)),
         camera=_hot(some_pixels, _exponential),
         far=(
-            Law("clusters", "in squares of two by two", _HOT, camera=_hot(clusters, _exponential),
+            Law("clusters", "in squares of two by two", camera=_hot(clusters, _exponential),
                 source="Janesick, Scientific CCDs (2001): radiation damage"),
-            Law("power law", "currents with a Pareto tail of exponent 2.5", _HOT, camera=_hot(some_pixels, _power_law),
+            Law("power law", "currents with a Pareto tail of exponent 2.5", camera=_hot(some_pixels, _power_law),
                 source="field-enhanced generation: heavy tails"),
         ),
     ),
@@ -215,12 +211,12 @@ MECHANISMS = (
     Mechanism(
         "random_telegraph_noise",
         "two-state dark current in some pixels",
-        _TRAPS,
+        shape(fraction=between(0.01, 0.04), dwell_ms=log_uniform(4.0, 25.0), traps=whole(0, 2**31)),
         physics=_telegraph(_equal),
         far=(
-            Law("in proportion", "the step is a multiple of the pixel's own dark current", _TRAPS,
+            Law("in proportion", "the step is a multiple of the pixel's own dark current",
                 physics=_telegraph(_in_proportion), source="Hopkins & Hopkinson (1993): meta-stable defect of a pixel"),
-            Law("unequal", "steps of an exponential law, up for a fifth of the time", _TRAPS,
+            Law("unequal", "steps of an exponential law, up for a fifth of the time",
                 physics=_telegraph(_unequal, RARELY_UP),
                 source="Hopkins & Hopkinson (1993): amplitudes; Kirton & Uren (1989): capture is not emission"),
         ),

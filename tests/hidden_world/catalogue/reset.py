@@ -93,7 +93,6 @@ MECHANISMS = (
             lambda p, camera: {"left_fraction": p["fraction"], "left_tau": frames_of(p["tau_us"])}),
         far=(
             Law("falling", "charge f exp(-T/tau) left: the longer the interval, the less",
-                shape(tau_us=log_uniform(100.0, 1000.0)),
                 physics=_after_reset(
                     lambda p, camera: {"left_always": p["fraction"], "left_fraction": -p["fraction"],
                                        "left_tau": frames_of(p["tau_us"])}),

@@ -190,10 +190,10 @@ MECHANISMS = (
         physics=_ripples((1.0, 1.0)),
         far=(
             Law("of the reset", "the level that a pixel is reset to swings: a cycle keeps what it was at its reset",
-                shape(frequency_hz=lines(100.0, 3000.0)), physics=_ripple_of_reset,
+                physics=_ripple_of_reset,
                 source="Razavi, Analog CMOS Circuits: supply rejection of either rail"),
             Law("rectified", "0.8 rho sin, and 0.6 rho sin of twice the frequency",
-                shape(frequency_hz=lines(100.0, 3000.0)), physics=_ripples((0.8, 1.0), (0.6, 2.0)),
+                physics=_ripples((0.8, 1.0), (0.6, 2.0)),
                 source="Horowitz & Hill, The Art of Electronics: ripple of a rectifier"),
         ),
     ),
@@ -204,8 +204,7 @@ MECHANISMS = (
         signs=(-1.0,),
         physics=_clock(Clock),
         far=(
-            Law("slewing", "it recovers along a straight line, in 2 tau",
-                shape(phase_frames=between(0.0, 1.0), tau_us=between(2.5, 10.0)), physics=_clock(SlewingClock),
+            Law("slewing", "it recovers along a straight line, in 2 tau", physics=_clock(SlewingClock),
                 source="Razavi, Analog CMOS Circuits: slewing"),
         ),
     ),
