@@ -348,7 +348,7 @@ def by_category(scored: Sequence[Scored]) -> list[Json]:
     """One row a group and kind of law: right of how many, what was named and is not there, and how long it took.
 
     A case with an effect by a far law is `far`.  spurious effects, spurious parameters: counted one by one.
-    false alarms: answers other than `none` where nothing is hidden.
+    false alarms: answers other than `none` where nothing is hidden.  Where no name is right, no law is near or far.
     """
     rows = []
     for group in dict.fromkeys(s.group for s in scored):
@@ -359,13 +359,13 @@ def by_category(scored: Sequence[Scored]) -> list[Json]:
             right = sum(s.right for s in some)
             low, high = binomial_90(right, len(some))
             seconds = [s.seconds for s in some]
-            hides = any(s.laws for s in some)
+            names = group not in ("outside", "left_out") and any(s.laws for s in some)
             rows.append({
                 "category": group,
-                "law": "" if not hides or group == "outside" else "far" if far else "near",
+                "law": ("far" if far else "near") if names else "",
                 "right": f"{right}/{len(some)}",
                 "90 %": f"{100 * low:.0f} - {100 * high:.0f} %",
-                "all found": f"{sum(len(s.found) == len(s.truth) for s in some)}/{len(some)}" if hides else "",
+                "all found": f"{sum(len(s.found) == len(s.truth) for s in some)}/{len(some)}" if names else "",
                 "spurious effects": sum(len(s.spurious) - len(s.off) for s in some),
                 "spurious parameters": sum(len(s.off) for s in some),
                 "false alarms": sum(s.answer != "none" for s in some) if group == "none" else "",

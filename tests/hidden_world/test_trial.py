@@ -316,6 +316,8 @@ def test_categories_are_counted_by_near_and_far_laws():
     assert rows["strong", "near"]["right"] == "1/1" and rows["strong", "far"]["right"] == "1/3"
     assert rows["strong", "far"]["all found"] == "2/3" and rows["strong", "far"]["90 %"] == "2 - 86 %"
     assert (rows["strong", "far"]["spurious effects"], rows["strong", "far"]["spurious parameters"]) == (1, 1)
+    (outside,) = by_category([answered(case_of("outside"), "unknown")])
+    assert outside["right"] == "1/1" and outside["law"] == outside["all found"] == ""
     assert rows["none", ""]["false alarms"] == 1 and rows["none", ""]["median [s]"] == "1"
     value = {f.what: f.value for f in figures(some)}
     assert (
