@@ -37,8 +37,8 @@ class BlindTrial:
 
     out: Path
     """Folder for manifest, sealed keys, results, trial.json and trial.md."""
-    set: Literal["quick", "full"] = "quick"
-    """Which set of cases."""
+    set: Literal["quick", "full", "laws"] = "quick"
+    """Which set of cases: effects by their near laws, few or many; or by near and far ones, strong pairs, triples."""
     part: Literal["tune", "report", "verify"] = "tune"
     """Disjoint seeds: one to work on, two to judge by, of other outside mechanisms; `verify` was looked at last."""
     jobs: Workers = 1
@@ -46,7 +46,7 @@ class BlindTrial:
     threads: Workers = 1
     """Threads of each diagnosis."""
     only: list[str] = field(default_factory=list)
-    """Groups: none, strong, weak, base, outside, left_out, pair, tricky, severe; default all."""
+    """Groups: none, strong, weak, severe, base, outside, left_out, pair, tricky, strong_pair, triple; default all."""
     hiding: list[str] = field(default_factory=list)
     """Mechanisms: cases that hide one of them, alone or beside another; default all."""
     limit: Count | None = None

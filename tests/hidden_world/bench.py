@@ -43,9 +43,9 @@ def filmed(
     return film(recipe, camera, Shot("shot", "fit", shown))
 
 
-def hidden(name: str, **parameters: float) -> Hidden:
-    """A mechanism with these parameters."""
-    return Hidden(name, parameters, 1.0)
+def hidden(name: str, law: str = "", **parameters: float) -> Hidden:
+    """A mechanism with these parameters, by its near law or a far one."""
+    return Hidden(name, parameters, 1.0, law=law)
 
 
 def step_up(low: float, high: float, at: int) -> Light:

@@ -1,29 +1,35 @@
 """The trial's cases: what is hidden, what the diagnosis is told, what counts as right.
 
-Groups: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `base` (the base model's own effects,
-told `ideal`), `outside`, `left_out` (a catalogue effect, its name withheld), `pair`, `tricky`.
+Groups: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `severe` (30 to 100), `base` (the base model's own
+effects, told `ideal`), `outside`, `left_out` (a catalogue effect, its name withheld), `pair` (3 to 10 each), `tricky`,
+`strong_pair` and `triple` (5 to 100 each, of different families).
 
-No two parts share a seed, nor do the sets `quick` and `full`; `tune` shares no outside mechanism with the others.  Of
-`report` cases have been looked at since, to find what was wrong; `verify` is as `report`, of seeds that were not.
+The sets `quick` and `full` hide effects by their near laws only; `laws` by near and far ones.  No two parts or sets
+share a seed; `tune` shares no outside mechanism with the others.  Of `report` cases have been looked at since, to find
+what was wrong; `verify` is as `report`, of seeds that were not.
 """
 
 from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 from tests.hidden_world.mechanism import Hidden, Mechanism, draw, limits
 from tests.hidden_world.outside import OUTSIDE, REPORT, TUNE
+from tests.hidden_world.score import family_of
 from tests.hidden_world.world import MECHANISMS, Recipe, stream
 
-SETS = ("quick", "full")
+SETS = ("quick", "full", "laws")
 PARTS = ("tune", "report", "verify")
-GROUPS = ("none", "strong", "weak", "base", "outside", "left_out", "pair", "tricky", "severe")
+GROUPS = (
+    "none", "strong", "weak", "base", "outside", "left_out", "pair", "tricky", "severe", "strong_pair", "triple",
+)  # fmt: skip
 BASE_CAMERAS = ("scsim", "physical")
 
 
@@ -45,7 +51,8 @@ class Answer:
 class Case:
     """One campaign and its key.
 
-    id: opaque.  truth: names hidden.  accept: any of these is right; where empty, the truth decides.
+    id: opaque, of all that the case is: another case has another.  truth: names hidden.  accept: any of these is
+    right; where empty, the truth decides.
     """
 
     id: str
@@ -85,6 +92,9 @@ MILLION = {
     ("full", "report"): 4,
     ("quick", "verify"): 11,
     ("full", "verify"): 12,
+    ("laws", "tune"): 21,
+    ("laws", "report"): 22,
+    ("laws", "verify"): 23,
 }
 """Where the seeds of a set and part begin, in millions; `verify` goes on to others once its cases were looked at,
 or the code has changed."""
@@ -118,19 +128,47 @@ SAME_TO_THE_EYE = (
 """Pairs are not drawn from within one of these: the second would hide in the error of the first."""
 
 
+SINGLES = {"strong": (3.0, 10.0), "weak": (1.0, 3.0), "severe": (30.0, 100.0)}
+"""Groups of one effect, and its strength over the detection limit."""
+
+TOGETHER = (5.0, 100.0)
+"""Strength of each effect of a strong pair or a triple, over its detection limit; see `_top`."""
+
+
 def cases(which: str, part: str) -> list[Case]:
     """All cases of a set and part, group by group."""
+    seeds = itertools.count(1_000_000 * MILLION[which, part])
+    return _by_laws(part, seeds) if which == "laws" else _by_near_laws(which, part, seeds)
+
+
+def _by_laws(part: str, seeds: Iterator[int]) -> list[Case]:
+    """Each mechanism by its near law and by a far one; strong pairs and triples, each effect by either."""
+    both, outside = ("near", "far"), TUNE if part == "tune" else REPORT
+    made = [_nothing(next(seeds)) for _ in range(30)]
+    for group, (low, high) in SINGLES.items():
+        for name, law in itertools.product(CATALOGUE, both):
+            top = _top(name, low, high) if group == "severe" else high
+            made += [_single(group, name, next(seeds), low, top, law)] if _has(name, law) else []
+    made += [_base(name, next(seeds), law) for name in BASE_EFFECTS for law in both if _has(name, law)]
+    made += [_single("outside", name, next(seeds), 4, 10) for name in outside for _ in range(2)]
+    made += _together("strong_pair", 2, 36, seeds)
+    made += _together("triple", 3, 12, seeds)
+    return made
+
+
+def _by_near_laws(which: str, part: str, seeds: Iterator[int]) -> list[Case]:
     counts = COUNTS[which]
     every = QUICK_SHARE if which == "quick" else 1
-    seeds = itertools.count(1_000_000 * MILLION[which, part])
     shift = 0 if part == "tune" else 1
     known = list(CATALOGUE)[shift % every :: every]
     outside = list(TUNE if part == "tune" else REPORT)[:: max(1, every // 2)]
     left_out = [name for name in known if name not in NOT_LEFT_OUT]
     made: list[Case] = []
     made += [_nothing(next(seeds)) for _ in range(counts.none)]
-    made += [_single("strong", name, next(seeds), 3, 10) for name in known for _ in range(counts.strong_each)]
-    made += [_single("weak", name, next(seeds), 1, 3) for name in known for _ in range(counts.weak_each)]
+    made += [
+        _single("strong", name, next(seeds), *SINGLES["strong"]) for name in known for _ in range(counts.strong_each)
+    ]
+    made += [_single("weak", name, next(seeds), *SINGLES["weak"]) for name in known for _ in range(counts.weak_each)]
     made += [_base(name, next(seeds)) for name in list(BASE_EFFECTS)[::every] for _ in range(counts.base_each)]
     made += [_ladder(next(seeds)) for _ in range(counts.base_each)]
     made += [_single("outside", name, next(seeds), 4, 10) for name in outside for _ in range(counts.outside_each)]
@@ -138,14 +176,16 @@ def cases(which: str, part: str) -> list[Case]:
     made += [_pair(next(seeds)) for _ in range(counts.pairs)]
     made += [_clock_by_rows(next(seeds)) for _ in range(counts.clock_pairs)]
     made += [trick(next(seeds)) for trick in TRICKY[:: max(1, every // 2)] for _ in range(counts.tricky_each)]
-    made += [_single("severe", name, next(seeds), 30, 100) for name in known for _ in range(counts.severe_each)]
+    made += [
+        _single("severe", name, next(seeds), *SINGLES["severe"]) for name in known for _ in range(counts.severe_each)
+    ]
     return made
 
 
 def _case(group: str, what: str, recipe: Recipe, **rest: object) -> Case:
-    opaque = hashlib.sha256(f"spikecam hidden world {recipe.seed}".encode()).hexdigest()[:12]
     model = rest.pop("model", recipe.base)
-    return Case(opaque, group, what, recipe, model, **rest)  # type: ignore[arg-type]
+    case = Case("", group, what, recipe, model, **rest)  # type: ignore[arg-type]
+    return replace(case, id=hashlib.sha256(json.dumps(asdict(case), sort_keys=True).encode()).hexdigest()[:12])
 
 
 def _camera_kind(name: str, rng: np.random.Generator) -> str:
@@ -153,9 +193,28 @@ def _camera_kind(name: str, rng: np.random.Generator) -> str:
     return "physical" if name == "excess_threshold_noise" else str(rng.choice(BASE_CAMERAS))
 
 
-def _drawn(name: str, low: float, high: float, rng: np.random.Generator) -> Hidden:
+def _top(name: str, low: float, high: float) -> float:
+    """Up to `high` limits: no further than the mechanism goes, but as far as it goes in a poor camera."""
+    limit = limits()[name]
+    return max(min(high, max(low, limit.furthest)), limit.poor / limit.limit)
+
+
+def _has(name: str, law: str) -> bool:
+    return law == "near" or bool(MECHANISMS[name].far)
+
+
+def _law(name: str, law: str, rng: np.random.Generator) -> str:
+    """`near`; `far`: one of them; `either`: near in every other case."""
+    far = MECHANISMS[name].far
+    if law == "near" or not far or (law == "either" and rng.random() < 0.5):
+        return ""
+    return str(rng.choice([other.name for other in far]))
+
+
+def _drawn(name: str, low: float, high: float, rng: np.random.Generator, law: str = "near") -> Hidden:
     mechanism: Mechanism = MECHANISMS[name]
-    return draw(mechanism, float(np.exp(rng.uniform(np.log(low), np.log(high)))), rng)
+    by = _law(name, law, rng)
+    return draw(mechanism, float(np.exp(rng.uniform(np.log(low), np.log(high)))), rng, by)
 
 
 def _nothing(seed: int) -> Case:
@@ -163,20 +222,20 @@ def _nothing(seed: int) -> Case:
     return _case("none", "nothing", Recipe(seed, base), accept=(Answer(("none",)),))
 
 
-def _single(group: str, name: str, seed: int, low: float, high: float) -> Case:
+def _single(group: str, name: str, seed: int, low: float, high: float, law: str = "near") -> Case:
     rng = stream(seed, "case")
     base = _camera_kind(name, rng)
-    recipe = Recipe(seed, base, (_drawn(name, low, high, rng),))
+    recipe = Recipe(seed, base, (_drawn(name, low, high, rng, law),))
     if name not in OUTSIDE:
         return _case(group, name, recipe, truth=(name,))
     verdicts = ("unknown", "data") if name == "repeated_frames" else ("unknown",)
     return _case(group, name, recipe, truth=(name,), accept=(Answer(verdicts),))
 
 
-def _base(name: str, seed: int) -> Case:
+def _base(name: str, seed: int, law: str = "near") -> Case:
     """An effect of the base model alone, told that the camera is ideal; a spread of the dark needs a dark current."""
     rng = stream(seed, "case")
-    hidden = [_drawn(name, 3, 10, rng)]
+    hidden = [_drawn(name, 3, 10, rng, law)]
     if name == "dark_current_spread":
         hidden.insert(0, Hidden("dark_current", {"mean_pA": 4.0 * hidden[0].parameters["sigma_pA"]}, 10.0))
     return _case("base", name, Recipe(seed, "ideal", tuple(hidden)), truth=tuple(h.name for h in hidden))
@@ -212,6 +271,32 @@ def _clock_by_rows(seed: int) -> Case:
     skew = Hidden("readout_skew", {"span": span}, abs(span) / limits()["readout_skew"].limit)
     recipe = Recipe(seed, str(rng.choice(BASE_CAMERAS)), (_drawn("clock_feedthrough", 3, 10, rng), skew))
     return _case("pair", "clock_feedthrough + readout_skew", recipe, truth=("clock_feedthrough", "readout_skew"))
+
+
+def _together(group: str, size: int, count: int, seeds: Iterator[int]) -> list[Case]:
+    """So many cases of so many strong effects, of different families; no two cases hide the same ones."""
+    made: dict[tuple[str, ...], Case] = {}
+    while len(made) < count:
+        seed = next(seeds)
+        rng = stream(seed, "case")
+        names = _of_different_families(size, rng)
+        base = "physical" if "excess_threshold_noise" in names else str(rng.choice(BASE_CAMERAS))
+        hidden = tuple(_drawn(name, TOGETHER[0], _top(name, *TOGETHER), rng, "either") for name in names)
+        case = _case(group, " + ".join(names), Recipe(seed, base, hidden), truth=names)
+        made.setdefault(tuple(sorted(names)), case)
+    return list(made.values())
+
+
+def _of_different_families(size: int, rng: np.random.Generator) -> tuple[str, ...]:
+    """Mechanisms that can be so strong, none that would hide in the error of another."""
+    names: list[str] = []
+    for name in (str(n) for n in rng.permutation([n for n in CATALOGUE if limits()[n].furthest > TOGETHER[0]])):
+        hides = any({name, other} <= same for other in names for same in SAME_TO_THE_EYE)
+        if not hides and family_of(name) not in {family_of(other) for other in names}:
+            names.append(name)
+        if len(names) == size:
+            break
+    return tuple(names)
 
 
 # ---- tricky

@@ -19,7 +19,11 @@ from tests.hidden_world.world import MECHANISMS, Recipe, stream, write_campaign
 def main(arguments: list[str] | None = None) -> None:
     """Write one campaign, and beside it (never in it) DIR.key.json with what is hidden."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--mechanism", action="append", default=[], choices=sorted(MECHANISMS), help="may be repeated")
+    known = sorted(
+        f"{m.name}/{law.name}" if law is not m else m.name for m in MECHANISMS.values() for law in (m, *m.far)
+    )
+    words = {"choices": known, "metavar": "NAME[/LAW]", "help": "by its near law or a far one; may be repeated"}
+    parser.add_argument("--mechanism", action="append", default=[], **words)
     parser.add_argument("--times-limit", type=float, default=5.0, help="strength over its detection limit")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--base", choices=sorted(BASES), default="scsim")
@@ -29,13 +33,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args(arguments)
     hidden = tuple(
-        draw(MECHANISMS[name], options.times_limit, stream(options.seed, name, "shape")) for name in options.mechanism
+        draw(MECHANISMS[name], options.times_limit, stream(options.seed, name, "shape"), law)
+        for name, _, law in (word.partition("/") for word in options.mechanism)
     )
     shape = (options.size, options.size)
     recipe = Recipe(options.seed, options.base, hidden, options.trick, shape=shape, frames=options.frames)
     began = time.perf_counter()
     drawn = write_campaign(recipe, options.out)
-    key = {"hidden": [{"name": h.name, "parameters": h.parameters} for h in hidden], "unit": drawn}
+    key = {"hidden": [{"name": h.name, "law": h.law, "parameters": h.parameters} for h in hidden], "unit": drawn}
     text = json.dumps(key, indent=1)
     options.out.with_name(options.out.name + ".key.json").write_text(text + "\n", encoding="utf-8")
     print(text)

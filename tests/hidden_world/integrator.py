@@ -46,7 +46,7 @@ Whole = NDArray[np.int64]
 
 BLOCK = 64
 """Frames whose windows are made at once."""
-NO_LAWS = Laws(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+NO_LAWS = Laws(0.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """A crossing takes the threshold away, and no more."""
 
 
@@ -75,6 +75,8 @@ class Physics:
     per_mv: Array
     key_frame: Array
     key_light: NDArray[np.float32]
+    before: float = 0.0
+    """frames that the camera has run before this recording"""
 
     light_waves: tuple[Wave, ...] = ()
     """factors on light"""
@@ -93,9 +95,14 @@ class Physics:
     dark_every: int = 1
     lags: tuple[tuple[float, float], ...] = ()
     """(share of the light's charge that comes late, time constant) of each late part"""
-    nonlinearity: float = 0.0
+    lag_fills_at_once: bool = False
+    """the late part follows light that rises"""
+    response: Callable[[Array], Array] | None = None
+    """a curve that the charge of a frame's light goes through"""
     bloom_share: float = 0.0
     bloom_full: float = 1.0
+    bloom_to: tuple[tuple[int, int], ...] = ()
+    """(rows, columns) away that what is beyond `bloom_full` goes, in equal parts"""
     trap_charge: float = 0.0
     """charge a frame when all traps are full (persistence)"""
     trap_half: float = 1.0
@@ -115,11 +122,15 @@ class Physics:
     row_mv: NDArray[np.float32] | None = None
     """(T, rows) offset of a row's reference"""
     column_mv: NDArray[np.float32] | None = None
-    frame_noise_mv: float = 0.0
+    frame_noise_mv: Array = field(default_factory=lambda: np.zeros(0))
+    """(P,) deviation of a draw of each frame"""
     slow_mv: Array = field(default_factory=lambda: np.zeros(0))
     """(J,) standard deviations of slow components of each pixel's reference, and their time constants"""
     slow_tau: Array = field(default_factory=lambda: np.zeros(0))
-    row_droop: float = 0.0
+    droop: Array = field(default_factory=lambda: np.zeros(0))
+    """(P,) factor on a pixel's threshold, less 1, when all of its row (or column) fired in the frame before"""
+    droop_axis: int = 1
+    """1: by rows, 0: by columns"""
     array_sag: float = 0.0
     sag_tau: float = 1.0
     alternate: float = 0.0
@@ -130,15 +141,26 @@ class Physics:
     substeps: int = 1
     """pieces that a frame is cut into at least, where light moves or sensitivity does"""
     dead: float = 0.0
+    dead_by_light: float = 0.0
+    """of dead time, by charge a frame"""
+    dead_share: Array | None = None
+    """(P,) factor on the dead time of each pixel"""
     delay: float = 0.0
-    """c of a delay c / sqrt(x)"""
+    """c of a delay c / x^delay_power"""
+    delay_power: float = 0.5
     hold_loss: float = 0.0
     """share lost of what comes between a crossing and the end of its frame"""
+    hold_chance: float = 1.0
+    """share of the resets that lose it"""
+    left_always: float = 0.0
+    """charge that a reset leaves at least; beside it left_fraction (1 - exp(-T / left_tau))"""
     left_fraction: float = 0.0
     left_tau: float = 1.0
     ramp_loss: float = 0.0
     """sensitivity lost just after a reset"""
     ramp_tau: float = 1.0
+    reset_ripple: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """amplitude, cycles a frame and phase of a sine on the level of a reset, which its cycle keeps"""
     kick: float = 0.0
     """charge that a spike gives to the pixels `kick_to` (rows, columns) away"""
     kick_to: tuple[tuple[int, int], ...] = ()
@@ -157,23 +179,24 @@ class Physics:
         """Whether nothing at all changes in time, and a reset only takes the threshold away."""
         waves = (self.dark_movie, self.row_mv, self.column_mv, self.clock)
         scalars = (
-            self.frame_noise_mv, self.row_droop, self.array_sag, self.alternate, self.outlier_share, self.dead,
-            self.delay, self.hold_loss, self.left_fraction, self.ramp_loss, self.kick,
+            self.array_sag, self.alternate, self.outlier_share, self.dead, self.delay, self.hold_loss,
+            self.left_fraction, self.ramp_loss, self.kick, self.reset_ripple[0],
         )  # fmt: skip
         events = self.dark_steps[0].size + self.hits[0].size + self.slow_mv.size
+        events += self.droop.size + self.frame_noise_mv.size
         moving = self.dark_waves or self.threshold_waves or any(a is not None for a in waves)
         return self.light_is_steady and not moving and not any(scalars) and not events
 
     @property
     def margin(self) -> float:
         """How far below its threshold [thresholds] no noise of a frame makes a pixel fire (seven sd)."""
-        millivolts = 7.0 * self.frame_noise_mv + 7.0 * float(np.sqrt(np.sum(self.slow_mv**2)))
+        millivolts = 7.0 * float(self.frame_noise_mv.max(initial=0.0)) + 7.0 * float(np.sqrt(np.sum(self.slow_mv**2)))
         for movie in (self.row_mv, self.column_mv):
             millivolts += 0.0 if movie is None else float(np.abs(movie).max())
         if self.clock is not None:
             millivolts += -float(self.clock.height(np.zeros(1))[0])
         wave = sum(abs(w.amplitude) for w in self.threshold_waves)
-        common = 1.2 * (wave + abs(self.row_droop) + abs(self.array_sag))
+        common = 1.2 * (wave + float(np.abs(self.droop).max(initial=0.0)) + abs(self.array_sag))
         kicks = 2.0 * len(self.kick_to) * abs(self.kick) if self.kick_at_spike else 0.0
         return float(0.005 + 7.0 * np.sqrt(self.quiet.max()) + millivolts * self.per_mv.max() + common + kicks)
 
@@ -181,8 +204,9 @@ class Physics:
     def laws(self) -> Laws:
         """What a crossing does."""
         return Laws(
-            self.dead, self.delay, self.hold_loss, self.left_fraction, self.left_tau, self.ramp_loss, self.ramp_tau,
-            self.alternate, self.outlier_share, self.outlier_kappa, self.kick if self.kick_at_spike else 0.0,
+            self.dead, self.dead_by_light, self.delay, self.delay_power, self.hold_loss, self.hold_chance,
+            self.left_always, self.left_fraction, self.left_tau, self.ramp_loss, self.ramp_tau, self.alternate,
+            self.outlier_share, self.outlier_kappa, self.kick if self.kick_at_spike else 0.0, *self.reset_ripple,
         )  # fmt: skip
 
 
@@ -286,6 +310,7 @@ class Recording:
             quiet=ph.quiet,
             kappa=ph.kappa,
             per_mv=ph.per_mv,
+            share=np.ones(count) if ph.dead_share is None else ph.dead_share,
         )
         self.dark = ph.dark.copy()
         self.late = [ph.gain * ph.key_light[0].astype(np.float64) for _ in ph.lags]
@@ -294,7 +319,7 @@ class Recording:
         self.slow = rng.standard_normal((count, ph.slow_mv.size))
         self.slow_at = np.zeros(count, np.int64)
         self.slow_kept = np.exp(-np.arange(1024)[:, None] / ph.slow_tau[None, :])
-        self.row_share = np.zeros((ph.shape[0], 1))
+        self.activity = np.zeros(ph.shape)
         self.sag = 0.0
         self.random = rng.integers(1, 2**63, 1, dtype=np.uint64)
         self.near = np.zeros(count, np.int64)
@@ -349,10 +374,11 @@ class Recording:
         for rows, columns in ph.kick_to if ph.kick and not ph.kick_at_spike else ():
             charge = self.pixels.charge.reshape(ph.shape)
             give(charge, bits.reshape(ph.shape), ph.kick, rows, columns, ph.kick_wraps)
-        if ph.row_droop or ph.array_sag:
-            self.row_share = bits.reshape(ph.shape).mean(axis=1, keepdims=True)
+        if ph.droop.size or ph.array_sag:
+            share = bits.reshape(ph.shape).mean(axis=ph.droop_axis, keepdims=True)
+            self.activity[:] = share
             kept = np.exp(-1.0 / ph.sag_tau)
-            self.sag = kept * self.sag + (1.0 - kept) * ph.array_sag * float(self.row_share.mean())
+            self.sag = kept * self.sag + (1.0 - kept) * ph.array_sag * float(share.mean())
 
     def _radiance(self, n: int, window: Window, total: Array, leak: Array, length: float) -> Array:
         """(P,) integral of the light over each pixel's window of frame n; leaves its slope in `tilt`."""
@@ -380,19 +406,19 @@ class Recording:
         if ph.lags and not ph.light_is_steady:
             total = (1.0 - sum(share for share, _ in ph.lags)) * x
             for late, (share, tau) in zip(self.late, ph.lags, strict=True):
-                lagged(x, self.tilt, late, share, tau, window, self.row_of, total)
+                lagged(x, self.tilt, late, share, tau, ph.lag_fills_at_once, window, self.row_of, total)
             x = total
         if ph.glare_loss:
             bright = x > 1.0
             self.glare = np.where(bright, 1.0, self.glare * np.exp(-1.0 / ph.glare_tau))
             x = np.where(bright, x, x * (1.0 - ph.glare_loss * self.glare))
-        if ph.nonlinearity:
-            x = x * (1.0 - ph.nonlinearity * x)
+        if ph.response is not None:
+            x = ph.response(x)
         if ph.bloom_share:
             spill = ph.bloom_share * np.maximum(x - ph.bloom_full, 0.0)
             x = x - spill
-            for way in ((1, 0), (-1, 0), (0, 1), (0, -1)) if spill.any() else ():
-                give(x.reshape(ph.shape), spill.reshape(ph.shape), 0.25, *way, False)
+            for way in ph.bloom_to if spill.any() else ():
+                give(x.reshape(ph.shape), spill.reshape(ph.shape), 1.0 / len(ph.bloom_to), *way, False)
         if ph.trap_charge:
             full = radiance / (radiance + ph.trap_half)
             self.traps = full + (self.traps - full) * np.exp(-1.0 / ph.trap_tau)
@@ -413,15 +439,17 @@ class Recording:
         """Factor on, and addition to, the thresholds of the pixels `near` in frame n, the whole frame long."""
         ph = self.physics
         stretch = np.ones(near.size)
-        if ph.row_droop or ph.array_sag:
-            stretch *= 1.0 + self.sag + ph.row_droop * self.row_share[near // ph.shape[1], 0]
+        if ph.array_sag:
+            stretch *= 1.0 + self.sag
+        if ph.droop.size:
+            stretch *= 1.0 + ph.droop[near] * self.activity.reshape(-1)[near]
         millivolt = np.zeros(near.size)
         if ph.row_mv is not None:
             millivolt += ph.row_mv[n][near // ph.shape[1]]
         if ph.column_mv is not None:
             millivolt += ph.column_mv[n][near % ph.shape[1]]
-        if ph.frame_noise_mv:
-            millivolt += ph.frame_noise_mv * self.rng.standard_normal(near.size)
+        if ph.frame_noise_mv.size:
+            millivolt += ph.frame_noise_mv[near] * self.rng.standard_normal(near.size)
         if ph.slow_mv.size:
             slow_noise(near, n, self.slow, self.slow_at, self.slow_kept, ph.slow_mv, self.random, millivolt)
         return stretch, millivolt * ph.per_mv[near]

@@ -5,7 +5,7 @@ A plan is a list of recordings; each holds exactly the numbers that its radiance
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +21,12 @@ class Light:
 
 @dataclass(frozen=True)
 class Shot:
-    """A recording to be made."""
+    """A recording to be made.  order: how many of the campaign come before it."""
 
     name: str
     use: str
     light: Light
+    order: int = 0
 
 
 FIT_LEVELS = (0.01, 0.03, 0.08, 0.2, 0.4, 0.65)
@@ -45,7 +46,7 @@ def plan(shape: tuple[int, int], frames: int, rng: np.random.Generator) -> list[
     shots.append(Shot("bars", "fit", bars(shape, frames, rng)))
     shots += flats(HOLDOUT_LEVELS, "holdout")
     shots.append(Shot("disk", "holdout", disk(shape, frames, rng)))
-    return shots
+    return [replace(shot, order=i) for i, shot in enumerate(shots)]
 
 
 def flat(level: float) -> Light:

@@ -1,4 +1,4 @@
-"""What a hidden mechanism is: a name, a law for the parameters it is drawn with, and where it takes hold.
+"""What a hidden mechanism is: a name, its laws, the parameters it is drawn with, and where it takes hold.
 
     camera    once a unit: its arrays
     light     once a recording: what falls on the pixels, key by key (linear optics)
@@ -32,24 +32,49 @@ else:
 Parameters: TypeAlias = dict[str, float]
 Rng: TypeAlias = np.random.Generator
 Bits: TypeAlias = NDArray[np.uint8]
+OnCamera: TypeAlias = Callable[[Camera, Parameters, Rng], Camera]
+OnLight: TypeAlias = Callable[[Light, tuple[int, int], Parameters], Light]
+OnPhysics: TypeAlias = Callable[[Physics, Camera, int, Parameters, Rng], None]
+OnBits: TypeAlias = Callable[[Bits, Parameters, Rng], Bits]
 
 
 @dataclass(frozen=True)
-class Mechanism:
-    """name: as in limits.toml.  law: one line.  describe: what a right description of it says (outside the catalogue).
+class Law:
+    """One form that a mechanism may have.  law: one line.
 
-    shape: draws every parameter but the strength.  signs: of the strength.
+    shape: draws every parameter but the strength; of a far law without one, that of the near.  source: of a far law,
+    where it is from.
     """
 
     name: str
     law: str
-    shape: Callable[[Rng], Parameters] = lambda rng: {}
-    camera: Callable[[Camera, Parameters, Rng], Camera] | None = None
-    light: Callable[[Light, tuple[int, int], Parameters], Light] | None = None
-    physics: Callable[[Physics, Camera, int, Parameters, Rng], None] | None = None
-    bits: Callable[[Bits, Parameters, Rng], Bits] | None = None
+    shape: Callable[[Rng], Parameters] | None = None
+    camera: OnCamera | None = None
+    light: OnLight | None = None
+    physics: OnPhysics | None = None
+    bits: OnBits | None = None
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Mechanism(Law):
+    """A mechanism by its name in limits.toml.  It is its own near law; `far` are the others.
+
+    describe: what a right description of it says (outside the catalogue).  signs: of the strength.
+    """
+
+    far: tuple[Law, ...] = ()
     describe: str = ""
     signs: tuple[float, ...] = (1.0,)
+
+    def by(self, law: str) -> Law:
+        """Its near law for "", else the far one of this name; raises KeyError if there is none."""
+        return {"": self, **{other.name: other for other in self.far}}[law]
+
+    def drawn(self, law: str, rng: Rng) -> Parameters:
+        """Every parameter but the strength, by one of its laws."""
+        shape = self.by(law).shape or self.shape
+        return shape(rng) if shape else {}
 
 
 @dataclass(frozen=True)
@@ -57,7 +82,7 @@ class Hidden:
     """A mechanism in a camera: its parameters, and where and when it acts.
 
     times_limit: strength over the detection limit.  rows, columns: pixels it acts in (None: all).  since: share of a
-    recording after which it acts.
+    recording after which it acts.  law: name of a far one, empty for the near.
     """
 
     name: str
@@ -66,20 +91,30 @@ class Hidden:
     rows: tuple[int, int] | None = None
     columns: tuple[int, int] | None = None
     since: float = 0.0
+    law: str = ""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A mechanism's entry in limits.toml."""
+    """A mechanism's entry in limits.toml.
+
+    most: as far as a camera that anybody uses would go.  poor: what a poor one has, where that is thousands of limits.
+    """
 
     parameter: str
     limit: float
     way: str = "more"
     most: float = field(default=float("inf"))
+    poor: float = 0.0
 
     def strength(self, times: float) -> float:
         """The parameter at so many times the limit."""
         return self.limit / times if self.way == "less" else min(self.limit * times, self.most)
+
+    @property
+    def furthest(self) -> float:
+        """Strength over the limit beyond which `strength` stays what it is."""
+        return self.most / self.limit
 
 
 @cache
@@ -89,11 +124,12 @@ def limits() -> dict[str, Limit]:
         return {name: Limit(**entry) for name, entry in tomllib.load(file).items()}
 
 
-def draw(mechanism: Mechanism, times_limit: float, rng: Rng) -> Hidden:
-    """The mechanism at a strength, its other parameters drawn."""
+def draw(mechanism: Mechanism, times_limit: float, rng: Rng, law: str = "") -> Hidden:
+    """The mechanism at a strength by one of its laws, its other parameters drawn."""
     limit = limits()[mechanism.name]
     strength = limit.strength(times_limit) * _sign(mechanism.signs, rng)
-    return Hidden(mechanism.name, {limit.parameter: float(strength), **mechanism.shape(rng)}, float(times_limit))
+    parameters = {limit.parameter: float(strength), **mechanism.drawn(law, rng)}
+    return Hidden(mechanism.name, parameters, float(times_limit), law=law)
 
 
 def _sign(signs: tuple[float, ...], rng: Rng) -> float:

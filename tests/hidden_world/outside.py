@@ -11,16 +11,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tests.hidden_world.catalogue import (
+from tests.hidden_world.catalogue.drawing import (
     LAG_SUBSTEPS,
     RESET_SUBSTEPS,
-    _between,
-    _log_uniform,
-    _shape,
-    _whole,
-    chosen,
+    between,
     event_arrays,
+    log_uniform,
+    shape,
+    whole,
 )
+from tests.hidden_world.catalogue.readout import chosen
 from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light
 from tests.hidden_world.mechanism import Bits, Mechanism, Parameters, Rng
@@ -137,7 +137,7 @@ def _streaks(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) 
     ph.hits = event_arrays(hits)
 
 
-def _ghost(light: Light, shape: tuple[int, int], p: Parameters) -> Light:
+def _ghost(light: Light, size: tuple[int, int], p: Parameters) -> Light:
     return Light(light.key_frame, (light.radiance + p["share"] * light.radiance[:, ::-1, ::-1]).astype(np.float32))
 
 
@@ -214,8 +214,8 @@ TUNE = {
         Mechanism(
             "two_component_lag",
             "a fast and a slow part of the light come late",
-            _shape(
-                fast_share=_between(0.4, 0.6), fast_frames=_log_uniform(3.0, 8.0), slow_frames=_log_uniform(80.0, 250.0)
+            shape(
+                fast_share=between(0.4, 0.6), fast_frames=log_uniform(3.0, 8.0), slow_frames=log_uniform(80.0, 250.0)
             ),
             physics=_two_component_lag,
             describe="light that changes: a tail with two time scales, in proportion to light",
@@ -223,56 +223,56 @@ TUNE = {
         Mechanism(
             "column_clock_modulation",
             "the reference of each column swings with a clock, each with a phase of its own",
-            _shape(period_frames=_between(5.0, 12.0), phases=_whole(0, 2**31)),
+            shape(period_frames=between(5.0, 12.0), phases=whole(0, 2**31)),
             physics=_column_clock,
             describe="columns: a line at a few kHz in every column, none in the whole array, light and dark",
         ),
         Mechanism(
             "spike_bursts",
             "a spike is now and then followed by several, frame by frame",
-            _shape(length=_whole(3, 5)),
+            shape(length=whole(3, 5)),
             bits=_bursts,
             describe="history: runs of successive spikes, rare, at random, in proportion to the spikes",
         ),
         Mechanism(
             "amp_glow",
             "dark current that falls off from a corner",
-            _shape(reach_pixels=_between(6.0, 14.0)),
+            shape(reach_pixels=between(6.0, 14.0)),
             camera=_amp_glow,
             describe="dark: one corner, static",
         ),
         Mechanism(
             "duty_cycled_shutter",
             "light shut off for a moment every period",
-            _shape(period_frames=_between(20.0, 60.0)),
+            shape(period_frames=between(20.0, 60.0)),
             physics=_shutter,
             describe="light: common, periodic, with harmonics (pulses, not a sine)",
         ),
         Mechanism(
             "even_row_gain_switching",
             "even and odd rows change gain in turns",
-            _shape(every_frames=_whole(100, 400)),
+            shape(every_frames=whole(100, 400)),
             physics=_even_rows,
             describe="light: even against odd rows, switching to and fro in time",
         ),
         Mechanism(
             "array_sag",
             "all thresholds follow the activity of the whole array, slowly",
-            _shape(tau_frames=_log_uniform(30.0, 150.0)),
+            shape(tau_frames=log_uniform(30.0, 150.0)),
             physics=_array_sag,
             describe="common: follows the mean level of the scene with a time constant, also in dark pixels",
         ),
         Mechanism(
             "recovery_ramp",
             "sensitivity comes back gradually after a reset",
-            _shape(tau_frames=_between(2.0, 6.0)),
+            shape(tau_frames=between(2.0, 6.0)),
             physics=_recovery_ramp,
             describe="level dependent: light lost after each reset, saturating for intervals beyond a few frames",
         ),
         Mechanism(
             "light_leak_flashes",
             "flashes of stray light at random times",
-            _shape(per_second=_between(60.0, 150.0), tau_frames=_between(8.0, 40.0)),
+            shape(per_second=between(60.0, 150.0), tau_frames=between(8.0, 40.0)),
             physics=_flashes,
             describe="common, also in the dark: bursts at random times, the same charge at all levels",
         ),
@@ -285,28 +285,28 @@ REPORT = {
         Mechanism(
             "persistence",
             "traps fill in the light, saturate, and leak over 100 ms; empty when a recording starts",
-            _shape(tau_ms=_log_uniform(40.0, 150.0), half_radiance=_between(0.03, 0.1)),
+            shape(tau_ms=log_uniform(40.0, 150.0), half_radiance=between(0.03, 0.1)),
             physics=_persistence,
             describe="light: an additive charge that builds up slowly from the start and saturates with level",
         ),
         Mechanism(
             "alternate_frame_comparator",
             "in some pixels the comparator looks only every second frame",
-            _shape(which=_whole(0, 2**31)),
+            shape(which=whole(0, 2**31)),
             bits=_alternate_frames,
             describe="some pixels: spikes only in even frames",
         ),
         Mechanism(
             "moving_hot_band",
             "a warm band moves across the chip and raises its dark current",
-            _shape(travel=_between(0.5, 1.0), width_pixels=_between(5.0, 9.0)),
+            shape(travel=between(0.5, 1.0), width_pixels=between(5.0, 9.0)),
             physics=_hot_band,
             describe="dark: columns, a place that moves during a recording",
         ),
         Mechanism(
             "cosmic_streaks",
             "charge along straight tracks in single frames",
-            _shape(charge=_between(0.3, 0.7)),
+            shape(charge=between(0.3, 0.7)),
             physics=_streaks,
             describe="rare events in space and time: pixels on a line fire early together, dark too",
         ),
@@ -319,21 +319,21 @@ REPORT = {
         Mechanism(
             "saturation_memory",
             "less sensitive for a while after more than one threshold a frame",
-            _shape(tau_frames=_between(15.0, 60.0)),
+            shape(tau_frames=between(15.0, 60.0)),
             physics=_saturation_memory,
             describe="light that changes: after bright light only, recovering over tens of frames",
         ),
         Mechanism(
             "distant_row_leak",
             "a spike gives charge to a pixel far away in its column",
-            _shape(rows_away=_whole(8, 31)),
+            shape(rows_away=whole(8, 31)),
             physics=_distant_row_leak,
             describe="coincidences of pixels a fixed number of rows apart, at lag 1; neighbours have none",
         ),
         Mechanism(
             "heavy_tailed_reset",
             "a reset now and then misses widely",
-            _shape(kappa=_between(0.06, 0.12)),
+            shape(kappa=between(0.06, 0.12)),
             physics=_heavy_tailed_reset,
             describe="interval noise with outliers on both sides, at all levels",
         ),
@@ -346,14 +346,14 @@ REPORT = {
         Mechanism(
             "speckle",
             "the light on each pixel fluctuates by itself",
-            _shape(tau_frames=_log_uniform(30.0, 200.0)),
+            shape(tau_frames=log_uniform(30.0, 200.0)),
             physics=_speckle,
             describe="light: local, in proportion to light, one time constant; none in the dark",
         ),
         Mechanism(
             "fringes",
             "oblique stripes of sensitivity",
-            _shape(period_pixels=_between(6.0, 14.0), angle=_between(0.4, 1.1)),
+            shape(period_pixels=between(6.0, 14.0), angle=between(0.4, 1.1)),
             camera=_fringes,
             describe="light: a static pattern, periodic in space, oblique",
         ),
@@ -366,7 +366,7 @@ REPORT = {
         Mechanism(
             "missing_slot",
             "in some columns one frame of sixteen reports nothing, the spike comes a frame later",
-            _shape(which=_whole(0, 2**31)),
+            shape(which=whole(0, 2**31)),
             bits=_missing_slot,
             describe="columns: periodic in time, sixteen frames",
         ),

@@ -29,7 +29,7 @@ class Pixels(NamedTuple):
 
     charge [thresholds]; owed: mean charge of which the noise has not been drawn; threshold: of this cycle; blind:
     frames that the node is held from now; late: whether a spike is due when it is let go; last: its last crossing;
-    ramp: sensitivity lost; parity: of its cycle.
+    ramp: sensitivity lost; parity: of its cycle.  share: of the dead time, that is this pixel's.
     """
 
     charge: Array
@@ -43,14 +43,19 @@ class Pixels(NamedTuple):
     quiet: Array
     kappa: Array
     per_mv: Array
+    share: Array
 
 
 class Laws(NamedTuple):
     """What a crossing does, as in `integrator.Physics`."""
 
     dead: float
+    dead_by_light: float
     delay: float
+    delay_power: float
     hold_loss: float
+    hold_chance: float
+    left_always: float
     left_fraction: float
     left_tau: float
     ramp_loss: float
@@ -59,6 +64,9 @@ class Laws(NamedTuple):
     outlier_share: float
     outlier_kappa: float
     kick: float
+    ripple: float
+    ripple_cycles: float
+    ripple_phase: float
 
 
 class Window(NamedTuple):
@@ -289,10 +297,10 @@ def _between(keys, t, first):
 
 
 @njit(cache=True, **PLAIN)
-def lagged(x, tilt, late, share, tau, window, rows_of, total):
+def lagged(x, tilt, late, share, tau, fills_at_once, window, rows_of, total):
     """Add to `total` the charge of a late part, share h_tau * x, of this frame; late (P,) is its rate, moved on.
 
-    Within a piece light is constant, and the part relaxes towards it: exact.
+    Within a piece light is constant, and the part relaxes towards it: exact; or is there at once, where it is more.
     """
     pieces = window.light.shape[1]
     for p in range(x.size):
@@ -301,6 +309,8 @@ def lagged(x, tilt, late, share, tau, window, rows_of, total):
             a, b = window.u[r, s], window.u[r, s + 1]
             rate = x[p] * (window.light[r, s] + tilt[p] * ((b * b - b) - (a * a - a))) / (b - a)
             kept = np.exp(-(b - a) / tau)
+            if fills_at_once and rate > late[p]:
+                late[p] = rate
             total[p] += share * (rate * (b - a) + (late[p] - rate) * tau * (1.0 - kept))
             late[p] = rate + (late[p] - rate) * kept
 
@@ -555,12 +565,12 @@ def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
     over = max(work.rest[i], 0.0) * after / (end - begin)
     r, s = work.row[i], work.piece[i]
     rate = _mean(i, p, come, window, work) / (window.u[r, s + 1] - window.u[r, s])
-    delay = laws.delay / np.sqrt(max(rate, 1e-9)) if laws.delay > 0.0 else 0.0
+    delay = laws.delay * max(rate, 1e-9) ** -laws.delay_power if laws.delay > 0.0 else 0.0
     if at + delay < 1.0:
         bits[p] = 1
     else:
         pixels.late[p] = 1
-    held = laws.dead + delay
+    held = laws.dead * pixels.share[p] * (1.0 + laws.dead_by_light * rate) + delay
     if held > 0.0:
         if held < after:  # of a Brownian path's piece, given its sum, a part: mean in proportion, variance of a bridge
             spread = np.sqrt(pixels.quiet[p] * rate * held * (after - held) / after)
@@ -568,12 +578,13 @@ def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
         else:
             over = 0.0
         work.open[i] = at + held
-    if laws.hold_loss > 0.0 and work.kept[i] == 1.0:
+    waits = laws.hold_loss > 0.0 and work.kept[i] == 1.0
+    if waits and (laws.hold_chance >= 1.0 or _uniform(random) < laws.hold_chance):
         work.kept[i] = 1.0 - laws.hold_loss
         over *= work.kept[i]
-    left = 0.0
+    left = laws.left_always
     if laws.left_fraction != 0.0:
-        left = -laws.left_fraction * np.expm1(-(n + at - pixels.last[p]) / laws.left_tau)
+        left -= laws.left_fraction * np.expm1(-(n + at - pixels.last[p]) / laws.left_tau)
     pixels.last[p] = n + at
     if laws.ramp_loss > 0.0:
         pixels.ramp[p] = laws.ramp_loss * np.exp(-after / laws.ramp_tau)
@@ -584,3 +595,6 @@ def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
     if laws.alternate != 0.0:
         pixels.parity[p] ^= 1
         pixels.threshold[p] += laws.alternate * (pixels.parity[p] - 0.5)
+    if laws.ripple != 0.0:
+        turns = laws.ripple_cycles * (n + at + window.start[work.row[i]]) + laws.ripple_phase
+        pixels.threshold[p] += laws.ripple * np.sin(2.0 * np.pi * turns)

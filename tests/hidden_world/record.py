@@ -1,4 +1,5 @@
-"""A trial in one file: a line a case, what was said of it and by which code, to be scored anew or gone on with.
+"""A trial in one file: a line a case, what it hid, what was said of it and by which code, to be scored anew or gone on
+with.
 
 What scoring does not need of a diagnosis is left out.
 """
@@ -10,7 +11,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from tests.hidden_world.keys import write_whole
+from tests.hidden_world.keys import open_key, write_whole
 from tests.hidden_world.trial import is_done
 
 SAID = ("verdict", "effects", "unknown", "class", "parameters", "data", "not_testable", "simulated")
@@ -20,7 +21,7 @@ SAID = ("verdict", "effects", "unknown", "class", "parameters", "data", "not_tes
 def pack(out: Path, record: Path) -> int:
     """Write all results in OUT that hold a diagnosis to a record, in the order of their ids; returns how many."""
     found = [json.loads(p.read_text(encoding="utf-8")) for p in sorted((out / "results").glob("*.json"))]
-    lines = [json.dumps(in_short(result)) for result in found if "diagnosis" in result]
+    lines = [json.dumps({**in_short(r), "hidden": _hidden(out, r["id"])}) for r in found if "diagnosis" in r]
     write_whole(record, "".join(line + "\n" for line in lines))
     return len(lines)
 
@@ -36,11 +37,19 @@ def unpack(record: Path, out: Path, ids: Collection[str]) -> int:
     lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
     results = [_result(line, record) for line in lines]
     if others := {r["id"] for r in results} - set(ids):
-        raise ValueError(f"{record} is of another trial (other set or part): it has {min(others)}; take another file")
+        raise ValueError(
+            f"{record} is of another trial (other set, part or cases): it has {min(others)}; take another file"
+        )
     lacking = [r for r in results if not is_done(out, r["id"])]
     for result in lacking:
         write_whole(out / "results" / f"{result['id']}.json", json.dumps(result, indent=1) + "\n")
     return len(lacking)
+
+
+def _hidden(out: Path, case_id: str) -> list[str]:
+    """What a case hid, `name` by its near law or `name/law` by a far one; its diagnosis is done."""
+    hidden = open_key(out, case_id)["recipe"]["hidden"]
+    return [f"{h['name']}/{h['law']}" if h["law"] else h["name"] for h in hidden]
 
 
 def _result(line: str, record: Path) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def solved(x: float, fraction: float, tau: float) -> float:
         ("comparator_delay", {"delay_us": 2.5}, 0.1, lambda x: 1 / x + 0.1 / np.sqrt(x)),
         ("incomplete_reset", {"fraction": 0.1, "tau_us": 250.0}, 0.15, lambda x: solved(x, 0.1, 10.0)),
         ("photo_response_nonlinearity", {"beta": 0.1}, 0.5, lambda x: 1 / (x * (1 - 0.1 * x))),
-        ("crosstalk", {"kick": 0.01, "at_spike": 0.0}, 0.3, lambda x: (1 - 0.04 * (1 - 1 / 32)) / x),
+        ("crosstalk", {"law": "late", "kick": 0.01}, 0.3, lambda x: (1 - 0.04 * (1 - 1 / 32)) / x),
         ("ir_drop", {"droop": 0.05}, 0.4, lambda x: (1 + 0.05 * 0.39227) * 2.5),
         ("afterpulsing", {"probability": 0.02, "delay_frames": 2}, 0.1, lambda x: 1 / (x * 1.02)),
         ("missed_spikes", {"probability": 0.02}, 0.1, lambda x: 1 / (x * 0.98)),

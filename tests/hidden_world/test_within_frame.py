@@ -10,7 +10,7 @@ import pytest
 from tests.hidden_world.bench import filmed, hidden, intervals, plain_camera, walk_of_spikes
 from tests.hidden_world.light import Light
 from tests.hidden_world.unit import SWING_V
-from tests.hidden_world.waves import Clock, Flashes, Polygon, Pulses, Rise, Sine, Wave
+from tests.hidden_world.waves import Clock, Flashes, Polygon, Pulses, Rise, Sine, SlewingClock, Square, Wave
 
 QUIET = plain_camera((32, 32), electrons=0.0, spread=0.0)
 LOOSE = plain_camera((32, 32), electrons=2e3, kappa=0.05, spread=0.1)
@@ -28,10 +28,12 @@ def near(value: float, expected: float, tolerance: float) -> None:
         Sine(0.3, 0.425, 0.2),
         Pulses(7.3, 2.1, 4.0),
         Rise(0.5, 30.0),
+        Rise(0.5, 30.0, begin=-20.0),
+        Square(0.3, 0.041, 0.2),
         Flashes(np.array([2.2, 9.7]), 0.4, 3.0),
         Polygon(np.array([0.0, 3.5, 3.6, 11.0]), np.array([0.1, 0.1, 0.5, 0.2])),
     ],
-    ids=lambda w: type(w).__name__,
+    ids=lambda w: f"{type(w).__name__}{getattr(w, 'begin', 0.0) or ''}",
 )
 def test_areas_are_the_integrals_of_values(wave: Wave):
     middles = (np.arange(200_000) + 0.5) * 1e-4
@@ -48,6 +50,9 @@ def test_a_clock_is_the_sum_of_all_its_edges_tails():
     at = np.append(clock.nodes(), 1.0)
     fine = np.linspace(0, 1, 4001)
     assert np.abs(np.interp(fine, at, clock.height(at)) - clock.height(fine)).max() < 9.0 / 280
+    slewing = SlewingClock(9.0, 0.7, 0.25)
+    at = np.append(slewing.nodes(), 1.0)
+    assert np.allclose(np.interp(fine, at, slewing.height(at)), slewing.height(fine))
 
 
 def square(low: float, high: float, edges: np.ndarray, rise: float = 1e-6) -> Light:
@@ -155,7 +160,7 @@ def kicked_in_small_steps(gain: np.ndarray, x: float, kappa: float, kick: float,
 def test_a_kick_at_the_spike_is_in_the_order_of_time():
     """Neighbours' bits, kick 0.02, light 0.22: about +0.036 in the same frame and -0.013 in the next."""
     camera = plain_camera((32, 32), electrons=0.0, kappa=0.02, spread=0.1)
-    bits = filmed(camera, 0.22, 8000, [hidden("crosstalk", kick=0.02, at_spike=1.0)])[500:]
+    bits = filmed(camera, 0.22, 8000, [hidden("crosstalk", kick=0.02)])[500:]
     slow = kicked_in_small_steps(camera.gain, 0.22, 0.02, 0.02, 3000, 64)[500:]
     for lag, published in ((0, 0.036), (1, -0.013)):
         near(coincidences(bits, lag), coincidences(slow, lag), 0.005)
@@ -164,13 +169,13 @@ def test_a_kick_at_the_spike_is_in_the_order_of_time():
 
 def test_a_kick_at_the_end_of_the_frame_shows_in_the_next():
     camera = plain_camera((32, 32), electrons=0.0, kappa=0.02, spread=0.1)
-    bits = filmed(camera, 0.22, 8000, [hidden("crosstalk", kick=0.02, at_spike=0.0)])[500:]
+    bits = filmed(camera, 0.22, 8000, [hidden("crosstalk", "late", kick=0.02)])[500:]
     assert coincidences(bits, 0) < -0.008 and coincidences(bits, 1) > 0.008
 
 
 def test_kicks_at_once_give_their_charge():
     """Less what of a kick is beyond the threshold, half of it, where it makes a pixel fire: a reset takes all."""
-    rate = filmed(plain_camera((32, 32)), 0.3, 2000, [hidden("crosstalk", kick=0.01, at_spike=1.0)]).mean()
+    rate = filmed(plain_camera((32, 32)), 0.3, 2000, [hidden("crosstalk", kick=0.01)]).mean()
     kicks = 4 * (1 - 1 / 32)
     near(rate, 0.3 / (1 - kicks * 0.01 + kicks * 0.01**2 / 2), 5 * 0.6 / 2000 / 32)
 

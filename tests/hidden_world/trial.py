@@ -27,7 +27,7 @@ from typing import Any
 
 from tests.hidden_world.cases import GROUPS, Case, cases
 from tests.hidden_world.keys import open_key, seal, write_whole
-from tests.hidden_world.score import Figure, Scored, by_effect, confusion, figures, score_case
+from tests.hidden_world.score import Figure, Scored, by_category, by_effect, figures, score_case
 from tests.hidden_world.world import write_campaign
 
 Diagnose = Callable[[Path, str, Path, int, "tuple[str, ...]", int], "dict[str, Any]"]
@@ -163,8 +163,8 @@ def score_trial(out: Path, picked: Sequence[Case]) -> dict[str, Any]:
         "errors": sum(bool(s.error) for s in scored),
         "code": dict(by),
         "figures": [{**asdict(f), "met": f.met} for f in made],
+        "categories": by_category(scored),
         "effects": by_effect(scored),
-        "confusion": confusion(scored),
         "scored": [asdict(s) for s in scored],
     }
     write_whole(out / "trial.json", json.dumps(trial, indent=1) + "\n")
@@ -187,29 +187,31 @@ def as_text(trial: dict[str, Any]) -> str:
         for f in trial["figures"]
     ]
     wrong = [s for s in trial["scored"] if not s["right"]]
-    matrix = [
-        {"true": true, "answered": ", ".join(f"{name} {n}" for name, n in sorted(row.items(), key=lambda i: -i[1]))}
-        for true, row in trial["confusion"].items()
-    ]
     lines = [
         f"# Blind trial: {trial['cases']} of {trial['of']} cases, {trial['errors']} ended in an error",
         "",
         f"Diagnosed by {', '.join(f'{name} ({count})' for name, count in trial['code'].items()) or 'nobody'}.",
         "",
         _table(rows),
+        "## By category and law",
+        "",
+        _table(trial["categories"]),
         "## By effect: right of tried, by group",
         "",
         _table(
             trial["effects"], ("effect", "strong", "severe", "weak", "base", "outside", "strength/limit", "answers")
         ),
-        "## Confusion: what was there, what was said",
-        "",
-        _table(matrix),
         "## Not right",
         "",
-        _table([{"id": s["id"], "group": s["group"], "true": s["what"], "said": s["answer"]} for s in wrong]),
+        _table([{"id": s["id"], "group": s["group"], "true": _hidden(s), "said": s["answer"]} for s in wrong]),
     ]
     return "\n".join(lines)
+
+
+def _hidden(scored: dict[str, Any]) -> str:
+    """What a case hides, far laws named."""
+    laws = ", ".join(law for law in scored["laws"] if law)
+    return f"{scored['what']} ({laws})" if laws else scored["what"]
 
 
 def _table(rows: Sequence[dict[str, Any]], columns: Sequence[str] = ()) -> str:

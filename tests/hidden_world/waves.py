@@ -47,6 +47,22 @@ class Sine:
 
 
 @dataclass(frozen=True)
+class Square:
+    """1 + amplitude in the first half of each period, 1 - amplitude in the second."""
+
+    amplitude: float
+    cycles: float
+    phase: float
+
+    def value(self, t: Array) -> Array:
+        return 1.0 + self.amplitude * np.where((self.cycles * t + self.phase) % 1.0 < 0.5, 1.0, -1.0)
+
+    def area(self, t: Array) -> Array:
+        into = (self.cycles * t + self.phase) % 1.0
+        return t + self.amplitude / self.cycles * np.minimum(into, 1.0 - into)
+
+
+@dataclass(frozen=True)
 class Pulses:
     """1, and 0 for the first `shut` frames of every period; phase: frames into a period at time 0."""
 
@@ -64,16 +80,17 @@ class Pulses:
 
 @dataclass(frozen=True)
 class Rise:
-    """1 + rise (1 - exp(-t / tau)) from time 0 on, 1 before."""
+    """1 + rise (1 - exp(-(t - begin) / tau)) from `begin` on, 1 before."""
 
     rise: float
     tau: float
+    begin: float = 0.0
 
     def value(self, t: Array) -> Array:
-        return 1.0 - self.rise * np.expm1(-np.maximum(t, 0.0) / self.tau)
+        return 1.0 - self.rise * np.expm1(-np.maximum(t - self.begin, 0.0) / self.tau)
 
     def area(self, t: Array) -> Array:
-        gone = np.maximum(t, 0.0)
+        gone = np.maximum(t - self.begin, 0.0)
         return t + self.rise * (gone + self.tau * np.expm1(-gone / self.tau))
 
 
@@ -137,6 +154,17 @@ class Clock:
     def height(self, since: Array) -> Array:
         """Value `since` frames (0 .. 1) after an edge; 1: just before the next one."""
         return -self.amplitude * np.exp(-since / self.tau)
+
+
+@dataclass(frozen=True)
+class SlewingClock(Clock):
+    """The same edge, from which the line comes back along a straight one, in 2 tau."""
+
+    def nodes(self) -> Array:
+        return np.array([0.0, min(2.0 * self.tau, 0.999)])
+
+    def height(self, since: Array) -> Array:
+        return -self.amplitude * np.maximum(1.0 - since / (2.0 * self.tau), 0.0)
 
 
 def means(waves: Sequence[Wave], t: Array) -> Array:

@@ -18,7 +18,7 @@ from tests.hidden_world.campaign import Recorded, write_index, write_recording
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 from tests.hidden_world.integrator import Physics, Recording
 from tests.hidden_world.light import Light, Shot, plan
-from tests.hidden_world.mechanism import Bits, Hidden, Mechanism
+from tests.hidden_world.mechanism import Bits, Hidden, Law, Mechanism
 from tests.hidden_world.outside import OUTSIDE
 from tests.hidden_world.tricky import changed_labels, changed_plan
 from tests.hidden_world.unit import Camera, draw_camera
@@ -42,6 +42,11 @@ class Recipe:
 def stream(seed: int, *names: object) -> np.random.Generator:
     """A generator for each purpose, so that what is drawn for one changes nothing for another."""
     return np.random.default_rng([seed, *(zlib.crc32(str(name).encode()) for name in names)])
+
+
+def law_of(hidden: Hidden) -> Law:
+    """By which a mechanism acts in a camera."""
+    return MECHANISMS[hidden.name].by(hidden.law)
 
 
 def write_campaign(recipe: Recipe, folder: str | Path) -> dict[str, Any]:
@@ -88,7 +93,7 @@ def _film(recipe: Recipe, camera: Camera, shot: Shot, hidden: Sequence[Hidden]) 
         parts.append(under_way.frames(first, stop))
     bits = (parts[0] if len(parts) == 1 else np.concatenate(parts)).reshape(recipe.frames, *recipe.shape)
     for h in hidden:
-        change = MECHANISMS[h.name].bits
+        change = law_of(h).bits
         if change is not None:
             first = round(h.since * recipe.frames)
             bits[first:] = change(bits[first:], h.parameters, stream(recipe.seed, h.name, "bits", shot.name))
@@ -99,11 +104,11 @@ def physics_of(recipe: Recipe, camera: Camera, shot: Shot, hidden: Sequence[Hidd
     """What a recording goes through with these mechanisms."""
     light: Light = shot.light
     for h in hidden:
-        mechanism = MECHANISMS[h.name]
-        if mechanism.camera is not None:
-            camera = mechanism.camera(camera, h.parameters, stream(recipe.seed, h.name, "camera"))
-        if mechanism.light is not None:
-            light = mechanism.light(light, recipe.shape, h.parameters)
+        law = law_of(h)
+        if law.camera is not None:
+            camera = law.camera(camera, h.parameters, stream(recipe.seed, h.name, "camera"))
+        if law.light is not None:
+            light = law.light(light, recipe.shape, h.parameters)
     radiance = light.radiance.reshape(len(light.radiance), -1)
     physics = Physics(
         recipe.shape,
@@ -115,9 +120,10 @@ def physics_of(recipe: Recipe, camera: Camera, shot: Shot, hidden: Sequence[Hidd
         camera.per_mv.reshape(-1),
         light.key_frame,
         radiance,
+        before=float(shot.order * recipe.frames),
     )
     for h in hidden:
-        change = MECHANISMS[h.name].physics
+        change = law_of(h).physics
         if change is not None:
             rng = stream(recipe.seed, h.name, "physics", shot.name)
             change(physics, camera, recipe.frames, h.parameters, rng)
