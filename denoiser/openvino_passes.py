@@ -95,8 +95,8 @@ class _ChannelsLast(nn.Module):
         self.network, self.span = network, span
 
     def forward(self, seen: Tensor, hidden: Tensor, planes: Tensor | None = None) -> tuple[Tensor, Tensor]:
-        beside = seen[..., self.span :]
-        return self.network.passed(*(x.permute(0, 3, 1, 2) for x in (seen, beside, hidden)), planes)
+        seen, beside, hidden = (x.permute(0, 3, 1, 2) for x in (seen, seen[..., self.span :], hidden))
+        return self.network.passed(seen, beside, hidden, planes)
 
 
 def _taken_over(network: nn.Module, example: tuple[Tensor, ...]) -> Any:

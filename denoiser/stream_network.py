@@ -96,12 +96,11 @@ class StreamDnSS(nn.Module):
         joined = self.join(joint(self.up(self.coarse(fine)), fine))
         first = self.unfold(self.out(joined))
         count = first.shape[1]
-        *features, last = self.head
-        change = joint(first, beside.to(first.dtype))
-        for layer in features:
-            change = layer(change)
+        features, last = self.head[0], self.head[1]
+        assert isinstance(last, nn.Conv2d) and last.bias is not None
+        change = features(joint(first, beside.to(first.dtype)))
         outputs = count if planes is None else last.out_channels
-        change = functional.conv2d(change, last.weight[:outputs], last.bias[:outputs], padding=last.padding)
+        change = functional.conv2d(change, last.weight[:outputs], last.bias[:outputs], padding=1)
         rate = first.float() + change[:, :count].float()
         if planes is not None:
             logits = functional.pad(change[:, count:].float() + MEANS_BEGIN, (0, 0, 0, 0, 1, 0))
@@ -113,6 +112,6 @@ class StreamDnSS(nn.Module):
 
 def joint(*parts: Tensor) -> Tensor:
     """`torch.cat` along the channels; last in memory, they are made the last axis: several times faster."""
-    if all(part.stride(1) == 1 for part in parts) and not torch.jit.is_tracing():
+    if all(part.stride(1) == 1 for part in parts) and not torch.jit.is_tracing():  # type: ignore[attr-defined]
         return torch.cat([part.movedim(1, -1) for part in parts], dim=-1).movedim(-1, 1)
     return torch.cat(parts, dim=1)

@@ -6,6 +6,7 @@ spikecam bench online
 from __future__ import annotations
 
 import time
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -25,24 +26,29 @@ CHUNK = 16
 def bench_online(threads: tuple[int, ...] = (1, 2), seconds: float = 3.0, seed: int = 0) -> list[dict[str, Any]]:
     """Frames a second of `OnlineDnSS` on a noisy stream of the disk, by size, network evaluation stride and threads.
 
-    Columns: mode, size, stride (frames between network evaluations; `best` gives 16 frames an evaluation), threads,
-    frames/s, x paper (same size and threads, stride 1), x real time (40 000 frames a second), latency [frames].
+    Of `best` both engines, where OpenVINO is installed.
+    Columns: mode, engine, size, stride (frames between network evaluations; `best` gives 16 frames an evaluation),
+    threads, frames/s, x paper (same size and threads, stride 1), x real time (40 000 frames a second), latency
+    [frames].
     """
     before = torch.get_num_threads()
-    contestants = [("paper", stride) for stride in STRIDES] + [("best", recipe_of("best").layout.planes)]
+    engines = ["torch", *(["openvino"] if find_spec("openvino") else [])]
+    contestants = [("paper", "torch", stride) for stride in STRIDES]
+    contestants += [("best", engine, recipe_of("best").layout.planes) for engine in engines]
     jobs = [(shape, count, *c) for shape in SHAPES for count in threads for c in contestants]
     rows: list[dict[str, Any]] = []
     base = 0.0
     try:
-        for shape, count, mode, stride in tqdm(jobs, desc="bench", unit="row", leave=False):
+        for shape, count, mode, engine, stride in tqdm(jobs, desc="bench", unit="row", leave=False):
             torch.set_num_threads(count)
-            options = {"stride": stride} if mode == "paper" else {}
+            options: dict[str, Any] = {"stride": stride} if mode == "paper" else {"engine": engine}
             online = OnlineDnSS.pretrained(mode, output="both", **options)
             rate = _frames_a_second(online, _stream(shape, seed), seconds)
             base = rate if (mode, stride) == ("paper", 1) else base
             rows.append(
                 {
                     "mode": mode,
+                    "engine": engine,
                     "size": f"{shape[0]} x {shape[1]}",
                     "stride": stride,
                     "threads": count,

@@ -18,48 +18,60 @@ class Bench:
     example:  spikecam bench sensor
     """
 
-    what: tyro.conf.Positional[Literal["sensor", "effects", "online", "live", "env", "scenes", "renderers", "dataset"]]
+    what: tyro.conf.Positional[
+        Literal["sensor", "effects", "online", "live", "loop", "env", "scenes", "renderers", "dataset"]
+    ]
     """sensor: pixel-steps a second of numpy, reference and fast.  effects: what each costs, over the base model.
     online: denoised frames a second.  live: pictures a second of a stream as it comes, frames lost, latency, and the
-    error of leaving passes out (some minutes).  env: steps a second of 1, 16 and 64 environments, one way and another.
-    scenes: frames of light a second, how far they are from the truth, renderers, scene to spikes, and whether the flow
-    is right (some minutes).  renderers: how fast and how exact each back-end of this machine is.  dataset: frames a
-    second into files."""
+    error of leaving passes out (some minutes).  loop: scene to denoised rates, each stage and the whole.  env: steps a
+    second of 1, 16 and 64 environments, one way and another.  scenes: frames of light a second, how far they are from
+    the truth, renderers, scene to spikes, and whether the flow is right (some minutes).  renderers: how fast and how
+    exact each back-end of this machine is.  dataset: frames a second into files."""
     out: Path | None = None
     """Where to write the figures as JSON."""
+    json: bool = False
+    """Print the figures as JSON, and no table."""
 
     def run(self) -> None:
         from spikecam_env.bench.dataset import bench_dataset
         from spikecam_env.bench.effects import bench_effects
         from spikecam_env.bench.environments import bench_environments
         from spikecam_env.bench.live import bench_live
+        from spikecam_env.bench.loop import bench_loop
         from spikecam_env.bench.machine import machine
         from spikecam_env.bench.online import bench_online
         from spikecam_env.bench.renderers import bench_renderers
         from spikecam_env.bench.scenes import bench_scenes
         from spikecam_env.bench.sensor import bench_sensor
-        from spikecam_env.cli.files import write_json
+        from spikecam_env.cli.files import json_text, write_json
         from spikecam_env.cli.table import table
         from spikecam_env.whole import check_file
 
         if self.out is not None:
             check_file(self.out)
-        print(machine())
+        if not self.json:
+            print(machine())
         benches: dict[str, Callable[[], list[dict[str, Any]] | dict[str, list[dict[str, Any]]]]] = {
             "sensor": bench_sensor,
             "effects": bench_effects,
             "online": bench_online,
             "live": bench_live,
+            "loop": bench_loop,
             "env": bench_environments,
             "scenes": bench_scenes,
             "renderers": bench_renderers,
             "dataset": bench_dataset,
         }
         rows = benches[self.what]()
-        for title, part in rows.items() if isinstance(rows, dict) else [("", rows)]:
-            if title:
-                print(f"\n{title}")
-            print(table(part))
+        figures = {"machine": machine(), "rows": rows}
+        if self.json:
+            print(json_text(figures))
+        else:
+            for title, part in rows.items() if isinstance(rows, dict) else [("", rows)]:
+                if title:
+                    print(f"\n{title}")
+                print(table(part))
         if self.out is not None:
-            write_json(self.out, {"machine": machine(), "rows": rows})
-            print(f"wrote {self.out}")
+            write_json(self.out, figures)
+            if not self.json:
+                print(f"wrote {self.out}")

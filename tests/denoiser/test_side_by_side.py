@@ -11,6 +11,7 @@ from denoiser.pixel_map import PixelMap
 from denoiser.recipe import RECIPES
 from denoiser.side_by_side import ROWS, side_by_side
 from denoiser.window import RollingWindow, Window
+from spikecam_env.threads import as_many_as_pay
 
 BEST = RECIPES["best"]
 
@@ -52,3 +53,20 @@ def test_a_pass_gives_the_bits_of_the_call_of_training(number_type, shape, mappe
         found, carried = infer.rates(network, w, number_type, carried)
         assert found.any() and np.array_equal(found, rate[0].float().clamp(0, 1).numpy())
         assert all(np.array_equal(a, b[0].numpy()) for a, b in zip(carried, kept, strict=True))
+
+
+def test_threads_change_no_bit():
+    """Frames so large that two threads share them."""
+    shape = (130, 140)
+    spikes = (np.random.default_rng(0).random((64, *shape)) < 0.2).astype(np.uint8)
+    before, found = torch.get_num_threads(), []
+    try:
+        for threads in (1, 2):
+            torch.set_num_threads(threads)
+            window = list(RollingWindow(BEST.layout, shape).push(spikes))[-1]
+            pixels = side_by_side([window], [None], torch.bfloat16, 4)
+            assert as_many_as_pay(threads, 9, min(window.spikes.size, pixels.numel())) == threads
+            found.append((window.planes, pixels))
+    finally:
+        torch.set_num_threads(before)
+    assert np.array_equal(found[0][0], found[1][0]) and torch.equal(found[0][1], found[1][1])
