@@ -166,25 +166,89 @@ def fit(key_pixels: Floats, pixels: Floats) -> tuple[Floats, Floats]:
     Returns the frames of reference (n, 3): middle x, y and 1 / spread; and the coefficients (n, 2, 6).
     What points do not determine stays as it is without turn: texels = DENSITY * pixels + constant.
     """
-    middle = pixels.mean(-2)
-    offset = pixels - middle[:, None]
-    spread = np.maximum(np.sqrt((offset**2).sum(-1).mean(-1)), 1.0)
-    u, v = np.moveaxis(offset / spread[:, None, None], -1, 0)
-    basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], -1)
-    rest = key_pixels - DENSITY * offset
-    transposed = np.swapaxes(basis, -1, -2)
-    normal = transposed @ basis + RIDGE * np.diag([0.0, 1, 1, 1, 1, 1])
-    found = np.linalg.solve(normal, transposed @ rest)
-    found[:, 1, 0] += DENSITY * spread
-    found[:, 2, 1] += DENSITY * spread
-    return np.concatenate([middle, 1 / spread[:, None]], -1), np.swapaxes(found, -1, -2)
+    reference, found = np.empty((len(pixels), 3)), np.empty((len(pixels), 2, 6))
+    _fit(np.ascontiguousarray(key_pixels), np.ascontiguousarray(pixels), reference, found)
+    return reference, found
 
 
-def _texels(reference: Floats, coefficients: Floats, pixels: Floats) -> Floats:
-    """Where the polynomials put pixels (n, J, 2)."""
-    u, v = np.moveaxis((pixels - reference[:, None, :2]) * reference[:, 2, None, None], -1, 0)
-    basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], -1)
-    return np.asarray(basis @ np.swapaxes(coefficients, -1, -2))
+@njit(nogil=True, cache=True, error_model="numpy")
+def _fit(key_pixels, pixels, reference, found):  # pragma: no cover - compiled
+    """See `fit`; instant by instant, so that none depends on what else is asked for."""
+    normal, right, basis = np.empty((6, 6)), np.empty((6, 2)), np.empty(6)
+    for n in range(len(pixels)):
+        points, count = pixels[n], len(key_pixels)
+        x = y = square = 0.0
+        for j in range(count):
+            x += points[j, 0]
+            y += points[j, 1]
+        x /= count
+        y /= count
+        for j in range(count):
+            square += (points[j, 0] - x) ** 2 + (points[j, 1] - y) ** 2
+        spread = max(np.sqrt(square / count), 1.0)
+        normal[:], right[:] = 0.0, 0.0
+        for j in range(count):
+            across, down = points[j, 0] - x, points[j, 1] - y
+            _basis(across / spread, down / spread, basis)
+            for row in range(6):
+                for column in range(row + 1):
+                    normal[row, column] += basis[row] * basis[column]
+                right[row, 0] += basis[row] * (key_pixels[j, 0] - DENSITY * across)
+                right[row, 1] += basis[row] * (key_pixels[j, 1] - DENSITY * down)
+        for row in range(1, 6):
+            normal[row, row] += RIDGE
+        _solve(normal, right)
+        reference[n, 0], reference[n, 1], reference[n, 2] = x, y, 1 / spread
+        for axis in range(2):
+            for row in range(6):
+                found[n, axis, row] = right[row, axis]
+            found[n, axis, 1 + axis] += DENSITY * spread
+
+
+@njit(inline="always")
+def _basis(u, v, basis):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """What the polynomial is a sum of, (6,), at (u, v)."""
+    basis[0], basis[1], basis[2], basis[3], basis[4], basis[5] = 1.0, u, v, u * u, u * v, v * v
+
+
+@njit(inline="always")
+def _solve(normal, right):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Solve normal x = right (6, 2) in place by Cholesky's factors; normal (6, 6), of which the lower half is read, is
+    positive definite."""
+    for row in range(6):
+        for column in range(row + 1):
+            rest = normal[row, column]
+            for k in range(column):
+                rest -= normal[row, k] * normal[column, k]
+            normal[row, column] = np.sqrt(rest) if row == column else rest / normal[column, column]
+    for axis in range(2):
+        for row in range(6):
+            for k in range(row):
+                right[row, axis] -= normal[row, k] * right[k, axis]
+            right[row, axis] /= normal[row, row]
+        for row in range(5, -1, -1):
+            for k in range(row + 1, 6):
+                right[row, axis] -= normal[k, row] * right[k, axis]
+            right[row, axis] /= normal[row, row]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _astray(key_pixels, pixels, reference, found, furthest):  # pragma: no cover - compiled
+    """furthest (n,): how far the polynomials put pixels (n, J, 2) from texels (J, 2) of the key, in x or y, at most."""
+    basis = np.empty(6)
+    for n in range(len(pixels)):
+        furthest[n] = 0.0
+        for j in range(len(key_pixels)):
+            u, v = (
+                (pixels[n, j, 0] - reference[n, 0]) * reference[n, 2],
+                (pixels[n, j, 1] - reference[n, 1]) * reference[n, 2],
+            )
+            _basis(u, v, basis)
+            for axis in range(2):
+                place = 0.0
+                for row in range(6):
+                    place += found[n, axis, row] * basis[row]
+                furthest[n] = max(furthest[n], abs(place - key_pixels[j, axis]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +273,8 @@ def carry(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats
     pixels, _ = project(view, key.points, focal, (0.0, 0.0))
     pixels += centre[:, None]
     reference, coefficients = fit(key.texels, pixels)
-    astray = np.abs(_texels(reference, coefficients, pixels) - key.texels).max((1, 2))
+    astray = np.empty(len(pixels))
+    _astray(key.texels, pixels, reference, coefficients, astray)
     rigid = np.concatenate([_rigid(key, view, key_view, focal, centre), astray[:, None]], -1)
     return Carried(key, reference.astype(np.float32), coefficients.astype(np.float32), rigid.astype(np.float32))
 

@@ -79,7 +79,7 @@ class World(WorldSpec):
             work += paint(self, self.cache, self.plan(block), frames[piece], gaze, pictures[piece])
         for part in work:
             part.result()
-        return Keyframes(frames, pictures)
+        return Keyframes.known(frames, pictures)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame, each body rendered at that very instant."""
