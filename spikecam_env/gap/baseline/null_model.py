@@ -29,6 +29,8 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
     made = twins(case, model, base, range(count))
     banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]
     null = null_of(banks, list(case.bank), [t.base for t in made if t.base])
+    own = [values_of(t.pattern, null.keys) for t in made]
+    null = replace(null, draws=tuple(replace(d, pattern=p) for d, p in zip(null.draws, own, strict=False)))
     moving = [i for i, c in enumerate(case.conditions) if c.moves and c.use == "fit"]
     if moving:
         null = with_more_twins(null, [t.bank for t in twins(case, model, base, range(count, 2 * count), moving)])

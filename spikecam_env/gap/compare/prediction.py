@@ -28,11 +28,14 @@ class Draw:
     """One simulated campaign.  number: of its random draws.  values: (S,), NaN where it was not simulated.
 
     refit: of its unit, None where nothing was simulated that a refit rests on.
+    pattern: (S,) of its own rates, whose unit is the measured one, NaN elsewhere; those among `values` are of fresh
+    units.
     """
 
     number: int
     values: Array
     refit: BaseFit | None
+    pattern: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,19 @@ def paired(null: Null, made: Sequence[Draw]) -> Prediction:
         own = np.where(counted, 1.0, pair_noise_share(null.keys) * null.sd)
         error2, spread = own**2 * (change[0] != 0), null.sd
     return Prediction(null.mean + change.mean(axis=0), np.sqrt(null.sd**2 / null.twins + error2), spread, tuple(made))
+
+
+def with_pattern_moved(null: Null, made: Draw) -> Draw:
+    """A campaign whose pattern is that of the null's fresh unit of the same number, moved by as much as an effect moves
+    the pattern of a twin; by less than fresh units vary, not at all.
+
+    A response that bends or locks to the frames changes how far apart pixels are, though it is no pattern.
+    """
+    without = next(d for d in null.draws if d.number == made.number)
+    if made.pattern is None or without.pattern is None:
+        return made
+    moved = np.nan_to_num(made.pattern - without.pattern)
+    return replace(made, values=np.where(np.abs(moved) > null.sd, without.values + moved, made.values))
 
 
 def pair_noise_share(keys: Sequence[Key]) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, paired, values_of
+from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, paired, values_of, with_pattern_moved
 from spikecam_env.gap.twins.case import Case, twins
 from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS, drawn_banks
 from spikecam_env.gap.unit.false_spikes import false_spikes_of
@@ -30,8 +30,11 @@ def predict_by_twins(
     recordings, by index) is as in `null`."""
     numbers = [d.number for d in null.draws[-count:]]
     made = twins(case, model, base, numbers, only, {d.number: d.refit for d in null.draws})
-    draws = [Draw(n, values_of(t.bank, null.keys), t.base) for n, t in zip(numbers, made, strict=True)]
-    predicted = paired(null, draws)
+    draws = [
+        Draw(n, values_of(t.bank, null.keys), t.base, values_of(t.pattern, null.keys))
+        for n, t in zip(numbers, made, strict=True)
+    ]
+    predicted = paired(null, [with_pattern_moved(null, d) for d in draws])
     changes_pattern = traps_of(model) or false_spikes_of(model)
     return with_drawn_pattern(case, model, null, predicted) if changes_pattern else predicted
 

@@ -69,10 +69,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Twin:
-    """One simulated campaign: its statistics, and its own refit where what that rests on was simulated."""
+    """One simulated campaign: its statistics, and its own refit where what that rests on was simulated.
+
+    pattern: statistics of the pattern of its rates, whose unit is the measured one.
+    """
 
     bank: dict[Key, float]
     base: BaseFit | None
+    pattern: dict[Key, float] = field(default_factory=dict)
 
 
 def case_of(
@@ -120,7 +124,8 @@ def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequen
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)
     own = free_refit(observations, conditions) if refit_recordings(case) <= set(which) else None
-    return Twin(statistics_bank(Reading(observations, conditions, own or refit, case.films)), own)
+    reading = Reading(observations, conditions, own or refit, case.films)
+    return Twin(statistics_bank(reading), own, pattern_bank(reading))
 
 
 def refit_recordings(case: Case) -> set[int]:

@@ -1,8 +1,9 @@
 """The remainder: what named effects leave beyond chance, where their law differs in details from the catalogue's.
 
-It is judged where it is left, by group of statistics and recording: what was far off elsewhere makes it no smaller, so
-that a strong effect hides no other.  What a mechanism outside of the catalogue leaves of its best stand-in is as large
-as what was there in some of them; what the right name of a slightly different law leaves is small in all.
+It is judged in all, and where it is left, by group of statistics and recording: what was far off elsewhere makes it no
+smaller there, so that a strong effect hides no other.  The best stand-in of a mechanism outside of the catalogue may
+take 99.9 % of the sum of squares, and yet leaves some group of some recording as it was; the right name of a slightly
+different law does not.
 """
 
 from __future__ import annotations
@@ -12,23 +13,29 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.distance import GATE, adjusted, normal_deviates, residual
+from spikecam_env.gap.compare.distance import GATE, adjusted, normal_deviates, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.result import Remainder
 from spikecam_env.gap.statistics import Key
 
 Array = NDArray[np.float64]
 
-MOST_LEFT = 0.2
-"""Largest distance that a name may leave beyond chance, over the largest before in the same group of statistics of the
-same recording; set on the trial's part `tune`."""
+MOST_LEFT = 0.05
+"""Share of the deviance beyond chance that a name may leave; set on the trial's part `tune`."""
+
+MOST_LEFT_THERE = 0.25
+"""Share of the sum of squares in a group of statistics of a recording that a name may leave there, of statistics that
+are beyond chance; set on the trial's part `tune`."""
 
 
 def explains(null: Null, values: Array, predicted: Prediction) -> bool:
     """Whether a prediction leaves chance of measured statistics (S,), or little beside what the null model leaves."""
-    there = largest_there(null.keys, distance(null, values, null.mean))
-    little = np.abs(distance(null, values, predicted.mean)) < MOST_LEFT * there
-    return bool(np.all(little, where=is_left(null, values, predicted)))
+    off = is_left(null, values, predicted)
+    before, after = (distance(null, values, mean) for mean in (null.mean, predicted.mean))
+    there = sums_by_place(null.keys, before**2 - 1.0)
+    little = sums_by_place(null.keys, np.where(off, after**2, 0.0)) <= MOST_LEFT_THERE * np.maximum(there, 1.0)
+    deviance = [robust_beyond_chance(null, rho) for rho in (before, residual(null, values, predicted))]
+    return bool(not off.any() or (np.all(little) and deviance[1] < MOST_LEFT * deviance[0]))
 
 
 def remainder_of(null: Null, values: Array, predicted: Prediction, where: str = "", when: str = "") -> Remainder | None:
@@ -65,13 +72,17 @@ def distance(null: Null, values: Array, mean: Array) -> Array:
     return np.nan_to_num((values - mean) / null.noise)
 
 
-def largest_there(keys: Sequence[Key], distances: Array) -> Array:
-    """(S,) the largest of (S,) distances in the same group of the same recording."""
+def sums_by_place(keys: Sequence[Key], squares: Array) -> Array:
+    """(S,) sum of (S,) squares over the same group of statistics of the same recording."""
     places = [(k.group, k.recording) for k in keys]
-    largest = dict.fromkeys(places, 0.0)
-    for place, d in zip(places, np.abs(distances), strict=True):
-        largest[place] = max(largest[place], float(d))
-    return np.array([largest[place] for place in places])
+    of = {place: i for i, place in enumerate(dict.fromkeys(places))}
+    place = np.array([of[p] for p in places])
+    return np.asarray(np.bincount(place, squares)[place])
+
+
+def robust_beyond_chance(null: Null, rho: Array) -> float:
+    """Deviance of residuals (S,) beyond what chance makes: one that is far off counts by its logarithm."""
+    return robust_squares(rho, null.weight) - float(np.sum(null.weight * np.ones(len(rho))))
 
 
 def beyond_chance(null: Null, distances: Array) -> float:

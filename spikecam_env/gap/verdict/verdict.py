@@ -122,13 +122,16 @@ def second_left_out(case: Case) -> bool:
 
 
 def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
-    """The rounds; where what they found does not explain the data, they end where they came nearest to recordings held
-    out: an empirical patch has to be of use in recordings that took no part."""
+    """The rounds, up to the last that explains the data: what was added beyond it is no better.  Where none does, they
+    end where they came nearest to recordings held out: an empirical patch has to be of use in recordings that took no
+    part."""
     *before, last = rounds
-    if explains(null, values, last.prediction):
+    explaining = [r for r in rounds[1:] if explains(null, values, r.prediction)]
+    if explaining and explaining[-1] is last:
         return list(rounds)
     gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
-    return [*before, replace(rounds[int(np.argmin(gaps))], fits=())]
+    end = explaining[-1] if explaining else rounds[int(np.argmin(gaps))]
+    return [*before, replace(end, fits=())]
 
 
 def named(

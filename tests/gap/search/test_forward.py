@@ -365,6 +365,21 @@ def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
         assert (after[-1].model is patched) == kept and len(after) == 2 and after[-1].fits == ()
 
 
+@pytest.mark.parametrize("spoils", [True, False])
+def test_rounds_end_with_the_last_that_explains(spoils: bool):
+    """A second effect that takes what is left is kept; one that moves what agreed is not."""
+    n, change, values, seen = campaign()
+    case = SimpleNamespace(held_out=lambda keys: ~FIT, conditions=())
+    one, two = MODEL.with_effect(DEAD_TIME), MODEL.with_effect(DEAD_TIME).with_effect(effect("optical_blur"))
+    first = a_fit(n, "dead_time", values - n.mean, seen)
+    second = a_fit(n, "optical_blur", values - n.mean + spoils * 500.0, seen)
+    start = Round(MODEL, unit(), n.prediction, change, 800.0, (first,))
+    middle = Round(one, unit(), first.prediction, first.rho, first.misfit, (second,))
+    end = Round(two, unit(), second.prediction, second.rho, second.misfit)
+    after = with_stand_ins(case, n, values, [start, middle, end])
+    assert len(after) == 3 and after[-1].model is (one if spoils else two)
+
+
 @pytest.mark.parametrize("keeps", [True, False])
 def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, monkeypatch):
     n, effect, values, _ = campaign()
