@@ -299,3 +299,10 @@ def test_what_removes_half_as_much_by_its_template_runs_for_anothers_place(monke
         if starts:
             own = starts[0].make()
             assert own.newest == ("dead_time",) and own.parent is rest and own.fit.prediction is one.fit.prediction
+
+
+def test_what_is_added_costs_no_less_for_a_parameter_that_was_off_before():
+    problem = problem_of(dead_time=20.0)
+    parent = replace(nothing_added(problem), off=("reset_noise",))
+    nothing = Truths(crosstalk=0.0).make(problem, parent, "crosstalk")
+    assert nothing.score - parent.score == pytest.approx(6.0)
