@@ -110,7 +110,8 @@ def beside(problem: Problem, parent: Hypothesis) -> Problem:
 def added_to(problem: Problem, parent: Hypothesis, found: Fit, newest: tuple[str, ...]) -> Hypothesis:
     """A fit beside a hypothesis as one of its own: it removes as much from the parent's deviance."""
     misfit = parent.misfit - (beside(problem, parent).misfit() - found.misfit)
-    return Hypothesis(found, misfit, (*parent.effects, *newest), newest, parent, Fidelity.STRENGTH)
+    effects = (*parent.effects, *newest)
+    return Hypothesis(found, misfit, effects, newest, parent, Fidelity.STRENGTH, off=parent.off)
 
 
 def leaves_something(problem: Problem, one: Hypothesis) -> bool:
