@@ -24,7 +24,7 @@ from denoiser.online import OnlineDnSS
 from scenes import RotatingDisk, Scene
 from scenes.catalogue import make_scene
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
-from spikecam_env.sensor import SpikeSensor
+from spikecam_env.sensor import Keyframes, SpikeSensor
 from spikecam_env.streams.hdf5 import SpikeWriter
 from spikecam_env.streams.packing import pack_frames, unpack_frames
 from spikecam_env.streams.sources import open_source
@@ -43,8 +43,12 @@ SMALL = (64, 96)
 """Rows and columns of the streams that errors are of."""
 GAP = 1344
 """Frames from picture to picture of those: 30 pictures a second at real time; a multiple of a pass."""
-PICTURES = 16
-"""Of each stream; the first half, in which the gain is found, is not judged."""
+SEEN = 256
+"""Frames of each gap that are simulated, the last: all that a picture of a few passes is made of."""
+PICTURES, JUDGED = 72, 6
+"""Of each stream, and those of them, the last, that are judged: the gain is known after some 64 passes."""
+SETTLED = 2048
+"""Frames after which `OnlineDnSS` knows a pixel's gain, of which it remembers 1024."""
 PASSES = (1, 2, 4)
 SCENES = (("disk", 20.0), ("fan", 10.0), ("tumble", 10.0), ("train", 20.0))
 """Name and mean interval [frames]."""
@@ -63,8 +67,8 @@ def bench_live(seconds: float = SECONDS, seed: int = 0) -> dict[str, list[dict[s
 def costs(spikes: NDArray[np.uint8]) -> list[dict[str, Any]]:
     """CPU time of taking a frame in, of reading it, and of a picture; `OnlineDnSS`, for every frame, to compare with.
 
-    Columns: what, CPU time [us] of a frame or picture, MB/s of packed bytes, and the cores that real time would take (30
-    pictures a second).
+    Columns: what, CPU time [us] of a frame or picture, MB/s of packed bytes, and the cores that real time would take
+    (30 pictures a second).
     """
     packed = pack_frames(spikes)
     live = LiveDnSS(SHAPE)
@@ -120,7 +124,7 @@ def streams(spikes: NDArray[np.uint8], seconds: float) -> list[dict[str, Any]]:
 
 
 def errors(seed: int) -> list[dict[str, Any]]:
-    """What leaving passes out costs: pictures GAP frames apart against the true light.
+    """What leaving passes out costs: pictures GAP frames apart against the true light, once the gain is found.
 
     Columns: scene, mean interval [frames]; PSNR [dB] of the noisy picture (TFP 41), of live pictures by passes a
     picture, and of the same frames out of `OnlineDnSS`.
@@ -130,43 +134,40 @@ def errors(seed: int) -> list[dict[str, Any]]:
 
 def _errors(name: str, interval: float, seed: int) -> dict[str, Any]:
     scene = make_scene(name, SMALL, seed, mean_interval=interval)
-    sensor = SpikeSensor("scsim", SMALL, seed)
-    packed = [
-        pack_frames(sensor.step(scene.radiance(first, first + GAP), GAP)) for first in range(0, PICTURES * GAP, GAP)
-    ]
-    row: dict[str, Any] = {"scene": name, "mean interval": interval}
-    stream = np.concatenate(packed)
-    for passes in PASSES:
-        live, shown = LiveDnSS(SMALL, passes=passes), {}
-        for block in packed:
-            live.push(block)
-            picture = live.picture()
-            assert live.frame is not None
-            shown[live.frame] = picture
-        judged = list(shown)[PICTURES // 2 :]
-        if passes == PASSES[0]:
-            noisy = {frame: unpack_frames(stream[frame - 20 : frame + 21], SMALL).mean(axis=0) for frame in judged}
-            row["noisy"] = _psnr_db(scene, noisy, judged)
-        row[f"live, {passes} a picture"] = _psnr_db(scene, shown, judged)
-    row["OnlineDnSS"] = _psnr_db(scene, _rates(stream, judged), judged)
-    return row
+    camera = SpikeSensor("scsim", SMALL, seed)
+    watching = {passes: LiveDnSS(SMALL, passes=passes) for passes in PASSES}
+    pictures: dict[str, dict[int, NDArray[np.floating]]] = {}
+    for stop in range(GAP, (PICTURES + 1) * GAP, GAP):
+        seen = _recorded(scene, camera, stop - SEEN, stop)
+        for passes, live in watching.items():
+            live.skip(GAP - SEEN)
+            live.push(seen)
+            picture, frame = live.picture(), live.frame
+            assert frame is not None
+            pictures.setdefault(f"live, {passes} a picture", {})[frame] = picture
+    judged = list(pictures[f"live, {PASSES[0]} a picture"])[-JUDGED:]
+    begun = (judged[0] - SETTLED) // GAP * GAP  # passes then cover the frames that they cover live
+    whole = unpack_frames(_recorded(scene, SpikeSensor("scsim", SMALL, seed), begun, PICTURES * GAP), SMALL)
+    rates = OnlineDnSS.pretrained("best", output="rate").push(whole)
+    assert isinstance(rates, np.ndarray)
+    noisy = {frame: whole[frame - begun - 20 : frame - begun + 21].mean(axis=0) for frame in judged}
+    pictures = {"noisy": noisy, **pictures, "OnlineDnSS": {frame: rates[frame - begun] for frame in judged}}
+    light = {frame: scene.truth(frame + 0.5).radiance for frame in judged}
+    figures = {
+        what: float(np.mean([psnr_db(shown[frame], true, float(true.max())) for frame, true in light.items()]))
+        for what, shown in pictures.items()
+    }
+    return {"scene": name, "mean interval": interval, **figures}
 
 
-def _rates(stream: NDArray[np.uint8], frames: list[int]) -> dict[int, NDArray[np.float32]]:
-    """Some frames (H, W) [spikes/frame] of the whole stream, denoised."""
-    online, done = OnlineDnSS.pretrained("best", output="rate"), 0
-    found: dict[int, NDArray[np.float32]] = {}
-    for first in range(0, len(stream), BLOCK):
-        rates = online.push(unpack_frames(stream[first : first + BLOCK], SMALL))
-        assert isinstance(rates, np.ndarray)
-        found |= {frame: rates[frame - done].copy() for frame in frames if done <= frame < done + len(rates)}
-        done += len(rates)
-    return found
-
-
-def _psnr_db(scene: Scene, pictures: dict[int, NDArray[np.floating]], frames: list[int]) -> float:
-    light = {frame: scene.truth(frame + 0.5).radiance for frame in frames}
-    return float(np.mean([psnr_db(pictures[frame], light[frame], float(light[frame].max())) for frame in frames]))
+def _recorded(scene: Scene, camera: SpikeSensor, first: int, stop: int) -> NDArray[np.uint8]:
+    """Packed frames of a camera, whatever it saw before, in the light of the scene's frames first .. stop."""
+    blocks = []
+    for at in range(first, stop, BLOCK):
+        count = min(BLOCK, stop - at)
+        keys = scene.radiance(at, at + count)
+        blocks.append(pack_frames(camera.step(Keyframes.known(keys.frame - at + camera.frame, keys.radiance), count)))
+    return np.concatenate(blocks)
 
 
 def _played(path: Path, speed: float, seconds: float) -> Figures:
