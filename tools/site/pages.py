@@ -6,8 +6,8 @@
 <!-- generated: benchmarks -->      speed by version
 <!-- generated: page FILE -->       a page at the root
 
-A link to a file of the repository becomes a download of it; a link to a folder, its name; a link to a page that is called
-by its file's name is called by the page's title.
+A link to a file of the repository becomes a download of it; a link to a folder, its name.  A link that is called by the name
+of its page is called by the page's title.
 """
 
 from __future__ import annotations
