@@ -13,6 +13,7 @@ sys.path.insert(0, str(ROOT))
 from spikecam_env import __version__  # noqa: E402
 from tools.site.docstrings import rendered  # noqa: E402
 from tools.site.pages import filled_in  # noqa: E402
+from tools.site.signatures import signature_of  # noqa: E402
 
 project = "spikecam-env"
 author = "the spikecam-env authors"
@@ -33,9 +34,6 @@ suppress_warnings = ["ref.python"]
 
 autodoc_member_order = "bysource"
 autodoc_inherit_docstrings = False
-autodoc_typehints_format = "short"
-autodoc_preserve_defaults = True
-python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 80
 toc_object_entries_show_parents = "hide"
 
@@ -58,6 +56,12 @@ def read_docstring(app, what, name, value, options, lines):
     lines[:] = rendered("\n".join(lines), arguments(value))
 
 
+def read_signature(app, what, name, value, options, signature, return_annotation):
+    if what in ("class", "function", "method"):
+        return signature_of(value, bound=what == "method" and not inspect.ismethod(value))
+    return None
+
+
 def arguments(value):
     """Names that a docstring may explain as `name: meaning`."""
     names = {f.name for f in fields(value)} if is_dataclass(value) else set()
@@ -71,3 +75,4 @@ def setup(app):
     app.add_lexer("csv", TextLexer)  # Pygments has none
     app.connect("source-read", read_page)
     app.connect("autodoc-process-docstring", read_docstring)
+    app.connect("autodoc-process-signature", read_signature)

@@ -3,6 +3,7 @@
 public          the modules of the reference, and the names that each of them offers
 docstrings      docstrings of this repository -> reStructuredText
 benchmarks      speed by version
+signatures      signatures as they are written
 commands        the command line reference, from the parser
 pages           Markdown that is filled in as a page is read: the reference, and links that leave docs
 """

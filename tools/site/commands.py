@@ -92,8 +92,9 @@ def _remark_last(line: str) -> str:
 
 
 def _prose(text: str) -> str:
-    """Text that Markdown leaves as it is, but for `code`."""
-    parts = re.split(r"(`[^`]+`)", " ".join(text.split()))
+    """Text that Markdown leaves as it is, but for `code`; options become code too."""
+    marked = re.sub(r"(?<![\w`-])(--[a-z][a-z-]*)(?![^`]*`(?:[^`]*`[^`]*`)*[^`]*$)", r"`\1`", " ".join(text.split()))
+    parts = re.split(r"(`[^`]+`)", marked)
     return "".join(part if part.startswith("`") else re.sub(r"([*_<>|\[\]])", r"\\\1", part) for part in parts)
 
 

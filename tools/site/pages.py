@@ -6,7 +6,8 @@
 <!-- generated: benchmarks -->      speed by version
 <!-- generated: page FILE -->       a page at the root
 
-A link to a file of the repository becomes a download of it; a link to a folder, its name.
+A link to a file of the repository becomes a download of it; a link to a folder, its name.  A link that is called by the name
+of its page is called by the page's title.
 """
 
 from __future__ import annotations
@@ -88,6 +89,8 @@ def _link(found: re.Match[str], folder: PurePosixPath) -> str:
     if not target.is_relative_to(ROOT) or not target.exists():
         return found[0]  # Sphinx says that it leads nowhere
     within = target.relative_to(ROOT).as_posix()
+    if found["text"].strip("`") == target.name and target.suffix == ".md" and not found["anchor"]:
+        return _link(LINK.match(f"[]({found['path']})") or found, folder)  # the page's title is put there
     if within in PAGES:
         up = "../" * len(folder.parts)
         return f"[{found['text']}]({up}{PAGES[within]}{found['anchor'] or ''})"
