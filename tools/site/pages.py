@@ -6,8 +6,8 @@
 <!-- generated: benchmarks -->      speed by version
 <!-- generated: page FILE -->       a page at the root
 
-A link to a file of the repository becomes a download of it; a link to a folder, its name.  A link that is called by the name
-of its page is called by the page's title.
+A link to a file of the repository becomes a download of it; a link to a folder, its name.  A link called by the name
+of its page is called by the title of the page.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _module(module: str) -> list[str]:
             ]
         elif kind == "data":
             text = ["   " + line for line in rendered(docstring_of(module, name))]
-            lines += ["```{eval-rst}", f".. py:data:: {module}.{name}", "", *text, "```", ""]
+            lines += ["```{eval-rst}", f".. py:data:: {name}", f"   :module: {module}", "", *text, "```", ""]
         elif kind != "module":
             lines += ["```{eval-rst}", directive, *(["   :members:"] if kind == "class" else []), "```", ""]
     return lines
