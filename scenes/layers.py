@@ -93,7 +93,7 @@ def render_key(
     points = np.stack([x, y, -z], -1) @ to_body[:3, :3].T + to_body[:3, 3]
     texels = np.stack([columns, rows], -1).astype(np.float64)
     brightest = max(float(light.max()), 1e-30)
-    tints = _tints(light / brightest, cover)
+    tints = _tints(light, np.float32(brightest), cover)
     lens = intrinsic(dense.focal, (dense.centre[0] - left, dense.centre[1] - top))
     return Key(tints, brightest * gain, _filled(sprite), points, texels, lens)
 
@@ -104,10 +104,17 @@ _NOTHING = Key(
 """Of a body that is out of sight."""
 
 
-def _tints(light: Array, cover: Array) -> NDArray[np.uint32]:
-    """Both in 0..1, in 16 bits each."""
-    lower, upper = (np.minimum(share * 65535 + 0.5, 65535).astype(np.uint32) for share in (light, cover))
-    return np.bitwise_or(lower, upper << np.uint32(16))
+@njit(nogil=True, cache=True, error_model="numpy")
+def _tints(light, brightest, cover):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Light as a share of the brightest, and coverage, both in 0..1, in 16 bits each."""
+    tints = np.empty(light.shape, np.uint32)
+    full, half = np.float32(65535), np.float32(0.5)
+    for row in range(len(tints)):
+        into, lights, covers = tints[row], light[row], cover[row]
+        for x in range(len(into)):
+            lower = np.uint32(min(lights[x] / brightest * full + half, full))
+            into[x] = lower | np.uint32(min(covers[x] * full + half, full)) << np.uint32(16)
+    return tints
 
 
 def _filled(sprite: Sprite) -> Array:
@@ -116,10 +123,22 @@ def _filled(sprite: Sprite) -> Array:
     if nothing.all():
         return np.zeros_like(sprite.depth)
     _, nearest = cv2.distanceTransformWithLabels(nothing, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
-    depth_of = np.zeros(nearest.max() + 1, np.float32)
-    seen = nothing == 0
-    depth_of[nearest[seen]] = sprite.depth[seen]
-    return depth_of[nearest]
+    filled: Array = _depth_of(nearest, int(nearest.max()), nothing, sprite.depth)
+    return filled
+
+
+@njit(nogil=True, cache=True)
+def _depth_of(nearest, labels, nothing, depth):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Of each texel the depth of the one that is not nothing and has the same label."""
+    of_label, filled = np.zeros(labels + 1, np.float32), np.empty(depth.shape, np.float32)
+    for row in range(len(nearest)):
+        for x in range(nearest.shape[1]):
+            if nothing[row, x] == 0:
+                of_label[nearest[row, x]] = depth[row, x]
+    for row in range(len(nearest)):
+        for x in range(nearest.shape[1]):
+            filled[row, x] = of_label[nearest[row, x]]
+    return filled
 
 
 def _dense(xy: tuple[float, float]) -> tuple[float, float]:

@@ -34,6 +34,7 @@ from scenes.renderers.view import (
     to_camera,
     towards,
 )
+from spikecam_env.compiled import njit
 from spikecam_env.errors import NotReadyError
 
 LARGEST = 4096
@@ -185,9 +186,7 @@ class OpenGL:
         gl.glReadPixels(0, 0, tile.columns, tile.rows, gl.GL_RGBA, gl.GL_FLOAT, values)
         top, left = tile.top - sprite.window.top, tile.left - sprite.window.left
         inside = np.s_[top : top + tile.rows, left : left + tile.columns]
-        for channel, picture in enumerate((sprite.radiance, sprite.coverage, sprite.depth)):
-            picture[inside] = values[..., channel]
-        sprite.depth[inside][values[..., 1] == 0] = np.inf
+        _split(values, sprite.radiance[inside], sprite.coverage[inside], sprite.depth[inside])
 
     def _targets_for(self, tile: Window, supersample: int) -> _Targets:
         rows, columns = tile.rows * supersample, tile.columns * supersample
@@ -270,6 +269,15 @@ def _end(context: contexts.Context, home: tuple[int, int]) -> None:
     if home == _here():
         context.make_current()
         context.end()
+
+
+@njit(nogil=True, cache=True)
+def _split(values, radiance, coverage, depth):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """What was read (rows, columns, 4) into pictures of its own; where nothing is seen it is infinitely far."""
+    for row in range(values.shape[0]):
+        for x in range(values.shape[1]):
+            radiance[row, x], coverage[row, x] = values[row, x, 0], values[row, x, 1]
+            depth[row, x] = values[row, x, 2] if values[row, x, 1] != 0 else np.inf
 
 
 def _to_window(camera: Pinhole, window: Window, near: float, far: float) -> NDArray[np.float64]:
