@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.live.online import LiveDnSS
+from spikecam_env.errors import InputError
 from spikecam_env.streams.sources import Source
 
 PICTURES_S = 30.0
@@ -89,6 +90,7 @@ class Session:
     speed: of a source that waits, 1 being its frame rate.  pictures: a second, at most.  frames, seconds: after which
     the session is over; None: when its source is.
     What a thread raised, InputError for a stream that breaks, `over` and `newest` raise.
+    Raises InputError for a denoiser of frames of another size.
     """
 
     def __init__(
@@ -101,14 +103,15 @@ class Session:
         frames: int | None = None,
         seconds: float | None = None,
     ) -> None:
+        if live.shape != source.shape:
+            raise InputError(f"the denoiser is of frames of {live.shape}, {source.title} has {source.shape}")
         self.live = live
         self._source, self._period_s = source, 1.0 / pictures
         self._rate = speed * source.frame_rate_hz if source.waits else None
         self._most, self._seconds = frames, seconds
-        self._reader = threading.Thread(target=self._run, args=(self._read,), daemon=True)
-        self._denoiser = threading.Thread(target=self._run, args=(self._denoise,), daemon=True)
-        self._reading = self._denoising = True
-        self._stop = threading.Event()
+        self._stop, self._read_all, self._denoised_all = threading.Event(), threading.Event(), threading.Event()
+        self._reader = threading.Thread(target=self._run, args=(self._read, self._read_all), daemon=True)
+        self._denoiser = threading.Thread(target=self._run, args=(self._denoise, self._denoised_all), daemon=True)
         self._changed = threading.Condition()
         self._shown: Shown | None = None
         self._error: BaseException | None = None
@@ -136,11 +139,11 @@ class Session:
         """Whether there will be no other picture."""
         if self._error is not None:
             raise self._error
-        return not self._denoising
+        return self._denoised_all.is_set()
 
     @property
     def figures(self) -> Figures:
-        until = time.perf_counter() if self._denoising else self._ended_s
+        until = self._ended_s if self._denoised_all.is_set() else time.perf_counter()
         seconds = until - self._begun_s if self._begun_s else 0.0
         return Figures(seconds, self._taken, self._lost, self._pictures, self._latency_s)
 
@@ -150,27 +153,26 @@ class Session:
             self._changed.wait_for(lambda: self._shown is not after or self.over, timeout_s)
             return None if self._shown is after else self._shown
 
-    def _run(self, work: Callable[[], object]) -> None:
+    def _run(self, work: Callable[[], object], done: threading.Event) -> None:
         try:
             work()
         except BaseException as error:
             self._error = error
             self._stop.set()
+        self._ended_s = time.perf_counter()
+        done.set()
         with self._changed:
             self._changed.notify_all()
 
     def _read(self) -> None:
-        try:
-            while not self._is_time_up() and (left := self._left()):
-                due = min(left, self._due())
-                if not due:
-                    time.sleep(TICK_S)
-                elif count := self._source.read(self.live.ring.lend(due)):
-                    self._take(count)
-                else:
-                    return
-        finally:
-            self._reading = False
+        while not self._is_time_up() and (left := self._left()):
+            due = min(left, self._due())
+            if not due:
+                time.sleep(TICK_S)
+            elif count := self._source.read(self.live.ring.lend(due)):
+                self._take(count)
+            else:
+                return
 
     def _is_time_up(self) -> bool:
         taken_s = time.perf_counter() - self._begun_s if self._begun_s else 0.0
@@ -204,19 +206,15 @@ class Session:
 
     def _denoise(self) -> None:
         due_s = 0.0
-        try:
-            while not self._is_time_up():
-                now = time.perf_counter()
-                if now >= due_s and self.live.ready():
-                    self._show()
-                    due_s = max(due_s + self._period_s, now)
-                elif self._reading or self.live.ready():
-                    time.sleep(TICK_S)
-                else:
-                    return
-        finally:
-            self._ended_s = time.perf_counter()
-            self._denoising = False
+        while not self._is_time_up():
+            now = time.perf_counter()
+            if now >= due_s and self.live.ready():
+                self._show()
+                due_s = max(due_s + self._period_s, now)
+            elif self._read_all.is_set() and not self.live.ready():
+                return
+            else:
+                time.sleep(TICK_S)
 
     def _show(self) -> None:
         rate = self.live.picture()
