@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -182,12 +183,14 @@ def test_frames_that_are_overwritten_while_a_picture_reads_them_are_not_shown() 
 
 def test_one_thread_pushes_while_another_asks_for_pictures() -> None:
     spikes, watching = stream(20_000), live(room=700)
+    watching.warm_up()
     packed = pack_frames(spikes)
     watching.push(packed[:64])
 
     def push() -> None:
         for first in range(64, len(packed), 50):
             watching.push(packed[first : first + 50])
+            time.sleep(0.002)  # a ring of 700 frames is overwritten in 30 ms
 
     pushing = threading.Thread(target=push)
     pushing.start()
