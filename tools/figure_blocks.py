@@ -49,7 +49,7 @@ def page_block(page: Page) -> str:
     return _joined(
         [
             f"*{page.about}; by {page.version}. Written by `{MADE_BY}`.*",
-            _fenced(page.texts("reproduce", "pre")[0]),
+            "<!-- not run: needs the real recordings -->\n" + _fenced(page.texts("reproduce", "pre")[0]),
             f"**{page.verdict}.** {page.sentence}",
             *_sizes(page),
             beside_measured(page),
