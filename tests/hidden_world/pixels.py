@@ -116,7 +116,13 @@ class Come(NamedTuple):
 
 def new_work(pixels: int) -> Work:
     """Room for so many pixels."""
-    whole, real = (lambda: np.zeros(pixels, np.int64)), (lambda: np.zeros(pixels))
+
+    def whole() -> NDArray[np.int64]:
+        return np.zeros(pixels, np.int64)
+
+    def real() -> Array:
+        return np.zeros(pixels)
+
     return Work(
         whole(), whole(), np.zeros(pixels, np.bool_), real(), real(), real(), real(), real(), real(),
         real(), whole(), whole(), np.full(pixels, -1, np.int64),
