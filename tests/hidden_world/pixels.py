@@ -117,7 +117,7 @@ class Come(NamedTuple):
 def new_work(pixels: int) -> Work:
     """Room for so many pixels."""
 
-    def whole() -> NDArray[np.int64]:
+    def whole() -> Whole:
         return np.zeros(pixels, np.int64)
 
     def real() -> Array:
