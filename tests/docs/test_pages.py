@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import signal
 import sys
 import time
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -28,6 +30,22 @@ SLOW = {
     "docs/tutorials/first_diagnosis.md",
 }
 """Pages that take ten seconds or more."""
+LONGEST_S = 300
+"""In which a page is done, on a busy machine too: a command of it that goes on for ever is an error, and is said so."""
+
+
+@contextmanager
+def ended_within(seconds: int, what: str) -> Iterator[None]:
+    def over(*_: object) -> None:
+        raise TimeoutError(f"{what} takes more than {seconds} s: does a command of it go on for ever?")
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def with_blocks() -> list[object]:
@@ -46,11 +64,17 @@ def test_what_a_page_shows_works(page: Path, tmp_path: Path, monkeypatch: pytest
     began = time.process_time()
     blocks = blocks_of(page.read_text(encoding="utf-8"))
     elsewhere = next((block.marks["tested by"] for block in blocks if "tested by" in block.marks), "")
-    for block in blocks:
-        shown.do(block, f"run by {elsewhere}" if elsewhere else "")
+    with ended_within(LONGEST_S, NAMES[page]):
+        for block in blocks:
+            shown.do(block, f"run by {elsewhere}" if elsewhere else "")
     assert not elsewhere or page.name in (ROOT / elsewhere).read_text(encoding="utf-8")
     record_property("pages", {what: {"count": count} for what, count in shown.counts.items()})
     print(f"{NAMES[page]}: {time.process_time() - began:.1f} s", dict(shown.counts))
+
+
+def test_a_page_that_goes_on_for_ever_is_an_error() -> None:
+    with pytest.raises(TimeoutError, match="the page takes more than 1 s"), ended_within(1, "the page"):
+        time.sleep(30)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES.get)
