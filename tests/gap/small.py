@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,10 @@ from spikecam_env.gap import Bars, Dark, Flat, Step
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import deviates
 from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.observe.conditions import Condition, planned_conditions
 from spikecam_env.gap.observe.observation import observe
+from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import expose
@@ -134,3 +137,10 @@ def check_reveals(group: str, shown_by: Effect, where: str, names: Sequence[str]
         worst = max(alone, key=lambda k: alone[k])
         print(f"left alone: at worst {worst} {alone[worst]:.1f} of {len(alone)}, at most {quiet(len(alone)):.1f}")
         assert alone[worst] < quiet(len(alone))
+
+
+def added_by(rounds: Sequence[Round]) -> list[Fit]:
+    """The best of each round whose effect is in the last model."""
+    last = {e.name for e in rounds[-1].model.effects}
+    added = [r.fits[0] for r, after in pairwise(rounds) if after.model is not r.model]
+    return [found for found in added if found.name in last]

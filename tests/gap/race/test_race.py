@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from small import MODEL, effect, unit
+from small import MODEL, added_by, effect, unit
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap import diagnose
@@ -32,7 +32,6 @@ from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.gap.verdict.named_effects import kept
 
 COUNT, TWINS = 200, 12
 PLACES = {"dead_time": range(0, 40), "crosstalk": range(60, 80), "photodiode_lag": range(100, 140)}
@@ -120,26 +119,26 @@ def test_a_second_effect_is_looked_for_however_loud_the_first(loud, no_twins, mo
     """Eight noises, beside a thousand: each is more than chance."""
     sizes = {"dead_time": loud, "crosstalk": 8.0}
     rounds = raced(problem_of(**sizes), Truths(**sizes, photodiode_lag=3.0), monkeypatch)
-    assert [f.name for f, _ in kept(rounds)] == ["dead_time", "crosstalk"]
+    assert [f.name for f in added_by(rounds)] == ["dead_time", "crosstalk"]
 
 
 def test_where_nothing_is_left_only_hypotheses_no_larger_are_tried(no_twins, monkeypatch):
     asked = Truths(dead_time=20.0, crosstalk=8.0)
     rounds = raced(problem_of(dead_time=20.0), asked, monkeypatch)
-    assert [f.name for f, _ in kept(rounds)] == ["dead_time"]
+    assert [f.name for f in added_by(rounds)] == ["dead_time"]
     assert asked.asked == [(), ("no larger", "dead_time")]
 
 
 def test_what_no_candidate_changes_ends_the_race(no_twins, monkeypatch):
     rounds = raced(problem_of(photodiode_lag=20.0), Truths(dead_time=20.0), monkeypatch)
-    assert kept(rounds) == [] and len(rounds) == 1 and [f.name for f in rounds[-1].fits] == ["dead_time"]
+    assert added_by(rounds) == [] and len(rounds) == 1 and [f.name for f in rounds[-1].fits] == ["dead_time"]
 
 
 def test_without_budget_a_second_effect_is_left_out(no_twins, monkeypatch):
     sizes = {"dead_time": 20.0, "crosstalk": 8.0}
     budget = Budget(limit=10.0)
     rounds = raced(problem_of(budget, **sizes), Truths(**sizes), monkeypatch)
-    assert [f.name for f, _ in kept(rounds)] == ["dead_time"] and budget.left_out == ["a second effect"]
+    assert [f.name for f in added_by(rounds)] == ["dead_time"] and budget.left_out == ["a second effect"]
 
 
 def of(problem: Problem, name: str, removed: float, fidelity: Fidelity = Fidelity.STRENGTH) -> Hypothesis:
@@ -261,7 +260,7 @@ def test_an_effect_that_took_anothers_place_is_a_round_without_a_parent():
     other = replace(both, newest=("photodiode_lag",))
     heats = [Heat((both, other), ("photodiode_lag",)), Heat((both,), ())]
     rounds = rounds_of(problem, both, heats, motion_alone=False)
-    assert [f.name for f, _ in kept(rounds)] == ["dead_time", "crosstalk"]
+    assert [f.name for f in added_by(rounds)] == ["dead_time", "crosstalk"]
     assert [r.rivals for r in rounds] == [(), ("photodiode_lag",), ()]
     assert rounds[-1].model is both.fit.model and rounds[1].model is first.fit.model
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from small import MODEL, TWINS, effect, recorded
+from small import MODEL, TWINS, added_by, effect, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import values_of
@@ -11,7 +11,6 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.race.pairs import BENDS, EDGE, PAIRS
 from spikecam_env.gap.race.race import race
 from spikecam_env.gap.screen.templates import shipped_templates
-from spikecam_env.gap.verdict.named_effects import kept
 from spikecam_env.sensor import CATALOGUE
 
 
@@ -19,7 +18,7 @@ def found_by_race(*hidden, names):
     case = recorded(*hidden)
     null = model_null(case, MODEL, TWINS)
     rounds = race(Problem.of(case, MODEL, null, values_of(case.bank, null.keys)), names, shipped_templates())
-    found = {f.name: f for f, _ in kept(rounds)}
+    found = {f.name: f for f in added_by(rounds)}
     print({name: (f.parameters, f.sd) for name, f in found.items()}, case.budget.simulated)
     return found
 
