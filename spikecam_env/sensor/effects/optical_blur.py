@@ -41,8 +41,7 @@ class OpticalBlur(Effect):
         if self.sigma_pixels < _NO_BLUR:
             return radiance
         kernel = gaussian_weights(self.sigma_pixels)
-        rows = convolve1d(radiance, kernel, axis=0, mode="nearest")
-        return np.asarray(convolve1d(rows, kernel, axis=1, mode="nearest"))
+        return convolve1d(convolve1d(radiance, kernel, axis=0, mode="nearest"), kernel, axis=1, mode="nearest")
 
 
 @lru_cache(maxsize=64)
@@ -50,11 +49,8 @@ def gaussian_weights(sigma: float) -> NDArray[np.float64]:
     """Normalised weights (2 n + 1,) of variance sigma^2 [pixels^2]; n reaches 5 sigma."""
     reach = int(np.ceil(5.0 * sigma)) + 1
     square = np.arange(-reach, reach + 1, dtype=np.float64) ** 2
-
-    def weights(v: float) -> NDArray[np.float64]:
-        return np.asarray(np.exp(-square / (2.0 * v)) / np.exp(-square / (2.0 * v)).sum())
-
-    v = brentq(lambda v: float(weights(v) @ square) - sigma**2, 1e-3, sigma**2 + 1.0)
-    found = np.asarray(weights(v), np.float64)
+    weights = lambda v: np.exp(-square / (2.0 * v)) / np.exp(-square / (2.0 * v)).sum()  # noqa: E731
+    v = brentq(lambda v: float(weights(v) @ square) - sigma**2, 1e-3, sigma**2 + 1.0)  # type: ignore[no-untyped-call]
+    found = np.asarray(weights(v), np.float64)  # type: ignore[no-untyped-call]
     found.setflags(write=False)  # kept, and given to whoever asks again
     return found
