@@ -12,12 +12,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from denoiser.strips import share_rows
 from denoiser.window import Window
 from spikecam_env.compiled import njit
-from spikecam_env.threads import as_many_as_pay, share_out
-
-ROWS = 16
-"""Rows that a thread takes at a time."""
 
 _ONE = {torch.bfloat16: np.uint16(0x3F80), torch.float32: np.uint32(0x3F800000)}
 """1.0 as bits."""
@@ -37,18 +34,15 @@ def side_by_side(
     span, one = len(windows[0].spikes), _ONE[number_type]
     size = len(windows), height + -height % multiple, width + -width % multiple, span + layers + 1
     bits = np.empty(size, one.dtype)
-    strips = -(-height // ROWS)
     nothing = np.zeros((1, height, width), np.float32)
 
-    def strip(number: int) -> None:
-        n, begin = number // strips, ROWS * (number % strips)
-        stop, window, before = min(begin + ROWS, height), windows[n], last[n]
+    def fill(n: int, rows: slice) -> None:
+        begin, stop, window, before = rows.start, rows.stop, windows[n], last[n]
         _spikes(window.spikes, one, begin, stop, bits[n])
         _layers(window.planes.view(np.uint32), span, begin, stop, bits[n])
         _layers((nothing if before is None else before).view(np.uint32), span + layers, begin, stop, bits[n])
 
-    count = len(windows) * strips
-    share_out(strip, count, as_many_as_pay(torch.get_num_threads(), count, bits.size))
+    share_rows(fill, len(windows), height, bits.size)
     bits[:, :height, width:] = bits[:, :height, width - 1 : width]
     bits[:, height:] = bits[:, height - 1 : height]
     signed = bits.view(np.int16 if one.dtype == np.uint16 else np.int32)

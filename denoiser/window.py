@@ -35,16 +35,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from denoiser.pixel_map import PixelMap
+from denoiser.strips import share_rows
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
-from spikecam_env.threads import as_many_as_pay, share_out
-
-ROWS = 16
-"""Rows that a thread takes at a time."""
 
 WINDOW_PRIOR = 2.0
 """Spikes that a pixel's gain of 1 weighs against what the sums say."""
@@ -164,13 +160,11 @@ class RollingWindow:
         planes = np.empty((layout.layers, *self.shape), np.float32)
         widths = np.asarray(layout.half_widths, np.int64)
 
-        def strip(number: int) -> None:
-            rows = slice(ROWS * number, ROWS * (number + 1))
+        def paint(_: int, rows: slice) -> None:
             last, out = self._last[rows], planes[:, rows]
             _interval_planes(known[:, rows], last, known_first, self.start, layout.planes, widths, out)
 
-        strips = -(-self.shape[0] // ROWS)
-        share_out(strip, strips, as_many_as_pay(torch.get_num_threads(), strips, known.size))
+        share_rows(paint, 1, self.shape[0], known.size)
         for i, memory in enumerate(layout.memories):
             weight = 1.0 - (1.0 - 1.0 / memory) ** self._averaged
             planes[layout.planes + len(layout.half_widths) + i] = self._means[i] * np.float32(1.0 / weight)

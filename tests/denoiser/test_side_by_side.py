@@ -9,7 +9,8 @@ import torch
 from denoiser import infer
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import RECIPES
-from denoiser.side_by_side import ROWS, side_by_side
+from denoiser.side_by_side import side_by_side
+from denoiser.strips import ROWS
 from denoiser.window import RollingWindow, Window
 from spikecam_env.threads import as_many_as_pay
 
