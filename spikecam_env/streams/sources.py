@@ -147,15 +147,13 @@ class Flowing:
         except OSError as error:
             raise InputError(f"{self.title} broke after {self._frames} frames: {error.strerror or error}") from error
         self._frames += frames
-        here = (
-            f"{rest} of {packed_bytes(self.taken.shape)} bytes of a frame of {self.taken.height} x {self.taken.width}"
-        )
-        if not self._frames:
-            raise InputError(f"{self.title} ended before a frame had come, with {here}")
-        if rest:
-            self.cut = (
-                f"{self.title} ended in the middle of a frame, with {here}; its {self._frames} whole frames were taken"
-            )
+        if rest or not self._frames:
+            size = f"a frame of {self.taken.height} x {self.taken.width}"
+            here = f"{rest} of {packed_bytes(self.taken.shape)} bytes of {size}"
+            if not self._frames:
+                raise InputError(f"{self.title} ended before a frame had come, with {here}")
+            taken = f"its {self._frames} whole frames were taken"
+            self.cut = f"{self.title} ended in the middle of a frame, with {here}; {taken}"
         return frames
 
     def skip(self, frames: int) -> None:
