@@ -26,9 +26,14 @@ def effect_size(null: Null, measured: Array, change: Array) -> float:
     return float(np.max(np.where(np.isfinite(measured), np.abs(change), 0.0) / null.noise))
 
 
+def in_noise(null: Null, values: Array, mean: Array | None = None) -> Array:
+    """(S,) how far values lie from a mean, by default the null model's, in the null model's noise; 0 where unknown."""
+    return np.nan_to_num((values - (null.mean if mean is None else mean)) / null.noise)
+
+
 def deviates(null: Null, values: Array) -> Array:
     """(S,) normal deviates from Student's t with the freedom of few twins; 0 where unknown."""
-    return normal_deviates(null, np.nan_to_num((values - null.mean) / null.noise))
+    return normal_deviates(null, in_noise(null, values))
 
 
 def normal_deviates(null: Null, t: Array, predicted: Prediction | None = None) -> Array:

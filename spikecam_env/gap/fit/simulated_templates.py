@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.baseline.null_model import unit_under
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET, candidate
+from spikecam_env.gap.compare.distance import in_noise
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.fit.gauss_newton import at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
@@ -95,7 +96,7 @@ def severe_template(
     seen = case.of(case.conditions, made)
     without = twins(seen, model, constrained_refit(model, seen.base), range(REFITTED))
     mean = np.mean([values_of(t.bank, null.keys) for t in without], axis=0)
-    shift = np.nan_to_num((values_of(seen.bank, null.keys) - mean) / null.noise)
+    shift = in_noise(null, values_of(seen.bank, null.keys), mean)
     of_pattern = np.array([k.group == "pattern" for k in null.keys])
     white = float(min(case.base.white / seen.base.white, 1.0))
     return Template(name, dict(parameters), np.where(of_pattern, 0.0, shift), times, white)
@@ -111,4 +112,4 @@ def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, param
         made, _ = at_settled_unit(
             partial(predict_by_twins, case, null=null, count=1), null, there, constrained_refit(there, case.base), []
         )
-    return np.nan_to_num((made.mean - null.mean) / null.noise)
+    return in_noise(null, made.mean)

@@ -9,22 +9,16 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
 from spikecam_env.gap.baseline.off_nominal import off_nominal
-from spikecam_env.gap.candidates.table import acting_through, candidate
-from spikecam_env.gap.compare.distance import robust_squares
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import in_noise, robust_squares
 from spikecam_env.gap.fit.confirm import confirmed, resettled
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.race.hypothesis import Fidelity, Hypothesis, added_to, beside, nothing_added
 from spikecam_env.gap.race.pairs import MOST_TWINS, PAIRS, Pair, fit_pair
-from spikecam_env.gap.screen.screen import Screened, screen
+from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.screen.templates import Templates
-from spikecam_env.gap.search.shortlist import fit_from, groups_that_stand_out, line_of, starts_to_fit
-
-Array = NDArray[np.float64]
+from spikecam_env.gap.search.shortlist import fit_from, groups_that_stand_out, screened_beside, starts_to_fit
 
 MOST_EFFECTS = 3
 """Effects of a hypothesis at most."""
@@ -104,13 +98,8 @@ class Field:
 
     def screened(self, problem: Problem, one: Hypothesis, names: Collection[str]) -> list[Screened]:
         """Candidates by what their templates leave of what a hypothesis leaves, best first."""
-        here, shown = beside(problem, one), problem.case.conditions
         left = [n for n in self.names if n in names and n not in one.effects]
-        found = screen(self.templates, shown, here.null, here.seen, left, line_of(here.case))
-        if through := acting_through(left, one.fit.model, shown):
-            own = own_templates(here.case, here.model, here.null, through)
-            found = sorted([*found, *screen(own, shown, here.null, here.seen, through)], key=lambda s: s.misfit)
-        return found
+        return screened_beside(beside(problem, one), left, self.templates)
 
     def added(self, problem: Problem, one: Hypothesis) -> list[Start]:
         """One effect more, the best by their templates."""
@@ -125,7 +114,7 @@ class Field:
         if len(one.effects) >= MOST_EFFECTS:
             return []
         here = beside(problem, one)
-        before, groups = deviance(here), groups_that_stand_out(here.null, distance(here))
+        before, groups = deviance(here), groups_that_stand_out(here.null, in_noise(here.null, here.seen))
         found = self.screened(problem, one, self.names)
         near = starts_to_fit(found, before)
         return [self.start(problem, one, s, before) for s in starts_to_fit(found, before, groups) if s not in near]
@@ -160,14 +149,9 @@ def fits_its_shape(name: str) -> bool:
     return bool(set(candidate(name).shapes) & set(candidate(name).fitted))
 
 
-def distance(here: Problem) -> Array:
-    """(S,) what a problem leaves, in the noise that templates are scaled in."""
-    return np.nan_to_num((here.seen - here.null.mean) / here.null.noise)
-
-
 def deviance(here: Problem) -> float:
     """Of a problem, in the noise that templates are scaled in."""
-    return robust_squares(distance(here), here.null.weight)
+    return robust_squares(in_noise(here.null, here.seen), here.null.weight)
 
 
 def identity(one: Hypothesis) -> Hypothesis:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import robust_squares
+from spikecam_env.gap.compare.distance import in_noise, robust_squares
 from spikecam_env.gap.compare.prediction import TOLERANCE, Null, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.observe.conditions import Condition
@@ -52,7 +52,7 @@ def screen(
     line_hz: frequency of the strongest line of the measured spectra, to start periodic candidates from.
     """
     at = _places(templates, conditions, null.keys)
-    d = np.nan_to_num((measured - null.mean) / null.noise)
+    d = in_noise(null, measured)
     best: dict[tuple[str, frozenset[Any]], Screened] = {}
     for entry in templates.entries:
         if entry.name not in names:

@@ -17,16 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.alarm import is_discrepant, with_held_out_motion
-from spikecam_env.gap.candidates.table import acting_through
-from spikecam_env.gap.compare.distance import is_significant, residual, robust_squares
+from spikecam_env.gap.compare.distance import in_noise, is_significant, residual, robust_squares
 from spikecam_env.gap.compare.thresholds import TO_ADD, TO_JOIN
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import TWINS_IN_THE_END, confirmed, with_dark_levels_open, with_prediction
 from spikecam_env.gap.fit.gauss_newton import PROBES
 from spikecam_env.gap.fit.joint import Errors, is_noisy, no_smaller, refined_together, simulated_for
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.simulated_templates import own_templates
-from spikecam_env.gap.screen.screen import screen
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
 from spikecam_env.gap.search.joint_start import fit_pairs, one_by_one, with_pairs
@@ -48,7 +45,7 @@ from spikecam_env.gap.search.round import (
     is_small_share,
     is_visible,
 )
-from spikecam_env.gap.search.shortlist import fits_of, groups_that_stand_out, line_of, starts_to_fit
+from spikecam_env.gap.search.shortlist import fits_of, groups_that_stand_out, screened_beside, starts_to_fit
 from spikecam_env.gap.unit.refit import constrained_refit
 
 Array = NDArray[np.float64]
@@ -119,11 +116,8 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
     """
     null, seen = here.null, here.seen
     left = [n for n in names if n not in {e.name for e in turn.model.effects}]
-    screened = screen(templates, here.case.conditions, null, seen, left, line_of(here.case))
-    if through := acting_through(left, turn.model, here.case.conditions):
-        own = own_templates(here.case, here.model, null, through)
-        screened = sorted([*screened, *screen(own, here.case.conditions, null, seen, through)], key=lambda s: s.misfit)
-    distance = np.nan_to_num((seen - null.mean) / null.noise)
+    screened = screened_beside(here, left, templates)
+    distance = in_noise(null, seen)
     starts = starts_to_fit(screened, robust_squares(distance, null.weight), groups_that_stand_out(null, distance))
     confirm = partial(confirmed, here)
     fits, tries = fits_of(here, turn.misfit, starts)

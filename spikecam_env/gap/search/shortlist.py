@@ -9,13 +9,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.candidates.table import acting_through, candidate
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import Fit, fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
 from spikecam_env.gap.fit.shapes import with_fitted_shapes, with_shapes_to_fit
-from spikecam_env.gap.screen.screen import Screened
+from spikecam_env.gap.fit.simulated_templates import own_templates
+from spikecam_env.gap.screen.screen import Screened, screen
+from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
 
@@ -40,6 +42,17 @@ def line_of(case: Case) -> float | None:
     lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > LINE_SPIKES]
     (ratio, at), frame = max(lines, key=lambda line: line[0][0], default=((0.0, 0), np.zeros(1)))
     return frequency(frame, at) * case.frame_rate_hz if ratio > LINE else None
+
+
+def screened_beside(here: Problem, names: Sequence[str], templates: Templates) -> list[Screened]:
+    """Candidates by what their templates leave, best first; of those that act through what the model has already, by
+    templates of their own."""
+    null, shown = here.null, here.case.conditions
+    found = screen(templates, shown, null, here.seen, names, line_of(here.case))
+    if through := acting_through(names, here.model, shown):
+        own = own_templates(here.case, here.model, null, through)
+        found = sorted([*found, *screen(own, shown, null, here.seen, through)], key=lambda s: s.misfit)
+    return found
 
 
 def best_of_each(screened: Sequence[Screened]) -> list[Screened]:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.distance import GATE, adjusted, normal_deviates, residual, robust_squares
+from spikecam_env.gap.compare.distance import GATE, adjusted, in_noise, normal_deviates, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.result import Remainder
 from spikecam_env.gap.statistics import Key
@@ -29,9 +29,13 @@ are beyond chance; set on the trial's part `tune`."""
 
 
 def explains(null: Null, values: Array, predicted: Prediction) -> bool:
-    """Whether a prediction leaves chance of measured statistics (S,), or little beside what the null model leaves."""
+    """Whether a prediction leaves chance of measured statistics (S,), or little beside what the null model leaves.
+
+    Both are in the noise of the null model.  The noise of a prediction holds a share of what it changes, beside which
+    what it leaves would look small.
+    """
     off = is_left(null, values, predicted)
-    before, after = (distance(null, values, mean) for mean in (null.mean, predicted.mean))
+    before, after = (in_noise(null, values, mean) for mean in (null.mean, predicted.mean))
     there = sums_by_place(null.keys, before**2 - 1.0)
     little = sums_by_place(null.keys, np.where(off, after**2, 0.0)) <= MOST_LEFT_THERE * np.maximum(there, 1.0)
     deviance = [robust_beyond_chance(null, rho) for rho in (before, residual(null, values, predicted))]
@@ -49,7 +53,7 @@ def remainder_of(null: Null, values: Array, predicted: Prediction, where: str = 
     groups = {
         g: float(np.sum(left[[k.group == g for k in null.keys]] ** 2)) for g in dict.fromkeys(k.group for k in keys)
     }
-    before, after = (beyond_chance(null, distance(null, values, mean)) for mean in (null.mean, predicted.mean))
+    before, after = (beyond_chance(null, in_noise(null, values, mean)) for mean in (null.mean, predicted.mean))
     return Remainder(
         noises=float(left.max()),
         share=after / max(before, 1.0),
@@ -64,12 +68,6 @@ def remainder_of(null: Null, values: Array, predicted: Prediction, where: str = 
 def is_left(null: Null, values: Array, predicted: Prediction) -> NDArray[np.bool_]:
     """(S,) which of measured statistics a prediction leaves off, beyond chance and what laws are known to at all."""
     return np.asarray(adjusted(normal_deviates(null, residual(null, values, predicted), predicted)) < GATE)
-
-
-def distance(null: Null, values: Array, mean: Array) -> Array:
-    """(S,) measured less predicted, in the noise of the null model; 0 where unknown.  Not in that of the prediction:
-    its law is taken to be good to a share of what it changes, and what it leaves would look small beside that."""
-    return np.nan_to_num((values - mean) / null.noise)
 
 
 def sums_by_place(keys: Sequence[Key], squares: Array) -> Array:

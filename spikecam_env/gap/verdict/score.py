@@ -19,6 +19,7 @@ from scipy import stats
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import candidate, expected_events
+from spikecam_env.gap.compare.distance import in_noise
 from spikecam_env.gap.compare.prediction import Null, Prediction, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import is_clear
 from spikecam_env.gap.fit.gauss_newton import at_settled_unit
@@ -157,7 +158,7 @@ class TwinProbe(EffectProbe):
 
     def _scatter_score(self, made: Prediction, parameters: Parameters) -> Score | None:
         null = self.null
-        z2 = np.mean([np.nan_to_num((d.values - null.mean) / null.noise) ** 2 for d in made.draws], axis=0)
+        z2 = np.mean([in_noise(null, d.values) ** 2 for d in made.draws], axis=0)
         moves = np.where(self.usable, np.maximum(pooled(null.keys, z2) - 2.0, 0.0), 0.0)
         if not moves.any():
             return None
@@ -238,12 +239,12 @@ def linear(
 
 def linear_score(null: Null, weight: Array, values: Array) -> float:
     """Score of statistics (S,) along a change; what is unknown counts for nothing."""
-    return float(weight @ np.clip(np.nan_to_num((values - null.mean) / null.noise), -MOST_DEVIATE, MOST_DEVIATE))
+    return float(weight @ np.clip(in_noise(null, values), -MOST_DEVIATE, MOST_DEVIATE))
 
 
 def log_mean_square(null: Null, weight: Array, values: Array) -> float:
     """Score of statistics (S,) that an effect scatters, each way equally: the logarithm of their mean square."""
-    square = float(weight @ np.nan_to_num((values - null.mean) / null.noise) ** 2)
+    square = float(weight @ in_noise(null, values) ** 2)
     return float(np.log(max(square, 1e-12)))
 
 

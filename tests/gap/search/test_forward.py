@@ -198,7 +198,7 @@ def test_a_round_in_which_nothing_promises_enough_is_one_without_a_choice(monkey
     poor = a_fit(n, "crosstalk", np.where(np.arange(COUNT) >= 150, 4.0, 0.0), seen)
     rho, before = residual_and_misfit(n, seen, n.prediction)
     assert poor.misfit == pytest.approx(before)
-    monkeypatch.setattr(search, "screen", lambda *_: [])
+    monkeypatch.setattr(search, "screened_beside", lambda *_: [])
     monkeypatch.setattr(search, "fits_of", lambda *_: ([poor], {}))
     monkeypatch.setattr(search, "confirmed", lambda *_: pytest.fail("it was confirmed"))
     turn = Round(MODEL, unit(), n.prediction, rho, before)
@@ -213,7 +213,7 @@ def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
     rho, before = residual_and_misfit(n, seen, n.prediction)
     hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (TO_ADD + TO_JOIN) / 2)
     asked = []
-    monkeypatch.setattr(search, "screen", lambda *_: [])
+    monkeypatch.setattr(search, "screened_beside", lambda *_: [])
     monkeypatch.setattr(search, "fits_of", lambda *_: ([hint], {Screened("crosstalk", {}, 0.0, rho): hint}))
     monkeypatch.setattr(search, "confirmed", lambda _problem, found: asked.append(found) or found)
     first = Round(MODEL, unit(), n.prediction, rho, before)
