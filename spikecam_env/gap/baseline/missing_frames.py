@@ -20,6 +20,10 @@ OFTEN, PASSES = 0.9, 0.4
 """Frames are missing only where the lateness elsewhere, its quantile OFTEN, is below PASSES times the largest: two gaps
 are in few frames of a recording, a flicker in many."""
 
+LEAST_TIMED = 20
+"""Pixels with regular intervals alone that a steady recording needs to be timed by: fewer are late together by chance,
+where spikes are lost and a mean interval of 2 frames makes one of 4 regular."""
+
 SEGMENTS = 8
 """Parts of a moving recording whose timing is compared."""
 
@@ -47,6 +51,8 @@ def _jump_steady(o: Observation) -> tuple[int, float] | None:
     A gap of half an interval makes some of them irregular, which are not timed, and lengthens the others.  Where more
     than two intervals on either side are late, light or the dark level changes; nearer to an end than that, it may.
     """
+    if int(np.count_nonzero(o.short + o.long == 0)) < LEAST_TIMED:
+        return None
     interval = o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9)
     window = int(np.clip(round(interval), 4, o.frames // 8))
     total, timed = (np.convolve(a, np.ones(window), "valid") for a in (o.late, o.timed))

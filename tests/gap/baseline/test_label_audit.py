@@ -141,6 +141,29 @@ def test_a_gap_that_makes_intervals_odd_is_found(name, count):
     assert found(case_from(spikes)) == [("dropped", (name,))]
 
 
+def with_few_regular(pixels: int):
+    """Spikes are lost, but for a few pixels that fire in every second frame of one flat: a double interval of theirs
+    is still regular, and two frames late."""
+    rng = np.random.default_rng(0)
+    spikes = {name: seen * (rng.random(seen.shape) > 0.1) for name, seen in spikes_of().items()}
+    every = np.broadcast_to(np.arange(FRAMES)[:, None] % 2 == 0, (FRAMES, pixels))
+    spikes["flat-0.4"].reshape(FRAMES, -1)[:, :pixels] = every & (rng.random(every.shape) > 0.001)
+    return spikes
+
+
+@pytest.mark.parametrize("pixels", [2, 12])
+def test_a_few_late_pixels_are_no_gap(pixels):
+    spikes = with_few_regular(pixels)
+    spikes["flat-0.4"].reshape(FRAMES, -1)[FRAMES // 2, :pixels] = 0
+    assert found(case_from(spikes)) == []
+
+
+def test_a_gap_is_found_by_those_pixels_that_are_regular():
+    spikes = with_few_regular(36)
+    spikes["flat-0.4"] = np.delete(spikes["flat-0.4"], FRAMES // 2, axis=0)
+    assert found(case_from(spikes)) == [("dropped", ("flat-0.4",))]
+
+
 def test_a_quick_drift_of_the_dark_is_no_gap_in_time():
     """All pixels of a dim flat are behind their time at its beginning, and for long after."""
     assert found(recorded(effect("dark_current_drift", rise=0.3, tau_ms=5.0))) == []
