@@ -85,7 +85,8 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         ready = np.asarray(self._open().push(block))
         due = np.concatenate([self._due, ready.astype(self._type)])
         self._due = due[len(block) :]
-        return due[: len(block)].copy()
+        first: NDArray[Any] = due[: len(block)].copy()
+        return first
 
     def _first_frames(self, block: NDArray[Any], count: int) -> NDArray[Any]:
         """(count, H, W) what is shown of frames before any is denoised."""

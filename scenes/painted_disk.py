@@ -91,7 +91,8 @@ def _turned_box(side: float) -> NDArray[np.float32]:
     towards_side = np.arccos(np.clip(side / 2 / np.maximum(distance, side / 2), 0, 1))
     share = np.clip(1 - towards_side / (np.pi / 4), 0, 1)
     kernel = share.reshape(size, fine, size, fine).mean(axis=(1, 3))
-    return (kernel / kernel.sum()).astype(np.float32)
+    normed: NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
+    return normed
 
 
 BAND = 16
@@ -174,7 +175,9 @@ def _in_view(place, radius, top, bottom, columns):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True)
-def paint_tile(tile, pan, tilt, above, picture):  # pragma: no cover - compiled
+def paint_tile(
+    tile: NDArray[np.float32], pan: float, tilt: float, above: int, picture: NDArray[np.float32]
+) -> None:  # pragma: no cover - compiled
     """Rows from `above` on of the repeated tile seen from offset (pan, tilt), bilinear."""
     height, width = tile.shape
     left, top = int(np.floor(pan)), int(np.floor(tilt))
@@ -193,8 +196,21 @@ def paint_tile(tile, pan, tilt, above, picture):  # pragma: no cover - compiled
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _paint_disk(
-    behind, pairs, side, low, step, x, y, radius, u0, v0, cosine, sine, top, picture
-):  # pragma: no cover - compiled
+    behind: NDArray[np.float32],
+    pairs: int,
+    side: np.int32,
+    low: np.float32,
+    step: np.float32,
+    x: float,
+    y: float,
+    radius: float,
+    u0: float,
+    v0: float,
+    cosine: float,
+    sine: float,
+    top: int,
+    picture: NDArray[np.float32],
+) -> None:  # pragma: no cover - compiled
     """The disk over what is behind it, rows from `top` on of the picture, another array; a pixel on the rim is covered
     by the share inside (of a half-plane).
 
@@ -228,7 +244,7 @@ def _paint_disk(
             place[k] = row * side + column
             right_share[k], lower_share[k] = u - np.float32(column), v - np.float32(row)
         for k in range(stop - first):
-            texels[k] = two_at(pairs + 4 * place[k])  # type: ignore[call-arg]
+            texels[k] = two_at(pairs + 4 * place[k])
         inside = light[first:stop]
         for k in range(stop - first):
             here, right = halves[2 * k], halves[2 * k + 1]
@@ -254,7 +270,15 @@ def _copy(values, into):  # type: ignore[no-untyped-def]  # pragma: no cover - c
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
-def _blend_rim(behind, start, stop, x, dy, reach, row):  # pragma: no cover - compiled
+def _blend_rim(
+    behind: NDArray[np.float32],
+    start: int,
+    stop: int,
+    x: float,
+    dy: np.float32,
+    reach: np.float32,
+    row: NDArray[np.float32],
+) -> None:  # pragma: no cover - compiled
     """Pixels of a row that the disk covers in part."""
     back, light = behind[start:stop], row[start:stop]
     for k in range(len(light)):

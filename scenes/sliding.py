@@ -123,9 +123,11 @@ def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.f
         turns, rest = np.divmod(place, texels)
         whole = np.minimum(rest.astype(int), texels - 1)
         part = (rest - whole)[:, None]
-        return integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
+        light: NDArray[np.float64] = integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
+        return light
 
-    return (up_to(middle + half) - up_to(middle - half)) / (2 * half)
+    average: NDArray[np.float64] = (up_to(middle + half) - up_to(middle - half)) / (2 * half)
+    return average
 
 
 def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
@@ -138,7 +140,9 @@ def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]
 
 
 @njit(cache=True, nogil=True)
-def _paint(samples, x, y, picture):  # pragma: no cover - compiled
+def _paint(
+    samples: NDArray[np.float32], x: float, y: float, picture: NDArray[np.float32]
+) -> None:  # pragma: no cover - compiled
     """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
     height, (rows, columns) = samples.shape[0], picture.shape
     left, top = int(x), int(y)

@@ -98,7 +98,7 @@ def register(effect: type[Effect]) -> None:
     if known is not effect and (file_of(known) is None or file_of(known) != file_of(effect)):
         raise InputError(f"there is an effect {effect.name} already ({_home(known)}); give the class another name")
     check_declaration(effect)
-    copyreg.pickle(effect, _reduced)  # type: ignore[arg-type]
+    copyreg.pickle(effect, _reduced)
     _set_catalogue({**CATALOGUE, effect.name: effect})
 
 

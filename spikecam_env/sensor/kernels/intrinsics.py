@@ -12,7 +12,7 @@ from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def use_widest_vectors(typing_context: Any) -> Any:
     """Compile the function that calls this with the processor's widest registers.
 
@@ -28,7 +28,7 @@ def use_widest_vectors(typing_context: Any) -> Any:
     return types.void(), mark
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
     """The next number of a counter that threads share: adds one to tickets[row, 0] (int64), returns what it was."""
 
@@ -41,7 +41,7 @@ def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
     return types.int64(tickets, types.int64), fetch_and_add
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def pointer_to(typing_context: Any, address: Any, kind: Any) -> Any:
     """The pointer to numbers of this kind (np.float32, ...) at an address: for `numba.carray`.
 
@@ -55,7 +55,7 @@ def pointer_to(typing_context: Any, address: Any, kind: Any) -> Any:
     return pointer(address, kind), cast
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def prefetch(typing_context: Any, address: Any) -> Any:
     """Ask for the line of cache at an address, which will soon be read; any address will do."""
 
@@ -71,7 +71,7 @@ def prefetch(typing_context: Any, address: Any) -> Any:
     return types.void(types.int64), ask
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def two_at(typing_context: Any, address: Any) -> Any:
     """The two uint32 at an address, the first in the lower half of a uint64 (little-endian processors): one read."""
 
