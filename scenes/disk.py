@@ -70,6 +70,11 @@ class RotatingDisk(PlanarScene):
 
     Truth: object 1 is the disk; poses["disk"] is (x, y, angle) with the angle in [0, 2 pi).
     Errors: InputError for a value out of range, by name.
+
+    >>> scene = RotatingDisk((16, 24), rpm=2000.0)
+    >>> truth = scene.truth(0.5)
+    >>> truth.radiance.shape, list(truth.poses)
+    ((16, 24), ['disk', 'camera'])
     """
 
     def __init__(

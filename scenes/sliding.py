@@ -38,6 +38,10 @@ class SlidingTexture:
 
     Truth: all is object 0; poses["texture"] is where its upper left corner has gone, (x, y) [pixels].
     Errors: InputError for a value out of range, by name.
+
+    >>> scene = SlidingTexture((16, 24), velocity_px_s=(20_000.0, 0.0))
+    >>> scene.truth(0.5).flow[0, 0].tolist()  # pixels a frame
+    [0.5, 0.0]
     """
 
     def __init__(

@@ -52,6 +52,9 @@ def isi_planes(
 
     The whole stream is seen whatever `start` and `stop` are; time is O(T) a pixel.
     Errors: InputError unless 0 <= start < stop <= T and future >= 0.
+
+    >>> isi_planes(np.uint8([1, 0, 0, 1, 0, 1]).reshape(6, 1, 1), start=2, stop=5).ravel().tolist()
+    [3.0, 2.0, 2.0]
     """
     frames = as_spikes(spikes)
     count = len(frames)
