@@ -105,7 +105,7 @@ _NOTHING = Key(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _tints(light, brightest, cover):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _tints(light: Array, brightest: np.float32, cover: Array) -> NDArray[np.uint32]:  # pragma: no cover - compiled
     """Light as a share of the brightest, and coverage, both in 0..1, in 16 bits each."""
     tints = np.empty(light.shape, np.uint32)
     full, half = np.float32(65535), np.float32(0.5)
@@ -123,12 +123,14 @@ def _filled(sprite: Sprite) -> Array:
     if nothing.all():
         return np.zeros_like(sprite.depth)
     _, nearest = cv2.distanceTransformWithLabels(nothing, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
-    filled: Array = _depth_of(nearest, int(nearest.max()), nothing, sprite.depth)
+    filled: Array = _depth_of(np.asarray(nearest, np.int32), int(nearest.max()), nothing, sprite.depth)
     return filled
 
 
 @njit(nogil=True, cache=True)
-def _depth_of(nearest, labels, nothing, depth):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _depth_of(
+    nearest: NDArray[np.int32], labels: int, nothing: NDArray[np.uint8], depth: Array
+) -> Array:  # pragma: no cover - compiled
     """Of each texel the depth of the one that is not nothing and has the same label."""
     of_label, filled = np.zeros(labels + 1, np.float32), np.empty(depth.shape, np.float32)
     for row in range(len(nearest)):
@@ -225,13 +227,13 @@ def _fit(key_pixels: Floats, pixels: Floats, reference: Floats, found: Floats) -
 
 
 @njit(inline="always")
-def _basis(u, v, basis):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _basis(u: float, v: float, basis: Floats) -> None:  # pragma: no cover - compiled
     """What the polynomial is a sum of, (6,), at (u, v)."""
     basis[0], basis[1], basis[2], basis[3], basis[4], basis[5] = 1.0, u, v, u * u, u * v, v * v
 
 
 @njit(inline="always")
-def _solve(normal, right):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _solve(normal: Floats, right: Floats) -> None:  # pragma: no cover - compiled
     """Solve normal x = right (6, 2) in place by Cholesky's factors; normal (6, 6), of which the lower half is read, is
     positive definite."""
     for row in range(6):

@@ -116,7 +116,16 @@ def parts_of(keys: int, rows: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def paint_scenes(tickets, parts, scenes, pan, tilt, textures, numbers, places):  # type: ignore[no-untyped-def]  # pragma: no cover
+def paint_scenes(
+    tickets: NDArray[np.int64],
+    parts: int,
+    scenes: NDArray[np.int64],
+    pan: NDArray[np.float64],
+    tilt: NDArray[np.float64],
+    textures: NDArray[np.int64],
+    numbers: NDArray[np.float64],
+    places: NDArray[np.float64],
+) -> None:  # pragma: no cover
     """Pictures of tiles with disks before them: the parts, a band of rows at some keys, that this thread gets hold of.
 
     tickets     (1, 8) int64, shared: [0, 0] is the next part, of `parts`
@@ -130,7 +139,7 @@ def paint_scenes(tickets, parts, scenes, pan, tilt, textures, numbers, places): 
     """
     n = 0
     while True:
-        part: Any = take_ticket(tickets, 0)  # type: ignore[call-arg]
+        part: Any = take_ticket(tickets, 0)
         if part >= parts:
             return
         while n + 1 < len(scenes) and scenes[n + 1, _FIRST_PART] <= part:
@@ -168,10 +177,12 @@ def paint_scenes(tickets, parts, scenes, pan, tilt, textures, numbers, places): 
 
 
 @njit(inline="always")
-def _in_view(place, radius, top, bottom, columns):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _in_view(
+    place: NDArray[np.float64], radius: float, top: int, bottom: int, columns: int
+) -> bool:  # pragma: no cover - compiled
     """Whether a disk at a place (`places_of`) is seen in rows from `top` to `bottom`."""
     reach = radius + 1
-    return -reach < place[0] < columns - 1 + reach and top - reach < place[1] < bottom - 1 + reach
+    return -reach < place[0] < columns - 1 + reach and top - reach < place[1] < bottom - 1 + reach  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
@@ -218,7 +229,7 @@ def _paint_disk(
     (u0 + cosine column - sine row, v0 + sine column + cosine row), bilinear.  Each row goes through short loops,
     places, texels, light: the first and the last are vectors then.  Nothing but the rim is blended.
     """
-    use_widest_vectors()  # type: ignore[call-arg]
+    use_widest_vectors()
     reach, solid = np.float32(radius + 0.5), np.float32(max(radius - 0.5, 0.0))
     du, dv = np.float32(cosine), np.float32(sine)
     rows, columns = picture.shape
@@ -264,7 +275,7 @@ def _paint_disk(
 
 
 @njit(inline="always")
-def _copy(values, into):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _copy(values: NDArray[np.float32], into: NDArray[np.float32]) -> None:  # pragma: no cover - compiled
     for i in range(len(values)):
         into[i] = values[i]
 
