@@ -54,9 +54,7 @@ def side_by_side(
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _spikes(
-    spikes: NDArray[np.uint8], one: np.uint16 | np.uint32, begin: int, stop: int, out: Bits
-) -> None:  # pragma: no cover - compiled
+def _spikes(spikes: NDArray[np.uint8], one: np.uint16 | np.uint32, begin: int, stop: int, out: Bits) -> None:
     """Frames (span, H, W) -> channels 0 .. span of rows begin .. stop; eight frames at a time as the bits of a byte."""
     span, _, width = spikes.shape
     byte = np.empty(width, np.uint8)
@@ -78,9 +76,7 @@ def _spikes(
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _layers(
-    values: NDArray[np.uint32], channel: int, begin: int, stop: int, out: Bits
-) -> None:  # pragma: no cover - compiled
+def _layers(values: NDArray[np.uint32], channel: int, begin: int, stop: int, out: Bits) -> None:
     """Bits (n, H, W) of float32 -> channels from `channel` on; to 16 bits rounded half to even."""
     half = out.itemsize == 2
     for y in range(begin, stop):

@@ -233,7 +233,7 @@ def _interval_planes(
     count: int,
     half_widths: NDArray[np.int64],
     planes: NDArray[np.float32],
-) -> None:  # pragma: no cover
+) -> None:
     """1/ISI at start .. start + count, then n / (t_n - t_0) about the middle; frames[0] is frame `first`."""
     stop = first + frames.shape[0]
     height, width = last_before.shape
@@ -302,7 +302,7 @@ def _interval_planes(
 
 
 @njit(cache=True, nogil=True)
-def _last_spikes(frames: NDArray[np.uint8], first: int, last: NDArray[np.int32]) -> None:  # pragma: no cover
+def _last_spikes(frames: NDArray[np.uint8], first: int, last: NDArray[np.int32]) -> None:
     count, height, width = frames.shape
     for t in range(count):
         for y in range(height):
@@ -312,9 +312,7 @@ def _last_spikes(frames: NDArray[np.uint8], first: int, last: NDArray[np.int32])
 
 
 @njit(cache=True, nogil=True)
-def _running_means(
-    frames: NDArray[np.uint8], share: NDArray[np.float32], means: NDArray[np.float32]
-) -> None:  # pragma: no cover
+def _running_means(frames: NDArray[np.uint8], share: NDArray[np.float32], means: NDArray[np.float32]) -> None:
     count, height, width = frames.shape
     for i in range(len(share)):
         for y in range(height):

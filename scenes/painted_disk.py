@@ -125,7 +125,7 @@ def paint_scenes(
     textures: NDArray[np.int64],
     numbers: NDArray[np.float64],
     places: NDArray[np.float64],
-) -> None:  # pragma: no cover
+) -> None:
     """Pictures of tiles with disks before them: the parts, a band of rows at some keys, that this thread gets hold of.
 
     tickets     (1, 8) int64, shared: [0, 0] is the next part, of `parts`
@@ -177,18 +177,14 @@ def paint_scenes(
 
 
 @njit(inline="always")
-def _in_view(
-    place: NDArray[np.float64], radius: float, top: int, bottom: int, columns: int
-) -> bool:  # pragma: no cover - compiled
+def _in_view(place: NDArray[np.float64], radius: float, top: int, bottom: int, columns: int) -> bool:
     """Whether a disk at a place (`places_of`) is seen in rows from `top` to `bottom`."""
     reach = radius + 1
     return -reach < place[0] < columns - 1 + reach and top - reach < place[1] < bottom - 1 + reach  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def paint_tile(
-    tile: NDArray[np.float32], pan: float, tilt: float, above: int, picture: NDArray[np.float32]
-) -> None:  # pragma: no cover - compiled
+def paint_tile(tile: NDArray[np.float32], pan: float, tilt: float, above: int, picture: NDArray[np.float32]) -> None:
     """Rows from `above` on of the repeated tile seen from offset (pan, tilt), bilinear."""
     height, width = tile.shape
     left, top = int(np.floor(pan)), int(np.floor(tilt))
@@ -221,7 +217,7 @@ def _paint_disk(
     sine: float,
     top: int,
     picture: NDArray[np.float32],
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """The disk over what is behind it, rows from `top` on of the picture, another array; a pixel on the rim is covered
     by the share inside (of a half-plane).
 
@@ -275,7 +271,7 @@ def _paint_disk(
 
 
 @njit(inline="always")
-def _copy(values: NDArray[np.float32], into: NDArray[np.float32]) -> None:  # pragma: no cover - compiled
+def _copy(values: NDArray[np.float32], into: NDArray[np.float32]) -> None:
     for i in range(len(values)):
         into[i] = values[i]
 
@@ -289,7 +285,7 @@ def _blend_rim(
     dy: np.float32,
     reach: np.float32,
     row: NDArray[np.float32],
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Pixels of a row that the disk covers in part."""
     back, light = behind[start:stop], row[start:stop]
     for k in range(len(light)):

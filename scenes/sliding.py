@@ -144,9 +144,7 @@ def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]
 
 
 @njit(cache=True, nogil=True)
-def _paint(
-    samples: NDArray[np.float32], x: float, y: float, picture: NDArray[np.float32]
-) -> None:  # pragma: no cover - compiled
+def _paint(samples: NDArray[np.float32], x: float, y: float, picture: NDArray[np.float32]) -> None:
     """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
     height, (rows, columns) = samples.shape[0], picture.shape
     left, top = int(x), int(y)

@@ -277,7 +277,7 @@ def _split(
     radiance: NDArray[np.float32],
     coverage: NDArray[np.float32],
     depth: NDArray[np.float32],
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """What was read (rows, columns, 4) into pictures of its own; where nothing is seen it is infinitely far."""
     for row in range(values.shape[0]):
         for x in range(values.shape[1]):

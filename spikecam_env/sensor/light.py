@@ -271,7 +271,7 @@ KEY0, KEY1, BEGIN, LENGTH, FIRST, COUNT = range(6)
 
 
 @njit(cache=True, nogil=True)
-def cuts(times: NDArray[np.float64], start: int, stop: int) -> NDArray[np.int64]:  # pragma: no cover - compiled
+def cuts(times: NDArray[np.float64], start: int, stop: int) -> NDArray[np.int64]:
     """How keys at `times` (K,) cut frames start .. stop into segments: (S, 6) int64, a row each.
 
     KEY0, KEY1: the keys whose pictures are the light at its start and at its end; -1 where no key is at that frame.
