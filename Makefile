@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 # Of some 16 000 modules few are imported, and compiled then.
 PIP := -m pip install --quiet --no-compile
 
-.PHONY: install install-dev install-oldest demo test test-oldest lint docs pages clean
+.PHONY: install install-dev install-oldest demo test test-oldest coverage lint docs pages clean
 
 install: $(VENV)/.installed
 install-dev: $(VENV)/.installed-dev
@@ -46,6 +46,14 @@ test-oldest: install-oldest
 	NUMBA_CACHE_DIR=$(abspath $(OLDEST))/numba $(OLDEST)/bin/python -m pytest -W ignore::DeprecationWarning \
 		$(SHARED_OUT) -m 'not slow' $(OLDEST_TESTS)
 
+# Share of lines that the tests run, without the slow ones; TESTS="tests/streams tests/cli" names fewer.
+TESTS ?= tests
+coverage: install-dev
+	$(BIN)/python -m coverage erase
+	$(BIN)/python -m coverage run -m pytest $(SHARED_OUT) -m 'not slow' $(TESTS)
+	$(BIN)/python -m coverage combine --quiet
+	$(BIN)/python -m coverage report
+
 # The committed diagnoses of real recordings, where these are at hand, and every figure about them in docs.
 pages: install-dev
 	$(BIN)/python -m tools.pages
@@ -61,4 +69,4 @@ lint: install-dev
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf $(VENV) $(VENV)-oldest build docs/_build *.egg-info
+	rm -rf $(VENV) $(VENV)-oldest build docs/_build .coverage *.egg-info

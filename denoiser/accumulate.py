@@ -37,7 +37,7 @@ def step(rates: NDArray[np.float32], state: AccumulateState) -> tuple[NDArray[np
 
 
 @njit(cache=True, nogil=True)
-def _accumulate(rates, charge, spikes):  # pragma: no cover - compiled
+def _accumulate(rates: NDArray[np.float32], charge: NDArray[np.float64], spikes: NDArray[np.uint8]) -> None:
     count, height, width = rates.shape
     for t in range(count):
         for y in range(height):

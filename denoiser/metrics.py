@@ -31,5 +31,5 @@ def count_variance(rate: NDArray[np.floating], window: int) -> NDArray[np.floati
     Two streams of the same rates and independent phases differ by twice that: no denoiser comes nearer to the clean
     twin's picture in the mean, since the phase of the clean twin is not in the noisy stream.
     """
-    fraction = np.mod(rate * window, 1.0)
+    fraction: NDArray[np.floating] = np.mod(rate * window, 1.0)
     return fraction * (1 - fraction) / window**2

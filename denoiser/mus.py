@@ -52,7 +52,7 @@ def step(inverse_intervals: NDArray[np.float32], state: MusState) -> tuple[NDArr
 
 
 @njit(cache=True, nogil=True)
-def _update(inverse_intervals, wait, spikes):  # pragma: no cover - compiled
+def _update(inverse_intervals: NDArray[np.float32], wait: NDArray[np.float64], spikes: NDArray[np.uint8]) -> None:
     count, height, width = spikes.shape
     for t in range(count):
         for y in range(height):

@@ -72,7 +72,8 @@ class UNet(nn.Module):
         fine = self.fine(x)
         middle = self.down1(fine)
         x = self.join2(torch.cat([self.up2(self.down2(middle)), middle], dim=1))
-        return self.join1(torch.cat([self.up1(x), fine], dim=1))
+        joined: Tensor = self.join1(torch.cat([self.up1(x), fine], dim=1))
+        return joined
 
 
 def _blend_head(inputs: int) -> nn.Conv2d:

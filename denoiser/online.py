@@ -62,6 +62,11 @@ class OnlineDnSS:
     The network is copied: training it further changes nothing here.  One object denoises one stream: for another stream
     take `another()`.
     Errors: InputError for unknown options and unusable spikes; NotReadyError for a push after `flush`.
+
+    >>> online = OnlineDnSS.pretrained("best", output="rate")
+    >>> spikes = (np.random.default_rng(0).random((64, 16, 24)) < 0.2).astype(np.uint8)
+    >>> [online.push(block).shape for block in (spikes[:32], spikes[32:])], online.flush().shape
+    ([(16, 16, 24), (32, 16, 24)], (16, 16, 24))
     """
 
     def __init__(
@@ -282,6 +287,11 @@ def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **option
 
     The same bits as pushing the stream piece by piece; it is pushed `chunk` frames at a time to save memory.
     Raises InputError as `OnlineDnSS` does, and for a chunk that is no whole number, 1 or more.
+
+    >>> spikes = (np.random.default_rng(0).random((48, 16, 24)) < 0.2).astype(np.uint8)
+    >>> rate = denoise(spikes, "best", output="rate")
+    >>> rate.shape, rate.dtype
+    ((48, 16, 24), dtype('float32'))
     """
     frames, chunk = as_spikes(spikes), checked_count(chunk, "chunk")
     online = OnlineDnSS.pretrained(mode, **options)

@@ -75,7 +75,7 @@ def _stored(archive: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
     return members
 
 
-class _Plain(pickle._Unpickler):  # type: ignore[name-defined,misc]  # the one in Python: damaged files cannot crash it
+class _Plain(pickle._Unpickler):  # the one in Python: damaged files cannot crash it
     def __init__(self, records: dict[str, bytes]) -> None:
         super().__init__(io.BytesIO(records["data.pkl"]))
         self._records = records

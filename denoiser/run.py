@@ -76,7 +76,8 @@ class Run:
 
     def _moments(self) -> dict[int, dict[str, Tensor]]:
         """Of each parameter by number."""
-        return self.optimiser.state_dict()["state"]
+        moments: dict[int, dict[str, Tensor]] = self.optimiser.state_dict()["state"]
+        return moments
 
     def _settings(self) -> list[dict[str, Any]]:
         """Of the optimiser, but for what depends on the device or changes from step to step."""

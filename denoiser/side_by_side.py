@@ -6,6 +6,7 @@ Convolutions want their input so (channels last).  Torch would make it in four c
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 import torch
@@ -15,6 +16,9 @@ from torch import Tensor
 from denoiser.strips import share_rows
 from denoiser.window import Window
 from spikecam_env.compiled import njit
+
+Bits: TypeAlias = "NDArray[np.uint16] | NDArray[np.uint32]"
+"""Numbers of 16 or 32 bits, as they lie in memory."""
 
 _ONE = {torch.bfloat16: np.uint16(0x3F80), torch.float32: np.uint32(0x3F800000)}
 """1.0 as bits."""
@@ -50,7 +54,7 @@ def side_by_side(
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _spikes(spikes, one, begin, stop, out):  # pragma: no cover - compiled
+def _spikes(spikes: NDArray[np.uint8], one: np.uint16 | np.uint32, begin: int, stop: int, out: Bits) -> None:
     """Frames (span, H, W) -> channels 0 .. span of rows begin .. stop; eight frames at a time as the bits of a byte."""
     span, _, width = spikes.shape
     byte = np.empty(width, np.uint8)
@@ -72,7 +76,7 @@ def _spikes(spikes, one, begin, stop, out):  # pragma: no cover - compiled
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _layers(values, channel, begin, stop, out):  # pragma: no cover - compiled
+def _layers(values: NDArray[np.uint32], channel: int, begin: int, stop: int, out: Bits) -> None:
     """Bits (n, H, W) of float32 -> channels from `channel` on; to 16 bits rounded half to even."""
     half = out.itemsize == 2
     for y in range(begin, stop):

@@ -225,7 +225,15 @@ def _mirror(frames: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 
 
 @njit(cache=True, nogil=True)
-def _interval_planes(frames, last_before, first, start, count, half_widths, planes):  # pragma: no cover
+def _interval_planes(
+    frames: NDArray[np.uint8],
+    last_before: NDArray[np.int32],
+    first: int,
+    start: int,
+    count: int,
+    half_widths: NDArray[np.int64],
+    planes: NDArray[np.float32],
+) -> None:
     """1/ISI at start .. start + count, then n / (t_n - t_0) about the middle; frames[0] is frame `first`."""
     stop = first + frames.shape[0]
     height, width = last_before.shape
@@ -294,7 +302,7 @@ def _interval_planes(frames, last_before, first, start, count, half_widths, plan
 
 
 @njit(cache=True, nogil=True)
-def _last_spikes(frames, first, last):  # pragma: no cover
+def _last_spikes(frames: NDArray[np.uint8], first: int, last: NDArray[np.int32]) -> None:
     count, height, width = frames.shape
     for t in range(count):
         for y in range(height):
@@ -304,7 +312,7 @@ def _last_spikes(frames, first, last):  # pragma: no cover
 
 
 @njit(cache=True, nogil=True)
-def _running_means(frames, share, means):  # pragma: no cover
+def _running_means(frames: NDArray[np.uint8], share: NDArray[np.float32], means: NDArray[np.float32]) -> None:
     count, height, width = frames.shape
     for i in range(len(share)):
         for y in range(height):

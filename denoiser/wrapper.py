@@ -29,6 +29,12 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
     Info: denoiser_latency, how late the block is; denoised_frames, how many of its frames, the last ones, are denoised.
     Errors: InputError for packed or other observations, an unknown mode or output, and an unusable checkpoint;
     NotReadyError for a step before the first reset or after `close`.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> env = DenoiseObservation(RotatingDiskEnv(shape=(16, 24)), output="rate")
+    >>> block, info = env.reset(seed=0)
+    >>> block.shape, info["denoiser_latency"]
+    ((40, 16, 24), 31)
     """
 
     def __init__(
@@ -85,7 +91,8 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         ready = np.asarray(self._open().push(block))
         due = np.concatenate([self._due, ready.astype(self._type)])
         self._due = due[len(block) :]
-        return due[: len(block)].copy()
+        first: NDArray[Any] = due[: len(block)].copy()
+        return first
 
     def _first_frames(self, block: NDArray[Any], count: int) -> NDArray[Any]:
         """(count, H, W) what is shown of frames before any is denoised."""

@@ -27,7 +27,8 @@ cameras = gymnasium.make_vec(
     "spikecam_env/Catch-v1", num_envs=16, vectorization_mode="vector_entry_point", obs="tfp", obs_state=True
 )
 recipe = Recipe(channels=1, shape=(64, 64), high=255, lags=(0, 2, 5), actions=1)
-run = Run.begin(recipe.network())
+policy = recipe.network()
+run = Run.begin(policy)
 
 
 def report() -> None:
@@ -41,7 +42,7 @@ def report() -> None:
 train(cameras, run, PPO(steps=STEPS), seed=0, save=report)
 cameras.close()
 
-agent = Agent("Catch-v1", "tfp", run.network)
+agent = Agent("Catch-v1", "tfp", policy)
 score = score_of(agent, agent.make(split="test"), EPISODES)
 print(f"score on {EPISODES} test episodes: {score:.2f}  (0: doing nothing, 1: the oracle)")
 agent.save("catch.pt")

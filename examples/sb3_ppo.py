@@ -36,7 +36,8 @@ def learned(task: str, steps: int, count: int = 8, rollout: int = 128, vector: t
 
 def performance(task: str, act: Callable[[np.ndarray], Any], episodes: int) -> float:
     """Mean over test episodes of what `info` says at their end."""
-    env, ended = cameras(task, 1, 0, "test"), []
+    env = cameras(task, 1, 0, "test")
+    ended: list[float] = []
     seen = env.reset()
     while len(ended) < episodes:
         seen, _, over, infos = env.step(act(seen))

@@ -19,7 +19,7 @@ def edge(at: float) -> np.ndarray:
     return np.broadcast_to(0.1 + 0.4 / (1 + np.exp(-(columns - at))), SHAPE)
 
 
-frames = np.arange(0, 641, 32)
+frames = np.arange(0.0, 641.0, 32.0)
 light = Keyframes(frames, np.stack([edge(20 + 0.1 * f) for f in frames]))
 
 sensor = SpikeSensor(SensorModel.preset("scsim"), shape=SHAPE, seed=1)

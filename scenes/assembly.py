@@ -25,6 +25,9 @@ class Part:
     """vertices, normals (V, 3); uv (V, 2), v = 1 at the top of the texture; faces (F, 3).
 
     albedo: 0..1, linear: one value, one for each vertex (V,), or a texture (h, w).
+
+    >>> disc(0.5).scaled(2.0).vertices.max(axis=0).round(6).tolist()
+    [1.0, 1.0, 0.0]
     """
 
     vertices: Points
@@ -49,7 +52,11 @@ class Part:
 
 def assemble(*parts: Part) -> Surface:
     """One rigid surface; textures and greys of several parts go into one atlas, greys and albedos of vertices into one
-    for each vertex."""
+    for each vertex.
+
+    >>> len(assemble(*box((1.0, 1.0, 1.0)), disc(0.4)).mesh.faces)
+    108
+    """
     if not parts:
         raise InputError("a surface needs at least one part")
     if len(parts) == 1:

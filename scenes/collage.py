@@ -39,6 +39,10 @@ class Collage:
     kinds          texture kinds (`scenes.textures`); default: all
     textures       square float32 pictures in [0, 1] to use instead of procedural ones
     Errors: InputError for an empty shape, negative speed, light <= 0 or contrast < 1.
+
+    >>> scene = Collage((16, 24), seed=1)
+    >>> scene.radiance(0, 64).radiance.shape[1:]
+    (16, 24)
     """
 
     def __init__(

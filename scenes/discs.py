@@ -159,7 +159,7 @@ class Discs(PlanarScene):
 
 
 @njit(cache=True, nogil=True)
-def _along(frames, knots, places):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _along(frames: NDArray[np.float64], knots: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """As `np.interp` of both columns of places (n, 2) given at knots (n,)."""
     found = np.empty((2, len(frames)))
     for k in range(len(frames)):

@@ -70,6 +70,11 @@ class RotatingDisk(PlanarScene):
 
     Truth: object 1 is the disk; poses["disk"] is (x, y, angle) with the angle in [0, 2 pi).
     Errors: InputError for a value out of range, by name.
+
+    >>> scene = RotatingDisk((16, 24), rpm=2000.0)
+    >>> truth = scene.truth(0.5)
+    >>> truth.radiance.shape, list(truth.poses)
+    ((16, 24), ['disk', 'camera'])
     """
 
     def __init__(
@@ -226,7 +231,8 @@ _AT_REST = Gaze.fixed(0.0, 0.0)
 
 def _sectors(turn: NDArray[np.float32], count: int) -> NDArray[np.float32]:
     """Alternating 0 and 1, `count` of them in a turn."""
-    return np.floor(turn * count) % 2
+    sectors: NDArray[np.float32] = np.floor(turn * count) % 2
+    return sectors
 
 
 def _round_text(
@@ -238,7 +244,9 @@ def _round_text(
     strip = np.zeros((height, width), np.uint8)
     cv2.putText(strip, text, (0, 114), cv2.FONT_HERSHEY_DUPLEX, 4.0, 255, 12, cv2.LINE_AA)
     across = (outer - radius) / np.float32(outer - inner) * height
-    return cv2.remap(strip, turn * width, across, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) / np.float32(255)
+    ring = cv2.remap(strip, turn * width, across, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    white: NDArray[np.float32] = ring / np.float32(255)
+    return white
 
 
 def _background_tile(
@@ -250,7 +258,8 @@ def _background_tile(
     """(h, w) float32 radiance, to be repeated."""
     if background is None:
         noise = gaussian_filter(fractal_noise(rng, 2 * (max(shape) // 2) + 64), 1.0, mode="wrap")
-        return np.float32(light[0]) + np.float32(0.4 * (light[1] - light[0])) * noise
+        cloudy: NDArray[np.float32] = np.float32(light[0]) + np.float32(0.4 * (light[1] - light[0])) * noise
+        return cloudy
     tile = np.atleast_2d(np.asarray(background, np.float32))
     if tile.ndim != 2 or not tile.size or not np.isfinite(tile).all() or tile.min() < 0:
         raise InputError("background must be a radiance or a (rows, columns) tile of it, finite and 0 or more")

@@ -30,6 +30,10 @@ def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = No
 
     metered   measure this one instead, e.g. the same scene at a smaller shape
     Errors: InputError for an interval below 1 (a pixel fires at most once a frame) or a scene without light.
+
+    >>> from scenes.disk import RotatingDisk
+    >>> round(1.0 / float(expose(RotatingDisk((16, 24)), mean_interval=20.0).truth(0.5).radiance.mean()))
+    20
     """
     checked_interval(mean_interval)
     mean = float(np.mean([(metered or scene).truth(frame).radiance.mean() for frame in METERED_FRAMES]))
@@ -39,20 +43,36 @@ def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = No
 
 
 def lit(scene: Scene, gain: float) -> Scene:
-    """The scene with `gain` times its light."""
+    """The scene with `gain` times its light.
+
+    >>> from scenes.disk import RotatingDisk
+    >>> scene = RotatingDisk((16, 24))
+    >>> round(float(lit(scene, 0.5).truth(0.5).radiance.mean() / scene.truth(0.5).radiance.mean()), 3)
+    0.5
+    """
     if gain == 1.0:
         return scene
     return scene.lit(gain) if isinstance(scene, Dimmable) else Exposed(scene, gain)
 
 
 def checked_interval(mean_interval: float) -> float:
-    """The interval as it is; raises InputError unless it is from 1 to MOST_INTERVAL frames."""
+    """The interval as it is; raises InputError unless it is from 1 to MOST_INTERVAL frames.
+
+    >>> checked_interval(10.0)
+    10.0
+    """
     return checked_number(mean_interval, "mean_interval", 1.0, MOST_INTERVAL, unit="frames, e.g. 10")
 
 
 @dataclass(frozen=True)
 class Exposed(Derived):
-    """Scene: another one with its light multiplied by `gain`."""
+    """Scene: another one with its light multiplied by `gain`.
+
+    >>> from scenes.collage import Collage
+    >>> scene = Collage((16, 24))
+    >>> float(Exposed(scene, 0.5).truth(0.5).radiance.max() / scene.truth(0.5).radiance.max())
+    0.5
+    """
 
     scene: Scene
     gain: float

@@ -105,7 +105,7 @@ _NOTHING = Key(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _tints(light, brightest, cover):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _tints(light: Array, brightest: np.float32, cover: Array) -> NDArray[np.uint32]:
     """Light as a share of the brightest, and coverage, both in 0..1, in 16 bits each."""
     tints = np.empty(light.shape, np.uint32)
     full, half = np.float32(65535), np.float32(0.5)
@@ -123,12 +123,12 @@ def _filled(sprite: Sprite) -> Array:
     if nothing.all():
         return np.zeros_like(sprite.depth)
     _, nearest = cv2.distanceTransformWithLabels(nothing, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
-    filled: Array = _depth_of(nearest, int(nearest.max()), nothing, sprite.depth)
+    filled: Array = _depth_of(np.asarray(nearest, np.int32), int(nearest.max()), nothing, sprite.depth)
     return filled
 
 
 @njit(nogil=True, cache=True)
-def _depth_of(nearest, labels, nothing, depth):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _depth_of(nearest: NDArray[np.int32], labels: int, nothing: NDArray[np.uint8], depth: Array) -> Array:
     """Of each texel the depth of the one that is not nothing and has the same label."""
     of_label, filled = np.zeros(labels + 1, np.float32), np.empty(depth.shape, np.float32)
     for row in range(len(nearest)):
@@ -191,7 +191,7 @@ def fit(key_pixels: Floats, pixels: Floats) -> tuple[Floats, Floats]:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _fit(key_pixels, pixels, reference, found):  # pragma: no cover - compiled
+def _fit(key_pixels: Floats, pixels: Floats, reference: Floats, found: Floats) -> None:
     """See `fit`; instant by instant, so that none depends on what else is asked for."""
     normal, right, basis = np.empty((6, 6)), np.empty((6, 2)), np.empty(6)
     for n in range(len(pixels)):
@@ -225,13 +225,13 @@ def _fit(key_pixels, pixels, reference, found):  # pragma: no cover - compiled
 
 
 @njit(inline="always")
-def _basis(u, v, basis):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _basis(u: float, v: float, basis: Floats) -> None:
     """What the polynomial is a sum of, (6,), at (u, v)."""
     basis[0], basis[1], basis[2], basis[3], basis[4], basis[5] = 1.0, u, v, u * u, u * v, v * v
 
 
 @njit(inline="always")
-def _solve(normal, right):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _solve(normal: Floats, right: Floats) -> None:
     """Solve normal x = right (6, 2) in place by Cholesky's factors; normal (6, 6), of which the lower half is read, is
     positive definite."""
     for row in range(6):
@@ -252,7 +252,7 @@ def _solve(normal, right):  # type: ignore[no-untyped-def]  # pragma: no cover -
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _astray(key_pixels, pixels, reference, found, furthest):  # pragma: no cover - compiled
+def _astray(key_pixels: Floats, pixels: Floats, reference: Floats, found: Floats, furthest: Floats) -> None:
     """furthest (n,): how far the polynomials put pixels (n, J, 2) from texels (J, 2) of the key, in x or y, at most."""
     basis = np.empty(6)
     for n in range(len(pixels)):
@@ -353,8 +353,18 @@ def lay(
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
 def _add(
-    layer, box, weight, tints, brightest, depth, reference, coefficients, rigid, solid, deep
-):  # pragma: no cover - compiled
+    layer: Array,
+    box: NDArray[np.int64],
+    weight: np.float32,
+    tints: NDArray[np.uint32],
+    brightest: np.float32,
+    depth: Array,
+    reference: Array,
+    coefficients: Array,
+    rigid: Array,
+    solid: bool,
+    deep: bool,
+) -> None:
     """Add weight x key, read bilinear, to a layer (3, h, w) of light, coverage and distance, the box of the picture.
 
     Each row goes through short loops over arrays of its own, places, texels, light: all but those that fetch are
@@ -452,33 +462,33 @@ def _add(
 
 
 @njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _empty(cells, at, under):  # pragma: no cover - compiled
+def _empty(cells: NDArray[np.uint32], at: np.uint32, under: np.uint32) -> bool:
     one = np.uint32(1)
-    return cells[at] | cells[at + one] | cells[at + under] | cells[at + under + one] == 0
+    return cells[at] | cells[at + one] | cells[at + under] | cells[at + under + one] == 0  # type: ignore[no-any-return]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _lay(
-    pictures,
-    depths,
-    boxes,
-    tints0,
-    depth0,
-    brightest0,
-    reference0,
-    coefficients0,
-    rigid0,
-    tints1,
-    depth1,
-    brightest1,
-    reference1,
-    coefficients1,
-    rigid1,
-    share,
-    solid,
-    tested,
-    marked,
-):  # pragma: no cover - compiled
+    pictures: Array,
+    depths: Array,
+    boxes: NDArray[np.int64],
+    tints0: NDArray[np.uint32],
+    depth0: Array,
+    brightest0: np.float32,
+    reference0: Array,
+    coefficients0: Array,
+    rigid0: Array,
+    tints1: NDArray[np.uint32],
+    depth1: Array,
+    brightest1: np.float32,
+    reference1: Array,
+    coefficients1: Array,
+    rigid1: Array,
+    share: Array,
+    solid: bool,
+    tested: bool,
+    marked: bool,
+) -> None:
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     deep = tested or marked
     resting = _resting(boxes, reference0, coefficients0, share)
@@ -536,7 +546,7 @@ def _lay(
 
 
 @njit(nogil=True, cache=True)
-def _resting(boxes, reference, coefficients, share):  # pragma: no cover - compiled
+def _resting(boxes: NDArray[np.int64], reference: Array, coefficients: Array, share: Array) -> NDArray[np.bool_]:
     """Whether a body is seen just as at the instant before: its rows need not be read again."""
     resting = np.zeros(len(boxes), np.bool_)
     for n in range(1, len(boxes)):

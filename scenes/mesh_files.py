@@ -38,6 +38,11 @@ def from_file(
     size   of its longest side, the middle at the origin; default: as it is in the file
     Warns of transparency, and of a texture that is not there or is no picture.
     Errors: InputError where there is no such file, no triangle in it, it is damaged, or out of range (`from_mesh`).
+
+    >>> import trimesh
+    >>> written = trimesh.creation.box((1.0, 1.0, 2.0)).export("box.stl")
+    >>> from_file("box.stl", size=4.0).mesh.extents.round(6).tolist()
+    [2.0, 2.0, 4.0]
     """
     source = Path(path)
     if not _is_file(source):
@@ -68,6 +73,10 @@ def from_mesh(
 
     Errors: InputError for a mesh without triangles or area, vertices that are not finite, faces of vertices that it
     does not have, a longest side out of 0.001 to 1e6 where no size is given, and albedo out of 0 to 1.
+
+    >>> import trimesh
+    >>> from_mesh(trimesh.creation.box((1.0, 1.0, 2.0)), size=4.0).mesh.extents.round(6).tolist()
+    [2.0, 2.0, 4.0]
     """
     return _one_surface(_sized([mesh], size), texture)
 
@@ -77,6 +86,12 @@ def picture(path: str | PathLike[str]) -> Texture:
 
     Whole numbers are in [0, 1], taken as sRGB unless the file states another transfer; floats are linear light as they
     are.  Errors: InputError where no picture can be read, and for transparent pixels (`scenes.pictures`).
+
+    >>> from PIL import Image
+    >>> Image.fromarray(np.full((4, 6), 255, np.uint8)).save("white.png")
+    >>> light = picture("white.png")
+    >>> light.shape, float(light.max())
+    ((4, 6), 1.0)
     """
     if not _is_file(Path(path)):
         raise InputError(f"no picture can be read from {path}; give the path of a png, jpg or tif file")

@@ -91,7 +91,8 @@ def _turned_box(side: float) -> NDArray[np.float32]:
     towards_side = np.arccos(np.clip(side / 2 / np.maximum(distance, side / 2), 0, 1))
     share = np.clip(1 - towards_side / (np.pi / 4), 0, 1)
     kernel = share.reshape(size, fine, size, fine).mean(axis=(1, 3))
-    return (kernel / kernel.sum()).astype(np.float32)
+    normed: NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
+    return normed
 
 
 BAND = 16
@@ -115,7 +116,16 @@ def parts_of(keys: int, rows: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def paint_scenes(tickets, parts, scenes, pan, tilt, textures, numbers, places):  # type: ignore[no-untyped-def]  # pragma: no cover
+def paint_scenes(
+    tickets: NDArray[np.int64],
+    parts: int,
+    scenes: NDArray[np.int64],
+    pan: NDArray[np.float64],
+    tilt: NDArray[np.float64],
+    textures: NDArray[np.int64],
+    numbers: NDArray[np.float64],
+    places: NDArray[np.float64],
+) -> None:
     """Pictures of tiles with disks before them: the parts, a band of rows at some keys, that this thread gets hold of.
 
     tickets     (1, 8) int64, shared: [0, 0] is the next part, of `parts`
@@ -129,7 +139,7 @@ def paint_scenes(tickets, parts, scenes, pan, tilt, textures, numbers, places): 
     """
     n = 0
     while True:
-        part: Any = take_ticket(tickets, 0)  # type: ignore[call-arg]
+        part: Any = take_ticket(tickets, 0)
         if part >= parts:
             return
         while n + 1 < len(scenes) and scenes[n + 1, _FIRST_PART] <= part:
@@ -167,14 +177,14 @@ def paint_scenes(tickets, parts, scenes, pan, tilt, textures, numbers, places): 
 
 
 @njit(inline="always")
-def _in_view(place, radius, top, bottom, columns):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _in_view(place: NDArray[np.float64], radius: float, top: int, bottom: int, columns: int) -> bool:
     """Whether a disk at a place (`places_of`) is seen in rows from `top` to `bottom`."""
     reach = radius + 1
-    return -reach < place[0] < columns - 1 + reach and top - reach < place[1] < bottom - 1 + reach
+    return -reach < place[0] < columns - 1 + reach and top - reach < place[1] < bottom - 1 + reach  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def paint_tile(tile, pan, tilt, above, picture):  # pragma: no cover - compiled
+def paint_tile(tile: NDArray[np.float32], pan: float, tilt: float, above: int, picture: NDArray[np.float32]) -> None:
     """Rows from `above` on of the repeated tile seen from offset (pan, tilt), bilinear."""
     height, width = tile.shape
     left, top = int(np.floor(pan)), int(np.floor(tilt))
@@ -193,8 +203,21 @@ def paint_tile(tile, pan, tilt, above, picture):  # pragma: no cover - compiled
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _paint_disk(
-    behind, pairs, side, low, step, x, y, radius, u0, v0, cosine, sine, top, picture
-):  # pragma: no cover - compiled
+    behind: NDArray[np.float32],
+    pairs: int,
+    side: np.int32,
+    low: np.float32,
+    step: np.float32,
+    x: float,
+    y: float,
+    radius: float,
+    u0: float,
+    v0: float,
+    cosine: float,
+    sine: float,
+    top: int,
+    picture: NDArray[np.float32],
+) -> None:
     """The disk over what is behind it, rows from `top` on of the picture, another array; a pixel on the rim is covered
     by the share inside (of a half-plane).
 
@@ -202,7 +225,7 @@ def _paint_disk(
     (u0 + cosine column - sine row, v0 + sine column + cosine row), bilinear.  Each row goes through short loops,
     places, texels, light: the first and the last are vectors then.  Nothing but the rim is blended.
     """
-    use_widest_vectors()  # type: ignore[call-arg]
+    use_widest_vectors()
     reach, solid = np.float32(radius + 0.5), np.float32(max(radius - 0.5, 0.0))
     du, dv = np.float32(cosine), np.float32(sine)
     rows, columns = picture.shape
@@ -228,7 +251,7 @@ def _paint_disk(
             place[k] = row * side + column
             right_share[k], lower_share[k] = u - np.float32(column), v - np.float32(row)
         for k in range(stop - first):
-            texels[k] = two_at(pairs + 4 * place[k])  # type: ignore[call-arg]
+            texels[k] = two_at(pairs + 4 * place[k])
         inside = light[first:stop]
         for k in range(stop - first):
             here, right = halves[2 * k], halves[2 * k + 1]
@@ -248,13 +271,21 @@ def _paint_disk(
 
 
 @njit(inline="always")
-def _copy(values, into):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _copy(values: NDArray[np.float32], into: NDArray[np.float32]) -> None:
     for i in range(len(values)):
         into[i] = values[i]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
-def _blend_rim(behind, start, stop, x, dy, reach, row):  # pragma: no cover - compiled
+def _blend_rim(
+    behind: NDArray[np.float32],
+    start: int,
+    stop: int,
+    x: float,
+    dy: np.float32,
+    reach: np.float32,
+    row: NDArray[np.float32],
+) -> None:
     """Pixels of a row that the disk covers in part."""
     back, light = behind[start:stop], row[start:stop]
     for k in range(len(light)):

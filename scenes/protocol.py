@@ -82,6 +82,10 @@ class Truth:
     object_id  (H, W) int32, 0 is the background
     depth      (H, W) float32 or None where the scene is flat
     poses      object name -> its pose, as the scene documents it; "camera" is the gaze (pan, tilt) [pixels]
+
+    >>> truth = SlidingTexture((16, 24)).truth(0.5)
+    >>> truth.radiance.shape, truth.flow.shape, truth.depth is None
+    ((16, 24), (16, 24, 2), True)
     """
 
     radiance: NDArray[np.float32]
@@ -93,7 +97,11 @@ class Truth:
 
 @runtime_checkable
 class Scene(Protocol):
-    """Light over time.  A scene holds no state: the same call gives the same light, in any order."""
+    """Light over time.  A scene holds no state: the same call gives the same light, in any order.
+
+    >>> isinstance(RotatingDisk((16, 24)), Scene)
+    True
+    """
 
     @property
     def shape(self) -> tuple[int, int]:

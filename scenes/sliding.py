@@ -38,6 +38,10 @@ class SlidingTexture:
 
     Truth: all is object 0; poses["texture"] is where its upper left corner has gone, (x, y) [pixels].
     Errors: InputError for a value out of range, by name.
+
+    >>> scene = SlidingTexture((16, 24), velocity_px_s=(20_000.0, 0.0))
+    >>> scene.truth(0.5).flow[0, 0].tolist()  # pixels a frame
+    [0.5, 0.0]
     """
 
     def __init__(
@@ -123,9 +127,11 @@ def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.f
         turns, rest = np.divmod(place, texels)
         whole = np.minimum(rest.astype(int), texels - 1)
         part = (rest - whole)[:, None]
-        return integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
+        light: NDArray[np.float64] = integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
+        return light
 
-    return (up_to(middle + half) - up_to(middle - half)) / (2 * half)
+    average: NDArray[np.float64] = (up_to(middle + half) - up_to(middle - half)) / (2 * half)
+    return average
 
 
 def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
@@ -138,7 +144,7 @@ def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]
 
 
 @njit(cache=True, nogil=True)
-def _paint(samples, x, y, picture):  # pragma: no cover - compiled
+def _paint(samples: NDArray[np.float32], x: float, y: float, picture: NDArray[np.float32]) -> None:
     """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
     height, (rows, columns) = samples.shape[0], picture.shape
     left, top = int(x), int(y)

@@ -22,6 +22,9 @@ def random_texture(rng: np.random.Generator, size: int, kinds: Sequence[str] | N
     """One texture of a kind drawn evenly from `kinds` (default: all of `TEXTURES`).
 
     Errors: InputError for size < 8 or an unknown kind.
+
+    >>> random_texture(np.random.default_rng(0), 64, kinds=["checker", "stripes"]).shape
+    (64, 64)
     """
     if size < 8:
         raise InputError(f"texture size is {size}; it must be at least 8 pixels")
@@ -33,7 +36,12 @@ def random_texture(rng: np.random.Generator, size: int, kinds: Sequence[str] | N
 
 
 def fractal_noise(rng: np.random.Generator, size: int) -> Texture:
-    """Noise of amplitude 1 / f^p, p in [0.8, 2], as in natural images (p about 1).  Tiles."""
+    """Noise of amplitude 1 / f^p, p in [0.8, 2], as in natural images (p about 1).  Tiles.
+
+    >>> texture = fractal_noise(np.random.default_rng(0), 64)
+    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+    ((64, 64), True)
+    """
     frequency = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None, :])
     frequency[0, 0] = np.inf
     spectrum = np.fft.rfft2(rng.standard_normal((size, size))) * frequency ** -rng.uniform(0.8, 2.0)
@@ -44,6 +52,10 @@ def dead_leaves(rng: np.random.Generator, size: int) -> Texture:
     """Shaded discs that cover each other, radii drawn from r^-3: edges at every scale.
 
     Source: Lee, Mumford and Huang, "Occlusion models for natural images", IJCV 2001.  Tiles.
+
+    >>> texture = dead_leaves(np.random.default_rng(0), 64)
+    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+    ((64, 64), True)
     """
     image = np.full((size, size), rng.random(), np.float32)
     smallest, largest = max(2.0, size / 100), size / 4
@@ -54,7 +66,12 @@ def dead_leaves(rng: np.random.Generator, size: int) -> Texture:
 
 
 def stripes(rng: np.random.Generator, size: int) -> Texture:
-    """Waves in one direction, from a sine to hard stripes.  Tiles."""
+    """Waves in one direction, from a sine to hard stripes.  Tiles.
+
+    >>> texture = stripes(np.random.default_rng(0), 64)
+    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+    ((64, 64), True)
+    """
     along, across = _wave_numbers(rng, size / 10)
     y, x = _grid(size)
     wave = np.sin(2 * np.pi * (along * x + across * y) + rng.uniform(0, 2 * np.pi))
@@ -63,7 +80,12 @@ def stripes(rng: np.random.Generator, size: int) -> Texture:
 
 
 def checker(rng: np.random.Generator, size: int) -> Texture:
-    """Two crossed waves: a checkerboard at any angle, soft to hard.  Tiles."""
+    """Two crossed waves: a checkerboard at any angle, soft to hard.  Tiles.
+
+    >>> texture = checker(np.random.default_rng(0), 64)
+    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+    ((64, 64), True)
+    """
     along, across = _wave_numbers(rng, size / 14)
     y, x = _grid(size)
     phase = rng.uniform(0, 2 * np.pi, 2)
@@ -73,13 +95,23 @@ def checker(rng: np.random.Generator, size: int) -> Texture:
 
 
 def blobs(rng: np.random.Generator, size: int) -> Texture:
-    """Smoothed noise pushed to two levels: islands of one scale.  Tiles."""
+    """Smoothed noise pushed to two levels: islands of one scale.  Tiles.
+
+    >>> texture = blobs(np.random.default_rng(0), 64)
+    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+    ((64, 64), True)
+    """
     noise = gaussian_filter(rng.standard_normal((size, size)), rng.uniform(0.004, 0.03) * size, mode="wrap")
     return _stretch(np.tanh(rng.uniform(0.5, 5.0) * noise / noise.std()))
 
 
 def rectangles(rng: np.random.Generator, size: int) -> Texture:
-    """Upright rectangles of random grey that cover each other.  Tiles."""
+    """Upright rectangles of random grey that cover each other.  Tiles.
+
+    >>> texture = rectangles(np.random.default_rng(0), 64)
+    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+    ((64, 64), True)
+    """
     image = np.full((size, size), rng.random(), np.float32)
     for height, width in rng.integers(max(2, size // 120), max(4, size // 5), (150, 2)):
         rows = (rng.integers(size) + np.arange(height)) % size
@@ -89,13 +121,23 @@ def rectangles(rng: np.random.Generator, size: int) -> Texture:
 
 
 def gradient(rng: np.random.Generator, size: int) -> Texture:
-    """Very smooth shading.  Tiles."""
+    """Very smooth shading.  Tiles.
+
+    >>> texture = gradient(np.random.default_rng(0), 64)
+    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+    ((64, 64), True)
+    """
     noise = gaussian_filter(rng.standard_normal((size, size)), rng.uniform(0.08, 0.2) * size, mode="wrap")
     return _stretch(noise)
 
 
 def glyphs(rng: np.random.Generator, size: int) -> Texture:
-    """Lines of letters and digits, dark on light or light on dark."""
+    """Lines of letters and digits, dark on light or light on dark.
+
+    >>> texture = glyphs(np.random.default_rng(0), 64)
+    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+    ((64, 64), True)
+    """
     page = np.full((size, size), 255, np.uint8)
     scale = rng.uniform(0.0012, 0.004) * size
     pitch = max(6, int(26 * scale))

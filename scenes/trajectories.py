@@ -29,7 +29,11 @@ GRAVITY = 9.81
 
 @runtime_checkable
 class Trajectory(Protocol):
-    """Anything with a pose over time; no state, so any time may be asked for in any order."""
+    """Anything with a pose over time; no state, so any time may be asked for in any order.
+
+    >>> isinstance(Still(), Trajectory)
+    True
+    """
 
     def pose(self, time_s: ArrayLike) -> Pose:
         """Times of any shape (...) [s] -> rigid maps (..., 4, 4) float64."""
@@ -37,7 +41,12 @@ class Trajectory(Protocol):
 
 
 class Motion:
-    """What makes trajectories chain: `outer @ inner`."""
+    """What makes trajectories chain: `outer @ inner`.
+
+    >>> moved = Still((0.0, 1.0, 0.0)) @ Still((2.0, 0.0, 0.0))
+    >>> moved.pose(0.0)[:3, 3].tolist()
+    [2.0, 1.0, 0.0]
+    """
 
     def pose(self, time_s: ArrayLike) -> Pose:
         raise NotImplementedError
@@ -48,7 +57,12 @@ class Motion:
 
 @dataclass(frozen=True)
 class Chain(Motion):
-    """outer after inner."""
+    """outer after inner.
+
+    >>> turned = Still((0.0, 1.0, 0.0)) @ Spinning((0.0, 0.0, 1.0), rpm=60.0)
+    >>> type(turned).__name__, turned.pose(0.25)[:2, :2].round(6).tolist()
+    ('Chain', [[0.0, -1.0], [1.0, 0.0]])
+    """
 
     outer: Trajectory
     inner: Trajectory
@@ -62,6 +76,9 @@ class Still(Motion):
     """At rest: turned by `turn` about an axis of that direction [degrees along the vector], then put at `position`.
 
     Still((0, 1, 0), turn=(90, 0, 0)) lies a quarter turn about x at height 1.
+
+    >>> Still((0.0, 1.0, 0.0)).pose(0.0)[:3, 3].tolist()
+    [0.0, 1.0, 0.0]
     """
 
     position: Vector = (0.0, 0.0, 0.0)
@@ -77,7 +94,11 @@ class Still(Motion):
 
 @dataclass(frozen=True)
 class Ballistic(Motion):
-    """position + velocity t + gravity t^2 / 2: thrown at t = 0; without gravity, straight and even."""
+    """position + velocity t + gravity t^2 / 2: thrown at t = 0; without gravity, straight and even.
+
+    >>> Ballistic(velocity=(3.0, 2.0, 0.0), gravity=(0.0, -9.81, 0.0)).pose(0.1)[:3, 3].round(3).tolist()
+    [0.3, 0.151, 0.0]
+    """
 
     position: Vector = (0.0, 0.0, 0.0)
     velocity: Vector = (0.0, 0.0, 0.0)
@@ -91,7 +112,11 @@ class Ballistic(Motion):
 
 @dataclass(frozen=True)
 class Spinning(Motion):
-    """Turning evenly about an axis through the origin: angle = angle_deg + 6 rpm t [degrees]."""
+    """Turning evenly about an axis through the origin: angle = angle_deg + 6 rpm t [degrees].
+
+    >>> Spinning((0.0, 0.0, 1.0), rpm=60.0).pose(0.25)[:2, :2].round(6).tolist()
+    [[0.0, -1.0], [1.0, 0.0]]
+    """
 
     axis: Vector
     rpm: float
@@ -104,7 +129,12 @@ class Spinning(Motion):
 
 @dataclass(frozen=True)
 class Swinging(Motion):
-    """Turning to and fro about an axis through the origin: angle = amplitude sin(2 pi (frequency t + phase))."""
+    """Turning to and fro about an axis through the origin: angle = amplitude sin(2 pi (frequency t + phase)).
+
+    >>> pose = Swinging((0.0, 0.0, 1.0), amplitude_deg=30.0, frequency_hz=1.0).pose(0.25)
+    >>> round(float(np.degrees(np.arctan2(pose[1, 0], pose[0, 0]))), 3)
+    30.0
+    """
 
     axis: Vector
     amplitude_deg: float
@@ -118,7 +148,11 @@ class Swinging(Motion):
 
 @dataclass(frozen=True)
 class Vibrating(Motion):
-    """Moving to and fro: amplitude (a vector) times sin(2 pi (frequency t + phase))."""
+    """Moving to and fro: amplitude (a vector) times sin(2 pi (frequency t + phase)).
+
+    >>> Vibrating((0.1, 0.0, 0.0), frequency_hz=100.0).pose(0.0025)[:3, 3].round(3).tolist()
+    [0.1, 0.0, 0.0]
+    """
 
     amplitude: Vector
     frequency_hz: float
@@ -135,6 +169,9 @@ class Bouncing(Motion):
     """Up and down between y = 0 and `height`, as under gravity on a perfect floor; at the top when t = 0.
 
     y = height - g tau^2 / 2,  tau: time to the nearest top;  period 2 sqrt(2 height / g)
+
+    >>> Bouncing(height=1.0).pose([0.0, 0.1])[:, 1, 3].round(3).tolist()
+    [1.0, 0.951]
     """
 
     height: float
@@ -155,6 +192,9 @@ class Path(Motion):
     """A smooth curve through positions at times (cubic spline); closed, it starts over after the last time.
 
     A closed path must end where it starts.  Before the first and after the last time an open path stands still.
+
+    >>> Path((0.0, 1.0, 2.0), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))).pose(0.5)[:3, 3].round(3).tolist()
+    [0.5, 0.0, 0.0]
     """
 
     time_s: tuple[float, ...]
@@ -188,6 +228,10 @@ class Shake(Motion):
     """A hand-held camera: small turns and shifts, each a sum of sines at random frequencies up to a highest one.
 
     angle_deg, shift   standard deviation about and along each axis [degrees, world units]
+
+    >>> poses = Shake(angle_deg=0.05).pose([0.0, 0.01])
+    >>> poses.shape, bool((poses[0] == poses[1]).all())
+    ((2, 4, 4), False)
     """
 
     angle_deg: float = 0.05
@@ -206,7 +250,12 @@ class Shake(Motion):
 
 @dataclass(frozen=True)
 class Repeating(Motion):
-    """Another trajectory, started over after every period; the jump back is best made out of sight."""
+    """Another trajectory, started over after every period; the jump back is best made out of sight.
+
+    >>> thrown = Repeating(Ballistic(velocity=(1.0, 0.0, 0.0)), period_s=0.5)
+    >>> thrown.pose([0.1, 0.6])[:, 0, 3].round(3).tolist()
+    [0.1, 0.1]
+    """
 
     motion: Trajectory
     period_s: float

@@ -36,7 +36,11 @@ CIE XYZ; ITU-R BT.709, BT.470, SMPTE 170M, SMPTE EG 432-1 (P3, D65), ITU-R BT.20
 
 
 def linear_from_srgb(encoded: ArrayLike) -> Array:
-    """sRGB values in [0, 1] to linear light (IEC 61966-2-1)."""
+    """sRGB values in [0, 1] to linear light (IEC 61966-2-1).
+
+    >>> [round(float(light), 3) for light in linear([0.0, 0.5, 1.0])]
+    [0.0, 0.214, 1.0]
+    """
     code = np.asarray(encoded, np.float32)
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
 

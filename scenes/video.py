@@ -51,6 +51,11 @@ class VideoScene:
     Warns where a file holds fewer pictures, or lasts shorter, than it states, and where a video states no transfer.
     Errors: InputError for a film that cannot be read or has fewer than two pictures, time stamps that do not rise, a
     transfer that is not read, or not stated with more than 8 bits a value, and a value out of range.
+
+    >>> film = np.stack([np.full((8, 12), value, np.uint8) for value in (0, 255)])
+    >>> scene = VideoScene(film, film_rate_hz=1000.0, light=(0.0, 0.6), transfer="linear")
+    >>> [round(float(scene.radiance(0, 40).at(frame)[0, 0]), 2) for frame in (0, 20, 40)]
+    [0.0, 0.3, 0.6]
     """
 
     def __init__(

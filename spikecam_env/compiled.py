@@ -14,17 +14,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
 from numba import config
 
+Compiled = TypeVar("Compiled", bound=Callable[..., Any])
 
-def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator as `numba.njit(cache=cache, **options)`, except that there need be no place for the cache."""
 
-    def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = numba.njit(**options)(function)
+def njit(*, cache: bool = False, **options: Any) -> Callable[[Compiled], Compiled]:
+    """Decorator as `numba.njit(cache=cache, **options)`, except that there need be no place for the cache.
+
+    What it returns has the type of the function, so that calls of compiled code are checked as others are.
+    """
+
+    def decorate(function: Compiled) -> Compiled:
+        dispatcher: Compiled = numba.njit(**options)(function)
         if cache:
             _keep(dispatcher)
         return dispatcher

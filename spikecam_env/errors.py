@@ -15,26 +15,55 @@ from difflib import get_close_matches
 
 
 class InputError(ValueError):
-    """An unusable value: says which, what is allowed, what to do."""
+    """An unusable value: says which, what is allowed, what to do.
+
+    >>> from spikecam_env.sensor import Circuit
+    >>> Circuit(reset_V=50.0)
+    Traceback (most recent call last):
+        ...
+    spikecam_env.errors.InputError: circuit.reset_V = 50.0 is outside -20 .. 20 V
+    """
 
 
 class WriteError(InputError, OSError):
-    """A file or folder that cannot be written: says which and why."""
+    """A file or folder that cannot be written: says which and why.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> SensorModel.preset("ideal").to_toml("nowhere/model.toml")
+    Traceback (most recent call last):
+        ...
+    spikecam_env.errors.WriteError: cannot write nowhere/model.toml: there is no folder nowhere; make it first
+    """
 
 
 class NotReadyError(RuntimeError):
-    """A call in the wrong order: says which call has to come first."""
+    """A call in the wrong order: says which call has to come first.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> RotatingDiskEnv(shape=(16, 24)).step([0.0, 0.0])
+    Traceback (most recent call last):
+        ...
+    spikecam_env.errors.NotReadyError: the environment has no scene yet; call reset first
+    """
 
 
 def unknown_name(kind: str, name: object, allowed: Iterable[str]) -> InputError:
-    """Error for a name that is not in a list: `unknown scene 'fun'; choose one of ball, fan, train (fan?)`."""
+    """Error for a name that is not in a list: `unknown scene 'fun'; choose one of ball, fan, train (fan?)`.
+
+    >>> unknown_name("scene", "fun", ["ball", "fan"])
+    InputError("unknown scene 'fun'; choose one of ball, fan (fan?)")
+    """
     names = sorted(allowed)
     nearest = "".join(f" ({near}?)" for near in get_close_matches(shown(name).strip("'"), names, n=1))
     return InputError(f"unknown {kind} {shown(name)}; choose one of {', '.join(names)}{nearest}")
 
 
 def shown(value: object) -> str:
-    """A value in an error's text: at most 60 characters."""
+    """A value in an error's text: at most 60 characters.
+
+    >>> len(shown("a" * 1000))
+    60
+    """
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text

@@ -99,7 +99,7 @@ def _lines(times: list[SpikeTimes], light: Array) -> tuple[Array, Array]:
 
 
 @njit(cache=True)
-def spike_steps(spikes, interval):  # type: ignore[no-untyped-def]
+def spike_steps(spikes: NDArray[np.uint8], interval: int) -> Array:
     """(P, 3) intervals of (T, P) spikes, and those of one frame more and one less than `interval`."""
     frames, pixels = spikes.shape
     out = np.zeros((pixels, 3))

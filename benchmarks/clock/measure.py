@@ -15,6 +15,7 @@ they are scaled again by the scatter of the rows' sums.  The edge itself is seen
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -229,7 +230,7 @@ def _curve(steps: Steps, law: Array, left: Array, slope: Array) -> tuple[Array, 
     return curve, np.sqrt(_scatter(steps, left + both @ move) * np.diag(covariance))
 
 
-def _slopes(residual, at: Array, left: Array, step: Array) -> Array:  # type: ignore[no-untyped-def]
+def _slopes(residual: Callable[[Array], Array], at: Array, left: Array, step: Array) -> Array:
     return np.stack([(residual(at + one) - left) / one.sum() for one in np.diag(step)], axis=1)
 
 

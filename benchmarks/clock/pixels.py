@@ -62,7 +62,7 @@ def counts(
 
 
 @njit(cache=True)
-def _psi(table, interval, out):  # type: ignore[no-untyped-def]
+def _psi(table: Array, interval: float, out: Array) -> None:
     """Psi at i / POINTS into out (POINTS + 1,); what came before the frame is its own maximum, a frame less."""
     points = table.size
     highest = -1e30
@@ -76,7 +76,7 @@ def _psi(table, interval, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _theta(psi, y):  # type: ignore[no-untyped-def]
+def _theta(psi: Array, y: float) -> float:
     """The time at which Psi comes to y, linear between its points."""
     points = psi.size - 1
     whole = np.floor(y - psi[0])
@@ -90,11 +90,19 @@ def _theta(psi, y):  # type: ignore[no-untyped-def]
             high = middle
     rise = psi[high] - psi[low]
     part = (at - psi[low]) / rise if rise > 0.0 else 1.0
-    return whole + (low + min(max(part, 0.0), 1.0)) / points
+    return whole + (low + min(max(part, 0.0), 1.0)) / points  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
-def _fire(interval, start, table, noise, frames, rng, out):  # type: ignore[no-untyped-def]
+def _fire(
+    interval: Array,
+    start: Array,
+    table: Array,
+    noise: float,
+    frames: int,
+    rng: np.random.Generator,
+    out: NDArray[np.uint8] | NDArray[np.int64],
+) -> None:
     """Add the spikes to out, (frames, P) by frame, or (1, P) together."""
     together = len(out) == 1
     psi = np.empty(table.size + 1)

@@ -97,7 +97,8 @@ def static_pixels(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> NDArra
     difference = first.sum(axis=0, dtype=np.int64) - second.sum(axis=0, dtype=np.int64)
     around = uniform_filter(np.square(difference.astype(np.float64)), BOX)
     usual = np.median(around)
-    return around <= usual + MOVES_SD * SD_BY_MEDIAN * np.median(np.abs(around - usual))
+    still: NDArray[np.bool_] = around <= usual + MOVES_SD * SD_BY_MEDIAN * np.median(np.abs(around - usual))
+    return still
 
 
 def reference(spikes: NDArray[np.uint8], static: NDArray[np.bool_]) -> Reference:

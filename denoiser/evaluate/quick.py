@@ -175,7 +175,8 @@ def picture_of(stream: Stream, kind: str, t: int) -> NDArray[np.float32]:
     """TFP 21, TFP 41 or TFI at frame t, of spikes, or of rates: their mean over the window, and the plane at t."""
     window = {"TFP 21": 21, "TFP 41": 41, "TFI": 1}[kind]
     if stream.dtype != np.uint8:
-        return stream[t - window // 2 : t + window // 2 + 1].mean(axis=0)
+        mean: NDArray[np.float32] = stream[t - window // 2 : t + window // 2 + 1].mean(axis=0)
+        return mean
     return middleTFI(stream, t) if kind == "TFI" else middleTFP(stream, t, window)
 
 
@@ -237,7 +238,8 @@ def _linear_square(photograph: NDArray[np.uint8], size: int) -> Texture:
     top, left = (grey.shape[0] - side) // 2, (grey.shape[1] - side) // 2
     middle = np.ascontiguousarray(grey[top : top + side, left : left + side] ** 2.2)
     square = np.asarray(cv2.resize(middle, (size, size), interpolation=cv2.INTER_AREA))
-    return ((square - square.min()) / (square.max() - square.min())).astype(np.float32)
+    light: NDArray[np.float32] = ((square - square.min()) / (square.max() - square.min())).astype(np.float32)
+    return light
 
 
 def _plain(value: Any) -> float | None:

@@ -143,7 +143,8 @@ class LiveDnSS:
             if all(self._pass(newest[0], start) for start in self._due(*newest)):
                 break
         assert self.rates is not None
-        return self.rates[self._plane]
+        picture: NDArray[np.float32] = self.rates[self._plane]
+        return picture
 
     def ready(self) -> bool:
         """Whether there are frames for a picture, and for another than the last."""

@@ -49,7 +49,14 @@ class Past:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _running_means(ring, first, stop, shares, spread, means):  # pragma: no cover - compiled
+def _running_means(
+    ring: NDArray[np.uint8],
+    first: int,
+    stop: int,
+    shares: NDArray[np.float32],
+    spread: NDArray[np.uint64],
+    means: NDArray[np.float32],
+) -> None:
     rows, size = ring.shape
     pixels = means.shape[1]
     words = np.empty(_TOGETHER, np.uint64)
@@ -68,7 +75,7 @@ def _running_means(ring, first, stop, shares, spread, means):  # pragma: no cove
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _last_spikes(ring, first, stop, last):  # pragma: no cover - compiled
+def _last_spikes(ring: NDArray[np.uint8], first: int, stop: int, last: NDArray[np.int64]) -> None:
     """From the newest frame back, until every pixel of a byte has been seen to fire."""
     rows, size = ring.shape
     pixels = len(last)

@@ -97,10 +97,13 @@ class SelfTaught:
 
     def _blind(self, spikes: Tensor, number_type: torch.dtype) -> Tensor:
         """In float32 on a processor: torch 2.13's gradient of a dilated bfloat16 convolution is NaN for some widths."""
+        light: Tensor
         if spikes.is_cuda:
-            return self.networks["blind"](_shown(spikes, number_type))
-        with torch.autocast("cpu", enabled=False):
-            return self.networks["blind"](_shown(spikes, torch.float32))
+            light = self.networks["blind"](_shown(spikes, number_type))
+        else:
+            with torch.autocast("cpu", enabled=False):
+                light = self.networks["blind"](_shown(spikes, torch.float32))
+        return light
 
 
 def _shown(spikes: Tensor, number_type: torch.dtype) -> Tensor:

@@ -59,7 +59,8 @@ def reconstruct(
     Raises: InputError as `reconstruct_many`.
     Example: reconstruct("spk2img-noisy", spikes, 100)
     """
-    return reconstruct_many(name, spikes, [t], weights=weights, precision=precision)[0]
+    light: NDArray[np.float32] = reconstruct_many(name, spikes, [t], weights=weights, precision=precision)[0]
+    return light
 
 
 def reconstruct_many(

@@ -60,7 +60,8 @@ class TemporalFilters(nn.Module):
         weight = self.filters.weight * self.seen
         filtered = functional.relu(functional.conv2d(block, weight, self.filters.bias, padding=1))
         shares = (torch.softmax(self.weigh(filtered), dim=1) * len(REACHES)).to(filtered.dtype)
-        return self.join(filtered * shares.repeat_interleave(filtered.shape[1] // len(REACHES), dim=1))
+        joined: Tensor = self.join(filtered * shares.repeat_interleave(filtered.shape[1] // len(REACHES), dim=1))
+        return joined
 
 
 class Alignment(nn.Module):
@@ -84,7 +85,8 @@ class Alignment(nn.Module):
         pyramid = [(moving, middle)]
         for down in self.down:
             pyramid.append((down(pyramid[-1][0]), down(pyramid[-1][1])))
-        moves = aligned = None
+        moves: Tensor | None = None
+        aligned: Tensor | None = None
         for level in reversed(range(LEVELS)):
             there, here = pyramid[level]
             seen = [there, here] if moves is None else [there, here, moves.to(there.dtype)]

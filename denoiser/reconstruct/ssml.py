@@ -88,7 +88,8 @@ class Blind(nn.Module):
 
     def forward(self, spikes: Tensor) -> Tensor:
         first = self.stem(spikes)
-        return self.out(torch.cat([branch(first) for branch in self.branches], dim=1)).float()
+        light: Tensor = self.out(torch.cat([branch(first) for branch in self.branches], dim=1))
+        return light.float()
 
 
 class Student(nn.Module):
@@ -108,7 +109,8 @@ class Student(nn.Module):
             torch.channels_last if spikes.is_contiguous(memory_format=torch.channels_last) else torch.preserve_format
         )
         folded = self.fold(padded).contiguous(memory_format=layout)
-        return self.unfold(self.out(self.body(self.stem(folded))).float())[..., :height, :width]
+        light: Tensor = self.unfold(self.out(self.body(self.stem(folded))).float())
+        return light[..., :height, :width]
 
 
 def interval_rate(spikes: Tensor, middle: int) -> Tensor:

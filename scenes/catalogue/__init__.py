@@ -87,7 +87,11 @@ def make_scene(
 def unexposed_scene(
     name: str, shape: tuple[int, int], seed: int, frame_rate_hz: float, renderer: Renderer | None = None
 ) -> Scene:
-    """A scene of the catalogue in light of its own; nothing is rendered yet.  Arguments and errors: `make_scene`."""
+    """A scene of the catalogue in light of its own; nothing is rendered yet.  Arguments and errors: `make_scene`.
+
+    >>> unexposed_scene("disk", (16, 24), 0, 40_000.0).shape
+    (16, 24)
+    """
     if name not in SCENES:
         raise unknown_name("scene", name, SCENES)
     shape, seed = checked_shape(shape), checked_seed(seed, most=LARGEST_DERIVED_SEED)
@@ -96,7 +100,12 @@ def unexposed_scene(
 
 
 def exposed(scene: Scene, mean_interval: float) -> Scene:
-    """`scenes.exposure.expose`, worlds measured small."""
+    """`scenes.exposure.expose`, worlds measured small.
+
+    >>> scene = exposed(unexposed_scene("disk", (16, 24), 0, 40_000.0), mean_interval=20.0)
+    >>> round(1.0 / float(scene.truth(0.5).radiance.mean()))
+    20
+    """
     metered, shape = None, scene.shape
     if isinstance(scene, World) and shape[0] > METERED_ROWS:
         metered = replace(scene, shape=(METERED_ROWS, max(1, round(METERED_ROWS * shape[1] / shape[0]))))
@@ -110,5 +119,10 @@ def random_world(
     frame_rate_hz: float = 40_000.0,
     renderer: Renderer | None = None,
 ) -> Scene:
-    """Textured objects in random rigid motion before a background, as in SPIFT; the whole follows from the seed."""
+    """Textured objects in random rigid motion before a background, as in SPIFT; the whole follows from the seed.
+
+    >>> scene = random_world(seed=3, shape=(16, 24))
+    >>> scene.truth(0.5).depth.shape
+    (16, 24)
+    """
     return make_scene("random", shape, seed, mean_interval, frame_rate_hz, renderer)

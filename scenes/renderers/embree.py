@@ -102,7 +102,7 @@ class _Traceable:
 
         place: (x, y) of the first pixel from the camera's axis, and the tangent of one pixel.
         """
-        turn = np.linalg.inv(matrix[:3, :3])
+        turn = np.asarray(np.linalg.inv(matrix[:3, :3]), np.float64)
         eye = (-turn @ matrix[:3, 3] - self._middle) / self._size
         origins, directions = _rays(eye, turn, *place, *size, supersample)
         return np.asarray(self._scene.run(origins, directions).reshape(*size, supersample**2))

@@ -272,7 +272,12 @@ def _end(context: contexts.Context, home: tuple[int, int]) -> None:
 
 
 @njit(nogil=True, cache=True)
-def _split(values, radiance, coverage, depth):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _split(
+    values: NDArray[np.float32],
+    radiance: NDArray[np.float32],
+    coverage: NDArray[np.float32],
+    depth: NDArray[np.float32],
+) -> None:
     """What was read (rows, columns, 4) into pictures of its own; where nothing is seen it is infinitely far."""
     for row in range(values.shape[0]):
         for x in range(values.shape[1]):

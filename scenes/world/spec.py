@@ -24,6 +24,11 @@ class Body:
     """A surface that moves.
 
     backdrop   laid first, in the order given; nothing ever goes behind it (a floor, a wall)
+
+    >>> from scenes.meshes import assemble, sphere
+    >>> from scenes.trajectories import Ballistic
+    >>> Body("ball", assemble(sphere(0.2)), Ballistic(velocity=(3.0, 2.0, 0.0))).name
+    'ball'
     """
 
     name: str

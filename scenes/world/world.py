@@ -47,6 +47,11 @@ class World(WorldSpec):
 
     Truth: poses[name] is the body's (x, y, z) and its rotation as a quaternion (x, y, z, w), in the world.
     Errors: InputError for a value out of range, by name.
+
+    >>> from scenes.meshes import assemble, sphere
+    >>> world = World((16, 24), (Body("ball", assemble(sphere(0.5))),))
+    >>> sorted(np.unique(world.truth(0.5).object_id).tolist())
+    [0, 1]
     """
 
     cache: WorldCache = field(init=False, repr=False)

@@ -38,6 +38,13 @@ class Agent:
     """task: an id, e.g. "Catch-v1"; obs: name of what it sees; policy: its network; training: how it was made.
 
     The observations are those of environments with `obs=obs, obs_state=True`.
+
+    >>> agent = Agent.load("Catch-v1")
+    >>> env = agent.make(split="test")
+    >>> observation, info = env.reset(seed=0)
+    >>> action = agent.act(observation)
+    >>> agent.obs, action.shape
+    ('tfp', (1,))
     """
 
     def __init__(self, task: str, obs: str, policy: Policy, training: dict[str, Any] | None = None) -> None:
@@ -108,12 +115,20 @@ class Agent:
 
 
 def shipped() -> list[str]:
-    """Tasks of which an agent comes with the package."""
+    """Tasks of which an agent comes with the package.
+
+    >>> shipped()
+    ['Catch-v1', 'Saccade-v1', 'Track-v1']
+    """
     return sorted(path.name[: -len(ENDING)] for path in _folder().glob(f"*{ENDING}"))
 
 
 def is_file(name: str) -> bool:
-    """Whether it can be a file's, and not that of a task."""
+    """Whether it can be a file's, and not that of a task.
+
+    >>> is_file("runs/catch/agent.pt"), is_file("Catch-v1")
+    (True, False)
+    """
     return ENDING in name or os.sep in name
 
 

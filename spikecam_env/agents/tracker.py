@@ -46,6 +46,12 @@ class Tracker:
     """Acts like an `Agent`: `begin` an episode, then `act(observation)`.
 
     env  whose task, picture and motor it is made for; raises InputError for a task that it does not know
+
+    >>> from spikecam_env.envs.tasks.env import TaskEnv
+    >>> env = TaskEnv("Track", obs="tfp", obs_state=True)
+    >>> observation, info = env.reset(seed=0)
+    >>> Tracker(env).act(observation).shape
+    (2,)
     """
 
     def __init__(self, env: AimingEnv) -> None:
@@ -99,7 +105,13 @@ def _crossing(places: list[Place], motion: Place, rows: int) -> tuple[Place, Pla
 
 
 def brightest(side: int) -> Find:
-    """The centroid of what is brighter than its surroundings."""
+    """The centroid of what is brighter than its surroundings.
+
+    >>> picture = np.zeros((64, 64), np.float32)
+    >>> picture[20:23, 30:33] = 1.0  # a spot about column 31, row 21
+    >>> brightest(64)(picture).round(1).tolist()
+    [31.0, 21.0]
+    """
 
     def find(picture: NDArray[np.float32]) -> Place | None:
         smooth = cv2.GaussianBlur(picture, (0, 0), BLUR_PX)
@@ -110,7 +122,13 @@ def brightest(side: int) -> Find:
 
 
 def ball(side: int) -> Find:
-    """The same above the bright row, where the ball has left it free."""
+    """The same above the bright row, where the ball has left it free.
+
+    >>> picture = np.zeros((64, 64), np.float32)
+    >>> picture[20:23, 30:33] = 1.0  # a spot about column 31, row 21
+    >>> ball(64)(picture).round(1).tolist()
+    [31.0, 21.0]
+    """
     above, bright = int((Catch.line - Catch.radius) * side) - 1, brightest(side)
 
     def find(picture: NDArray[np.float32]) -> Place | None:
@@ -121,7 +139,13 @@ def ball(side: int) -> Find:
 
 
 def spokes(side: int) -> Find:
-    """The disc whose light has the largest 8th angular harmonic."""
+    """The disc whose light has the largest 8th angular harmonic.
+
+    >>> y, x = np.mgrid[-32:32, -32:32]
+    >>> disc = (np.hypot(x, y) < 8) * (1 + np.cos(8 * np.arctan2(y, x)))  # eight spokes about column 32, row 32
+    >>> spokes(64)(disc.astype(np.float32)).round(1).tolist()
+    [32.0, 32.0]
+    """
     real, imaginary = _harmonic(Saccade.radius * side)
 
     def find(picture: NDArray[np.float32]) -> Place | None:
@@ -132,7 +156,11 @@ def spokes(side: int) -> Find:
 
 
 def centroid(weights: NDArray[np.float32]) -> Place | None:
-    """(x, y) of non-negative weights (H, W); None where all are 0."""
+    """(x, y) of non-negative weights (H, W); None where all are 0.
+
+    >>> centroid(np.float32([[0, 0, 0], [0, 1, 1]])).tolist()
+    [1.5, 1.0]
+    """
     total = float(weights.sum())
     if total <= 0:
         return None

@@ -33,6 +33,9 @@ class Study:
     task     an id, e.g. "Catch-v1"
     sight    a name of SIGHTS
     options  further keywords of the environments
+
+    >>> Study("Catch-v1", sight="tfi", options={"split": "test"}).keywords
+    {'obs_state': True, 'obs': 'tfi', 'split': 'test'}
     """
 
     task: str
@@ -77,7 +80,14 @@ STEPS = {"Track": 81_920, "Catch": 98_304, "Saccade": 98_304}
 
 
 def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
-    """The network for a task."""
+    """The network for a task.
+
+    >>> study = Study("Catch-v1")
+    >>> cameras = study.make_vec(1)
+    >>> recipe_of(study, cameras).shape
+    (64, 64)
+    >>> cameras.close()
+    """
     name, spaces, action = study.task.split("-")[0], envs.single_observation_space, envs.single_action_space
     assert isinstance(spaces, Dict) and isinstance(action, Box)
     picture = spaces["picture"]
@@ -94,12 +104,23 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
 
 
 def budget(study: Study, steps: int | None = None) -> PPO:
-    """The learner's numbers for a task, with its steps or so many."""
+    """The learner's numbers for a task, with its steps or so many.
+
+    >>> budget(Study("Catch-v1")).steps, budget(Study("Catch-v1"), steps=4096).steps
+    (98304, 4096)
+    """
     return PPO(steps=steps or STEPS.get(study.task.split("-")[0], 98_304))
 
 
 def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16) -> Agent:
-    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `budget(study)`."""
+    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `budget(study)`.
+
+    >>> from pathlib import Path
+    >>> from spikecam_env.agents.ppo import PPO
+    >>> agent = train_agent(Study("Catch-v1"), Path(), PPO(steps=64, rollout=32), environments=2)
+    >>> Path("agent.pt").is_file()
+    True
+    """
     ppo = ppo or budget(study)
     envs, threads = study.make_vec(environments), torch.get_num_threads()
     torch.set_num_threads(1)  # as many as pay for so small a network

@@ -39,7 +39,7 @@ def _supersample(
     angle: float,
     samples: int,
     picture: NDArray[np.float32],
-) -> None:  # pragma: no cover - compiled
+) -> None:
     n = texture.shape[0]
     cosine, sine = np.cos(angle), np.sin(angle)
     for r in range(picture.shape[0]):

@@ -16,7 +16,11 @@ Status = Literal["identified", "assumed", "not identified"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the identifiability table; half_width: of the 90 % interval, None where there is none."""
+    """One line of the identifiability table; half_width: of the 90 % interval, None where there is none.
+
+    >>> Finding("N", "identified", 29_600.0, 350.0, "electrons a threshold", "two V_d").text
+    '2.96e+04 ± 3.5e+02'
+    """
 
     quantity: str
     status: Status
@@ -34,7 +38,13 @@ class Finding:
 
 
 def findings(calibration: Calibration) -> list[Finding]:
-    """The table, most direct first."""
+    """The table, most direct first.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
+    >>> [(found.quantity, found.status) for found in findings(calibrate(campaign))][:2]
+    [('alpha/phi, mean', 'identified'), ('alpha/phi, spread', 'identified')]
+    """
     return [*_rates(calibration), *_noise(calibration), *_two_v_d(calibration), *_rest(calibration)]
 
 

@@ -29,6 +29,11 @@ def write_flats(
 
     levels: radiance of each recording, as its label says.  frames: their lengths, or one for all.
     second_v_d: repeat all levels at this V_D - V_ref [V], same light.  seed: which unit, and its temporal noise.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2), frames=100, shape=(4, 8))
+    >>> [recording.name for recording in campaign.recordings]
+    ['dark-00', 'flat-01']
     """
     levels = [float(level) for level in levels]
     lengths = [frames] * len(levels) if isinstance(frames, int) else list(frames)

@@ -24,7 +24,7 @@ from spikecam_env.compiled import njit
 
 Array = NDArray[np.float64]
 
-_WEIGHTS = 1.0 / (2 * np.pi**2 * np.arange(1, 13) ** 2)
+_WEIGHTS = np.asarray(1.0 / (2 * np.pi**2 * np.arange(1, 13) ** 2), np.float64)
 """Of the harmonics of r_k."""
 
 _ITERATIONS = 30
@@ -77,7 +77,7 @@ def _quantisation(read: _Read, white: float) -> tuple[Array, Array]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sum_harmonics(cosines, rates, white, weights, values, slopes):  # type: ignore[no-untyped-def]
+def _sum_harmonics(cosines: Array, rates: Array, white: float, weights: Array, values: Array, slopes: Array) -> None:
     """cos(m x) and exp(-m^2 y) by recurrence over m."""
     for i in range(rates.size):
         first = np.exp(-rates[i] * white)

@@ -132,7 +132,7 @@ def _variance_above_floor(spikes: NDArray[np.uint8]) -> Array:
 
 
 @njit(cache=True)
-def _minimum_ranges(spikes):  # type: ignore[no-untyped-def]
+def _minimum_ranges(spikes: NDArray[np.uint8]) -> Array:
     """(P,) of (P, T): min over a of max(N - a t) - min(N - a t), t at the ends of frames, by golden section."""
     out = np.empty(spikes.shape[0])
     frames = spikes.shape[1]
@@ -155,7 +155,7 @@ def _minimum_ranges(spikes):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _range(counted, slope):  # type: ignore[no-untyped-def]
+def _range(counted: Array, slope: float) -> float:
     low, high = np.inf, -np.inf
     for t in range(counted.size):
         value = counted[t] - slope * t

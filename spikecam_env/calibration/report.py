@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -190,7 +191,7 @@ def _swing(figure: Figure, s: Setting, c: Calibration) -> None:
     figure.colorbar(image, ax=right, label="V_d + V_S [V]")
 
 
-def _normal_histogram(axis, values: NDArray[np.float64], label: str) -> None:  # type: ignore[no-untyped-def]
+def _normal_histogram(axis: Axes, values: NDArray[np.float64], label: str) -> None:
     axis.hist(values, 60, density=True, color="tab:blue", alpha=0.6)
     x = np.linspace(values.min(), values.max(), 200)
     axis.plot(

@@ -19,7 +19,13 @@ MAPS_FORMAT = "spikecam-maps/1"
 
 
 def save_calibration(calibration: Calibration, folder: str | Path) -> list[Path]:
-    """Write all three files; returns their paths."""
+    """Write all three files; returns their paths.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
+    >>> [path.name for path in save_calibration(calibrate(campaign), "calibrated")]
+    ['model.toml', 'maps.h5', 'report.html']
+    """
     target = Path(folder)
     paths = [target / name for name in ("model.toml", "maps.h5", "report.html")]
     with made_folder(target):
@@ -34,6 +40,11 @@ def calibrated_model(calibration: Calibration) -> SensorModel:
 
     Its radiance is that of the labels times `radiance_scale` of the maps (mean alpha/phi), so that 1.0 keeps meaning
     one spike a frame of the nominal pixel.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
+    >>> calibrated_model(calibrate(campaign)).name
+    'calibrated from camera'
     """
     c = calibration
     electrons, reset_noise_mV = c.circuit.threshold_electrons, c.circuit.thermal_noise_mV

@@ -79,6 +79,12 @@ class Calibration:
 
     charge: N and kappa, with what they rest on.  swing_V: (H, W) V_d + V_S [V], with a second V_d, else None.
     warnings: what the data could not say, or contradict.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
+    >>> calibration = calibrate(campaign)
+    >>> calibration.shape, len(calibration.settings), calibration.flags.shape
+    ((8, 8), 1, (8, 8))
     """
 
     campaign: str
@@ -110,6 +116,12 @@ def calibrate(
     circuit: prior for what rates cannot say (capacitance, reference voltage); default the published one.
     reset_noise_mV: prior for the reset noise, used where there is one V_d; default thermal, sqrt(kT/C).
     Raises InputError where nothing can be identified: one level only, all dark, labels that contradict the rates.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
+    >>> calibration = calibrate(campaign)
+    >>> round(float(calibration.main.gain.mean()), 1)  # spikes a frame at radiance 1
+    1.0
     """
     campaign = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     prior = circuit or Circuit()

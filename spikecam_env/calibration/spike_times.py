@@ -67,7 +67,15 @@ def spike_times(
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _scan(words, first_word, last_word, ks, ends, square, terms):  # type: ignore[no-untyped-def]
+def _scan(
+    words: NDArray[np.uint64],
+    first_word: int,
+    last_word: int,
+    ks: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    square: NDArray[np.float64],
+    terms: NDArray[np.int64],
+) -> None:
     frames = words.shape[0]
     bits = np.empty((64, (frames + 63) // 64), np.uint64)
     times = np.empty(frames + 1, np.int32)
@@ -89,7 +97,7 @@ def _scan(words, first_word, last_word, ks, ends, square, terms):  # type: ignor
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc"})
-def second_differences(t, n, k):  # type: ignore[no-untyped-def]
+def second_differences(t: NDArray[np.int32], n: int, k: int) -> float:
     """Sum of (t_(i+2k) - 2 t_(i+k) + t_i)^2 over the n spike times at the start of t: of whole numbers, in any
     order."""
     first, middle, last = t[: n - 2 * k], t[k : n - k], t[2 * k : n]  # views: indices that cannot wrap vectorise

@@ -51,6 +51,13 @@ class CampaignRecording:
 
     frames: length.  spikes, rates: one of them is a path.  radiance: path, or None for an unknown static scene.
     v_d: V_D - V_ref [V] at which it was taken, or None.  temperature_k: [K], or None.
+
+    >>> from spikecam_env.sensor import Keyframes, SensorModel
+    >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
+    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), [Take("flat", light, 80)], shape=(2, 4))
+    >>> flat = campaign.recordings[0]
+    >>> float(flat.load().mean()), float(flat.static_radiance().mean())
+    (0.25, 0.25)
     """
 
     name: str
@@ -108,7 +115,14 @@ class CampaignRecording:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A folder of recordings of one camera; `read_campaign` makes it."""
+    """A folder of recordings of one camera; `read_campaign` makes it.
+
+    >>> from spikecam_env.sensor import Keyframes, SensorModel
+    >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
+    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), [Take("flat", light, 80)], shape=(2, 4))
+    >>> campaign.shape, [recording.name for recording in campaign.recordings]
+    ((2, 4), ['flat'])
+    """
 
     folder: Path
     shape: tuple[int, int]
@@ -147,6 +161,12 @@ def read_campaign(folder: str | Path, *, outside: bool = False) -> Campaign:
 
     outside: read files that lie outside of the folder too, by `..`, from the root, or over symbolic links.
     Raises InputError that names the recording for anything missing or contradictory.
+
+    >>> from spikecam_env.sensor import Keyframes, SensorModel
+    >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
+    >>> recorded = record_takes("camera", SensorModel.preset("ideal"), [Take("flat", light, 80)], shape=(2, 4))
+    >>> read_campaign("camera") == recorded
+    True
     """
     root = Path(folder)
     path = root / "campaign.json"

@@ -44,6 +44,11 @@ class Take:
     name: of its files.  light: keys whose radiance is (K, H, W) or broadcasts to it.  use: fit or holdout.
     v_d: V_D - V_ref [V]; None is the model's own.  The light is the same at any v_d: 1.0 makes the nominal pixel of the
     model's own v_d fire once a frame.
+
+    >>> from spikecam_env.sensor import Keyframes
+    >>> flat = Take("flat", Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32)), frames=80)
+    >>> flat.use, flat.frames
+    ('fit', 80)
     """
 
     name: str
@@ -70,6 +75,12 @@ def record_takes(
     same settings is returned as it is.
     Errors: InputError for no takes, names that repeat or are no file names, an unknown use, light of another shape, a
     v_d that leaves no threshold, and a folder of other settings.
+
+    >>> from spikecam_env.sensor import Keyframes, SensorModel
+    >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
+    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), [Take("flat", light, 80)], shape=(2, 4))
+    >>> int(campaign.recordings[0].load().sum())
+    160
     """
     shape, seed = checked_shape(shape), checked_seed(seed)
     _check(takes, shape)
@@ -95,7 +106,12 @@ def record_takes(
 
 
 def at_v_d(model: SensorModel, v_d: float) -> SensorModel:
-    """The same camera with its reset voltage set so that V_D - V_ref = v_d [V]: fewer or more electrons a spike."""
+    """The same camera with its reset voltage set so that V_D - V_ref = v_d [V]: fewer or more electrons a spike.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> round(at_v_d(SensorModel.preset("scsim"), 0.9).circuit.reset_V, 3)
+    3.1
+    """
     try:
         circuit = replace(model.circuit, reset_V=model.circuit.reference_V + v_d)
     except InputError as error:

@@ -32,7 +32,12 @@ from spikecam_env.whole import alone_in, clear_unfinished, is_unfinished, made_f
 @dataclass(frozen=True)
 class Built:
     """What a run did: with which renderer, files made and files that were there, bytes of both; over all
-    workers, where the time went [s] and processor time [s]."""
+    workers, where the time went [s] and processor time [s].
+
+    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+    >>> build(plan, "small").made, build(plan, "small").kept
+    (1, 1)
+    """
 
     renderer: str
     made: int
@@ -48,6 +53,11 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     jobs: worker processes; 1 works in this one.  ray: "local" for a cluster of `jobs` workers on this machine, or the
     address of a running one, whose machines share `folder`.  progress: a bar over frames.
     Errors: InputError if the folder holds anything else, or another run is at work in it.
+
+    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+    >>> built = build(plan, "small")
+    >>> built.made, built.kept
+    (1, 0)
     """
     checked_count(jobs, "jobs")
     target = Path(os.path.realpath(folder))

@@ -38,6 +38,9 @@ class Entry:
     scene       its name in `scenes.catalogue.SCENES`
     scene_seed  of what the scene leaves to chance
     unit_seed   of the camera: its fixed pattern, starting phases and temporal noise
+
+    >>> Entry("train/disk.h5", scene="disk", scene_seed=0, unit_seed=7)
+    Entry(path='train/disk.h5', scene='disk', scene_seed=0, unit_seed=7)
     """
 
     path: str
@@ -56,6 +59,10 @@ class Plan:
     mean_interval  between spikes, over the picture [frames]: the exposure
     renderer       back-end that draws: one of `scenes.renderers.choose.BACKENDS`, or "auto" for the best there is
     Errors: InputError for no entries, an unknown scene, and numbers that are not positive.
+
+    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+    >>> [entry.scene for entry in plan.entries], plan.mean_interval
+    (['disk'], 10.0)
     """
 
     kind: str
@@ -111,6 +118,9 @@ def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any)
     """Random scenes: `train` of them to train on, `test` others.  settings: fields of `Plan`.
 
     A scene depends on the seed, its split and its number, not on how many there are.
+
+    >>> [entry.path for entry in spift_n(train=2, test=1).entries]
+    ['train/000.h5', 'train/001.h5', 'test/000.h5']
     """
     counts = {"train": checked_seed(train, "train", MOST_SCENES), "test": checked_seed(test, "test", MOST_SCENES)}
     checked_seed(seed)
@@ -123,7 +133,11 @@ def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any)
 
 
 def phm_n(*, scenes: tuple[str, ...] = PHM, seed: int = 0, **settings: Any) -> Plan:
-    """Well-designed scenes, each with a camera of its own.  settings: fields of `Plan`."""
+    """Well-designed scenes, each with a camera of its own.  settings: fields of `Plan`.
+
+    >>> [entry.path for entry in phm_n(scenes=("fan", "train"), frames=100).entries]
+    ['test/fan.h5', 'test/train.h5']
+    """
     checked_seed(seed)
     for name in scenes:
         if scenes.count(name) > 1:

@@ -20,6 +20,11 @@ def verify(folder: str | Path, *, jobs: int = 1, outside: bool = False, progress
 
     jobs: files read at a time.  outside: read files that the dataset keeps outside of its folder too.
     Errors: InputError if the folder holds no dataset, or files outside of it unless `outside`.
+
+    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+    >>> built = build(plan, "small")
+    >>> verify("small")
+    []
     """
     checked_count(jobs, "jobs")
     target = Path(folder)

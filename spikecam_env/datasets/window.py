@@ -23,7 +23,14 @@ FIRST_REACH = 32
 
 @dataclass(frozen=True)
 class Window:
-    """spikes (2 reach + 1, h, w) uint8, noisy; clean_isi (h, w) float32, normalised: 1 / ISI in (0, 1]."""
+    """spikes (2 reach + 1, h, w) uint8, noisy; clean_isi (h, w) float32, normalised: 1 / ISI in (0, 1].
+
+    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+    >>> built = build(plan, "small")
+    >>> window = read_window("small/train/disk.h5", 50, reach=10)
+    >>> window.spikes.shape, window.clean_isi.dtype
+    ((21, 8, 16), dtype('float32'))
+    """
 
     spikes: NDArray[np.uint8]
     clean_isi: NDArray[np.float32]
@@ -37,6 +44,12 @@ def read_window(
     rows, columns: slices with start and stop; None for all.  The plane is
     `isi_plane(clean, frame, normalised=True)` of the whole clean stream, to the bit.
     Errors: InputError if the window or the crop leaves the recording, or it has no clean twin.
+
+    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+    >>> built = build(plan, "small")
+    >>> window = read_window("small/train/disk.h5", 50, columns=slice(0, 4))
+    >>> window.spikes.shape, window.clean_isi.shape
+    ((41, 8, 4), (8, 4))
     """
     with open_recording(path) as recording:
         if "clean" not in recording.streams:

@@ -58,7 +58,13 @@ SMALL_TASKS = tuple(name for name in TASK_ENVIRONMENTS if "-Full" not in name)
 
 
 def register() -> None:
-    """Register every id that is not registered yet, each with the native vector environment of its class."""
+    """Register every id that is not registered yet, each with the native vector environment of its class.
+
+    >>> import gymnasium
+    >>> register()
+    >>> "spikecam_env/Track-v1" in gymnasium.registry
+    True
+    """
     for name, (entry_point, options) in (ENVIRONMENTS | TASK_ENVIRONMENTS).items():
         if name not in gymnasium.registry:
             vector = f"spikecam_env.envs.vector_of:{entry_point.replace(':', '.')}"

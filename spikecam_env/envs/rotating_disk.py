@@ -28,6 +28,12 @@ class RotatingDiskEnv(AimingEnv):
     camera            keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
 
     Options of reset: centre (x, y) [pixels], drift_px_s (x, y), angle [radians] fix what is drawn otherwise.
+
+    >>> env = RotatingDiskEnv(shape=(16, 24))
+    >>> spikes, info = env.reset(seed=0)
+    >>> spikes, reward, terminated, truncated, info = env.step(np.array([0.2, 0.0]))
+    >>> spikes.shape, spikes.dtype
+    ((40, 16, 24), dtype('int8'))
     """
 
     def __init__(

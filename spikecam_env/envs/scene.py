@@ -66,6 +66,11 @@ class SceneEnv(AimingEnv):
     Options of reset: start_frame, offset (pan, tilt) [pixels], drift_px_s (pan, tilt) and, of random worlds, seed fix
     what is drawn otherwise.
     Errors: InputError for an unknown scene or target, and for a scene in which nothing moves.
+
+    >>> env = SceneEnv(scene="disk", shape=(16, 24))
+    >>> spikes, info = env.reset(seed=0)
+    >>> spikes.shape, env.action_space.shape
+    ((40, 16, 24), (2,))
     """
 
     def __init__(

@@ -49,6 +49,13 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     `envs` are the single environments, to look at; theirs is the block, what is made of it is made for all at once.
     Errors: InputError as of `single`, for models that are not N, and actions of another shape; NotReadyError for a step
     before the first reset, and for anything after `close`.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> cameras = SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24))
+    >>> spikes, infos = cameras.reset(seed=0)
+    >>> spikes.shape
+    (2, 40, 16, 24)
+    >>> cameras.close()
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
@@ -195,6 +202,10 @@ def batched(infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Infos of N environments as gymnasium's vectors have them: by name an array (N, ...), and as `_name` who has it.
 
     Numbers and arrays are 0 where there is none; dictionaries are dictionaries of such; anything else is an object.
+
+    >>> infos = batched([{"on_target": True}, {"on_target": False, "episode_number": 7}])
+    >>> infos["episode_number"].tolist(), infos["_episode_number"].tolist()
+    ([0, 7], [False, True])
     """
     together: dict[str, Any] = {}
     alike = all(info.keys() == infos[0].keys() for info in infos)

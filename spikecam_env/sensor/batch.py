@@ -30,7 +30,15 @@ from spikecam_env.sensor.model import SensorModel, generator
 
 @dataclass(frozen=True)
 class SensorBatchState:
-    """A batch mid-stream: what its cameras are, each one's next frame (B,), phase (B, H, W), pixels.  Picklable."""
+    """A batch mid-stream: what its cameras are, each one's next frame (B,), phase (B, H, W), pixels.  Picklable.
+
+    >>> cameras, light = SpikeSensorBatch("scsim", shape=(4, 4), seeds=[0, 1], device="cpu"), np.full((4, 4), 0.3)
+    >>> state = cameras.state()
+    >>> spikes = cameras.step(light, frames=16)
+    >>> cameras.restore(state)
+    >>> bool((cameras.step(light, frames=16) == spikes).all())
+    True
+    """
 
     models: tuple[SensorModel, ...]
     seeds: tuple[int, ...]

@@ -122,14 +122,19 @@ class Keyframes:
     def at(self, frame: float) -> NDArray[np.float32]:
         """Radiance (H, W) at an instant [frames]; what a frame collects is the mean over it."""
         if frame <= self.frame[0]:
-            return self.radiance[0]
+            return self._picture(0)
         if frame >= self.frame[-1]:
-            return self.radiance[-1]
+            return self._picture(-1)
         i = int(np.searchsorted(self.frame, frame, side="right")) - 1
         w = np.float32((frame - self.frame[i]) / (self.frame[i + 1] - self.frame[i]))
         if w == 0.0:
-            return self.radiance[i]
-        return self.radiance[i] * (np.float32(1.0) - w) + self.radiance[i + 1] * w
+            return self._picture(i)
+        between: NDArray[np.float32] = self.radiance[i] * (np.float32(1.0) - w) + self.radiance[i + 1] * w
+        return between
+
+    def _picture(self, key: int) -> NDArray[np.float32]:
+        picture: NDArray[np.float32] = self.radiance[key]
+        return picture
 
 
 def light_values(values: ArrayLike) -> NDArray[np.float32]:
@@ -266,7 +271,7 @@ KEY0, KEY1, BEGIN, LENGTH, FIRST, COUNT = range(6)
 
 
 @njit(cache=True, nogil=True)
-def cuts(times, start, stop):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def cuts(times: NDArray[np.float64], start: int, stop: int) -> NDArray[np.int64]:
     """How keys at `times` (K,) cut frames start .. stop into segments: (S, 6) int64, a row each.
 
     KEY0, KEY1: the keys whose pictures are the light at its start and at its end; -1 where no key is at that frame.
@@ -354,7 +359,8 @@ class Ramp:
     def collected(self, frame: int) -> NDArray[np.int32]:
         """Grains (P,) collected from the start of the key interval to the start of its frame."""
         k = np.int32(frame)
-        return self.level * k + self.curve * (k * k) + ((self.rest * (k * k)) >> np.int32(18))
+        grains: NDArray[np.int32] = self.level * k + self.curve * (k * k) + ((self.rest * (k * k)) >> np.int32(18))
+        return grains
 
 
 def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32]) -> Ramp:
@@ -390,8 +396,9 @@ def _grains_per_frame(
     radiance: NDArray[np.float32], gain: NDArray[np.float32], dark: NDArray[np.float32]
 ) -> NDArray[np.int32]:
     with np.errstate(over="ignore"):  # infinity is capped too
-        capped = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
-    return (capped + np.float32(0.5)).astype(np.int32)
+        capped: NDArray[np.float32] = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
+    grains: NDArray[np.int32] = (capped + np.float32(0.5)).astype(np.int32)
+    return grains
 
 
 def as_light(radiance: Keyframes | ArrayLike, shape: tuple[int, int]) -> Keyframes | NDArray[np.float32]:

@@ -45,6 +45,12 @@ def load_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
     Loading a file again changes nothing; loading it after it was edited replaces its effects.
     Raises InputError for a file that cannot be read, fails when it is run (with the line), has no effect, declares one
     wrongly (`check_declaration`), or names one as an effect of another file is named.
+
+    >>> from spikecam_env.sensor import beginning
+    >>> path = beginning.__path__[0] + "/new_effect.py"
+    >>> with effects_from():  # CATALOGUE is as before after the block
+    ...     [effect.name for effect in load_effects(path)]
+    ['new_effect']
     """
     source = Path(os.path.abspath(path))
     module = _module_of(source, read_text(Path(path)))
@@ -63,7 +69,16 @@ def load_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
 
 @contextmanager
 def effects_from(*paths: str | os.PathLike[str]) -> Iterator[tuple[type[Effect], ...]]:
-    """The effects of these files in CATALOGUE within the block; afterwards it is what it was."""
+    """The effects of these files in CATALOGUE within the block; afterwards it is what it was.
+
+    >>> from spikecam_env.sensor import beginning
+    >>> path = beginning.__path__[0] + "/new_effect.py"
+    >>> with effects_from(path):
+    ...     "new_effect" in CATALOGUE
+    True
+    >>> "new_effect" in CATALOGUE
+    False
+    """
     before = dict(CATALOGUE)
     try:
         yield tuple(effect for path in paths for effect in load_effects(path))
@@ -72,7 +87,11 @@ def effects_from(*paths: str | os.PathLike[str]) -> Iterator[tuple[type[Effect],
 
 
 def load_installed_effects() -> tuple[type[Effect], ...]:
-    """Register the effects that installed packages offer; one that fails is left out with a warning."""
+    """Register the effects that installed packages offer; one that fails is left out with a warning.
+
+    >>> load_installed_effects()  # no installed package offers effects
+    ()
+    """
     loaded: list[type[Effect]] = []
     for entry in metadata.entry_points(group=GROUP):
         try:
@@ -98,7 +117,7 @@ def register(effect: type[Effect]) -> None:
     if known is not effect and (file_of(known) is None or file_of(known) != file_of(effect)):
         raise InputError(f"there is an effect {effect.name} already ({_home(known)}); give the class another name")
     check_declaration(effect)
-    copyreg.pickle(effect, _reduced)  # type: ignore[arg-type]
+    copyreg.pickle(effect, _reduced)
     _set_catalogue({**CATALOGUE, effect.name: effect})
 
 

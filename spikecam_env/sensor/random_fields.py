@@ -80,9 +80,11 @@ def _normal(sigma: float) -> tuple[np.float32, ...]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _white(low, high, first, polynomial, out):  # type: ignore[no-untyped-def]
+def _white(
+    low: np.uint32, high: np.uint32, first: int, polynomial: tuple[np.float32, ...], out: NDArray[np.float32]
+) -> None:
     """out: (F, P) float32, overwritten."""
-    use_widest_vectors()  # type: ignore[call-arg]
+    use_widest_vectors()
     frames, pixels = out.shape
     key = np.empty((2, TILE), np.uint32)
     for start in range(0, pixels, TILE):
@@ -96,12 +98,21 @@ def _white(low, high, first, polynomial, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _octaves(words, every, kept, driven, first, polynomial, value, total):  # type: ignore[no-untyped-def]
+def _octaves(
+    words: NDArray[np.uint32],
+    every: NDArray[np.int64],
+    kept: NDArray[np.float32],
+    driven: NDArray[np.float32],
+    first: int,
+    polynomial: tuple[np.float32, ...],
+    value: NDArray[np.float32],
+    total: NDArray[np.float32],
+) -> None:
     """value: (J, P) float32, updated.  total: (F, P) float32, overwritten.
 
     Slow octaves are summed only when they move: above[j] is the sum of octaves j and slower.
     """
-    use_widest_vectors()  # type: ignore[call-arg]
+    use_widest_vectors()
     octaves, pixels = value.shape
     key = np.empty((octaves, 2, TILE), np.uint32)
     above = np.zeros((octaves + 1, TILE), np.float32)
@@ -129,7 +140,7 @@ def _octaves(words, every, kept, driven, first, polynomial, value, total):  # ty
 
 
 @njit(inline="always")
-def write_keys(start, low, high, out):  # type: ignore[no-untyped-def]
+def write_keys(start: int, low: np.uint32, high: np.uint32, out: NDArray[np.uint32]) -> None:
     """Both keys of the pixels of a tile: out (2, TILE) uint32."""
     for p in range(TILE):
         key = first_key(start + p, low)

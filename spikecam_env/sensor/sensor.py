@@ -37,6 +37,13 @@ class SensorState:
 
     Tied to its engine, its shape, its model, and the unit that was given to the sensor, if one was.
     unit: that one's digest.  phase: read-only.
+
+    >>> sensor, light = SpikeSensor(SensorModel.preset("scsim"), shape=(4, 4), seed=0), np.full((4, 4), 0.3)
+    >>> state = sensor.state()
+    >>> spikes = sensor.step(light, frames=32)
+    >>> sensor.restore(state)
+    >>> bool((sensor.step(light, frames=32) == spikes).all())
+    True
     """
 
     engine: str
@@ -255,6 +262,11 @@ def step_together(
     a camera a thread.
     threads: default NUMBA_NUM_THREADS.
     Raises InputError as `SpikeSensor.step` does; all cameras are then as they were.
+
+    >>> cameras = [SpikeSensor(SensorModel.preset("ideal"), shape=(2, 2), seed=seed) for seed in (0, 1)]
+    >>> lights = [np.full((2, 2), 0.25), np.full((2, 2), 0.5)]
+    >>> [int(spikes.sum()) for spikes in step_together(cameras, lights, frames=8)]
+    [8, 16]
     """
     given = [
         sensor._exposing(radiance, frames, out)

@@ -45,6 +45,10 @@ class Circuit:
 
     Threshold phi = C (V_D - V_ref + V_bias).  Defaults: the public SCSim script's constants.
     Raises InputError for a value outside its range, and for a swing outside SWING_V.
+
+    >>> circuit = Circuit()
+    >>> round(circuit.swing_V, 4), round(circuit.threshold_electrons)
+    (1.0924, 29646)
     """
 
     reset_V: float = parameter(3.3, unit="V", bounds=(-20.0, 20.0), doc="voltage that a reset leaves")
@@ -165,6 +169,11 @@ class Unit:
     kappa: relative standard deviation of the threshold, drawn at each reset.  swing_V: voltage from reset to reference.
     threshold_fC: charge of a threshold.
     shot: whether charge is Poisson; dark_is_noisy: whether that holds for dark charge too.
+
+    >>> SensorModel.preset("ideal").draw_unit((1, 2), seed=0).gain.tolist()
+    [1.0, 1.0]
+    >>> bool(SensorModel.preset("scsim").draw_unit((1, 2), seed=0).shot)
+    True
     """
 
     gain: NDArray[np.float64]

@@ -69,6 +69,13 @@ class SpikeWriter:
     shape: (rows, columns).  frame_rate_hz: None where unknown.  attributes: text, numbers or bools.
     Errors: InputError for an attribute of another type or a reserved name, spikes of another shape, or a place that
     cannot be written to, e.g. because the disk is full.
+
+    >>> with SpikeWriter("flat.h5", (2, 3), 40_000.0, scene="flat") as writer:
+    ...     writer.append(np.zeros((8, 2, 3), np.uint8))
+    ...     writer.append(np.ones((4, 2, 3), np.uint8))
+    >>> recording = read_recording("flat.h5")
+    >>> recording.spikes.shape, recording.attributes["scene"]
+    ((12, 2, 3), 'flat')
     """
 
     def __init__(
@@ -185,7 +192,14 @@ def read_hdf5(
 
 
 def read_truth(path: str | Path) -> dict[str, NDArray[Any]]:
-    """Ground truth beside a recording: name -> (N, ...), with "frame" (N,); empty where there is none."""
+    """Ground truth beside a recording: name -> (N, ...), with "frame" (N,); empty where there is none.
+
+    >>> with SpikeWriter("disk.h5", (2, 3), 40_000.0) as writer:
+    ...     writer.append(np.zeros((8, 2, 3), np.uint8))
+    ...     writer.append_truth(4.5, radiance=np.full((2, 3), 0.2, np.float32))
+    >>> {name: array.shape for name, array in read_truth("disk.h5").items()}
+    {'frame': (1,), 'radiance': (1, 2, 3)}
+    """
     with open_recording(path) as recording, _damage_named(path):
         if "truth" not in recording.file.keys():  # noqa: SIM118 - `in` follows links
             return {}

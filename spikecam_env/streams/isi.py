@@ -52,6 +52,9 @@ def isi_planes(
 
     The whole stream is seen whatever `start` and `stop` are; time is O(T) a pixel.
     Errors: InputError unless 0 <= start < stop <= T and future >= 0.
+
+    >>> isi_planes(np.uint8([1, 0, 0, 1, 0, 1]).reshape(6, 1, 1), start=2, stop=5).ravel().tolist()
+    [3.0, 2.0, 2.0]
     """
     frames = as_spikes(spikes)
     count = len(frames)
@@ -79,7 +82,7 @@ def _isi(
     normalised: bool,
     planes: NDArray[np.float32],
     last_of: NDArray[np.int32],
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Fill `planes`.  last_of: the same memory as int32, which holds last(t) until the interval is known: float32 would
     round frames beyond 2^24."""
     count, pixels = spikes.shape
@@ -108,7 +111,7 @@ def _isi(
 
 
 @njit(cache=True)
-def _first_that_matters(spikes: NDArray[np.uint8], start: int, a: int, b: int) -> int:  # pragma: no cover - compiled
+def _first_that_matters(spikes: NDArray[np.uint8], start: int, a: int, b: int) -> int:
     """The latest t <= start such that every pixel in [a, b) has a spike in t .. start, or 0."""
     missing = b - a
     seen = np.zeros(b - a, np.uint8)

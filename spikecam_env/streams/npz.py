@@ -86,7 +86,12 @@ def read_npy(
 
 
 def save_npz(path: str | Path, spikes: ArrayLike) -> None:
-    """(T, H, W) spikes -> a compressed `.npz` that `load_npz` reads back.  The file appears whole."""
+    """(T, H, W) spikes -> a compressed `.npz` that `load_npz` reads back.  The file appears whole.
+
+    >>> save_npz("spikes.npz", np.ones((8, 2, 3), np.uint8))
+    >>> read_recording("spikes.npz").spikes.shape
+    (8, 2, 3)
+    """
     with whole_file(path) as beside, beside.open("wb") as file:
         np.savez_compressed(file, spikes=as_spikes(spikes), time_axis=0)
 

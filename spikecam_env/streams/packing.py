@@ -39,6 +39,9 @@ def unpack_frames(
     """(T, ceil(H W / 8)) uint8 -> (T, H, W) uint8 of 0 and 1.
 
     Errors: InputError if the width is not that of `shape`.
+
+    >>> unpack_frames(np.uint8([[9]]), (1, 4)).tolist()
+    [[[1, 0, 0, 1]]]
     """
     height, width = check_shape(shape)
     expected = packed_bytes((height, width))

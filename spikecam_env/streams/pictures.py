@@ -37,6 +37,9 @@ def middleTFI(spikes: ArrayLike, t: int | None = None) -> NDArray[np.float32]:
     """(T, H, W) spikes -> (H, W) float32 rate 1 / ISI [spikes/frame] at frame t (default: the middle).
 
     Errors: InputError if t is outside the stream.
+
+    >>> middleTFI(np.uint8([1, 0, 0, 0, 1, 0]).reshape(6, 1, 1), t=2).tolist()
+    [[0.25]]
     """
     return isi_plane(spikes, _middle(as_stream(spikes), t), normalised=True)
 
@@ -45,6 +48,9 @@ def tfp_film(spikes: ArrayLike, window: int = 41, *, every: int = 1) -> NDArray[
     """(T, H, W) spikes -> (ceil(T / every), H, W) float32: `middleTFP` at frames 0, every, 2 every, ...
 
     Errors: InputError for an empty stream, window < 1 or every < 1.
+
+    >>> tfp_film(np.tile(np.uint8([1, 0, 0, 0]), 10).reshape(40, 1, 1), window=8, every=20).ravel().tolist()
+    [0.25, 0.25]
     """
     frames = as_spikes(spikes)
     if every < 1:

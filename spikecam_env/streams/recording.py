@@ -21,7 +21,11 @@ from spikecam_env.streams.vidar import read_dat, read_raw
 
 @dataclass(frozen=True)
 class Recording:
-    """Spikes (T, H, W) uint8 of 0 and 1, the frame rate [Hz] where the file states it, and what else it says."""
+    """Spikes (T, H, W) uint8 of 0 and 1, the frame rate [Hz] where the file states it, and what else it says.
+
+    >>> print(Recording(np.zeros((301, 250, 400), np.uint8), frame_rate_hz=40_000.0))
+    301 frames of 250 rows x 400 columns
+    """
 
     spikes: NDArray[np.uint8]
     frame_rate_hz: float | None = None
@@ -57,6 +61,10 @@ def read_recording(path: str | Path, **options: Any) -> Recording:
 
     Warns (UserWarning) where the spikes say that it was read wrong.
     Raises InputError for another ending, an option the format does not have, and all that its loader refuses.
+
+    >>> save_npz("spikes.npz", np.zeros((8, 2, 3), np.uint8))
+    >>> print(read_recording("spikes.npz"))
+    8 frames of 2 rows x 3 columns, key spikes, time_axis 0
     """
     loader = _loader(path)
     allowed = _options(loader)

@@ -60,6 +60,11 @@ def load_vidar_dat(
     option is not what the side file says.
     Raises InputError if the file is absent or holds no frame, its size is a whole number of frames of another known
     geometry only, or the frames or columns asked are not in it.
+
+    >>> spikes = np.uint8([[[1, 0, 0, 1, 0, 0, 0, 0]], [[0, 0, 1, 0, 0, 0, 0, 0]]])
+    >>> save_vidar_dat("spikes.dat", spikes)
+    >>> bool((load_vidar_dat("spikes.dat", height=1, width=8, flip=False) == spikes).all())
+    True
     """
     return read_dat(
         path,
@@ -134,6 +139,11 @@ def save_vidar_dat(
     """(T, H, W) spikes -> a `.dat` file that `load_vidar_dat` reads with the same options.  The file appears whole.
 
     side_file: also write its geometry to `<name>.dat.json`, so that it reads without options; frame_rate_hz goes there.
+
+    >>> from pathlib import Path
+    >>> save_vidar_dat("spikes.dat", np.zeros((3, 2, 8), np.uint8))
+    >>> Path("spikes.dat").stat().st_size
+    6
     """
     frames = as_spikes(spikes)
     packed = pack_checked(frames[:, ::-1] if flip else frames, bit_order)

@@ -38,7 +38,7 @@ class LiveScreen:
         """(rows, columns, 3) uint8, even sizes, of two pictures (H, W) [spikes/frame] with a line below."""
         bright = float(np.percentile(rate[::SAMPLED, ::SAMPLED], BRIGHT_PERCENT)) or 1.0
         self._white = bright if self._white is None else self._white + FOLLOWS * (bright - self._white)
-        canvas = self._empty.copy()
+        canvas: NDArray[np.uint8] = self._empty.copy()
         left = MARGIN
         for panel in (noisy, rate):
             level = np.minimum(panel * np.float32((LEVELS - 1) / self._white), LEVELS - 1).astype(np.uint16)

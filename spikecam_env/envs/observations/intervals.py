@@ -84,9 +84,7 @@ class TFI(Observation):
 
 
 @njit(cache=True, nogil=True)
-def _wait(
-    spikes: NDArray[np.uint8], since: NDArray[np.int32], interval: NDArray[np.int32]
-) -> None:  # pragma: no cover - compiled
+def _wait(spikes: NDArray[np.uint8], since: NDArray[np.int32], interval: NDArray[np.int32]) -> None:
     streams, frames, pixels = spikes.shape
     for n in range(streams):
         for k in range(frames):

@@ -67,7 +67,7 @@ def counts(spikes: NDArray[np.uint8]) -> NDArray[np.int32]:
 
 
 @njit(cache=True, nogil=True)
-def _count(spikes, total):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _count(spikes: NDArray[np.uint8], total: NDArray[np.int32]) -> None:
     """spikes (N, K, P) uint8; total (N, P) int32, added to.  Sums of up to 255 frames fit in bytes, which are added
     faster than numpy adds them, as numbers of 32 bits."""
     streams, frames, pixels = spikes.shape

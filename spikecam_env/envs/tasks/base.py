@@ -15,6 +15,10 @@ class View:
     """What a task knows of the camera that plays it: units to turn sides and seconds into pixels and frames.
 
     pictures  numbers of the textures that this split may show (`tasks.things`)
+
+    >>> view = View((64, 64), 40_000.0, frames_per_step=40, pictures=range(1))
+    >>> view.steps(0.5), view.middle
+    (500, (31.5, 31.5))
     """
 
     shape: tuple[int, int]
@@ -65,6 +69,11 @@ class Task:
     further          numbers of the action after those
     stream           of random numbers: tasks that begin their draws with the same thing have different ones, so that
                      none is tested on what another is trained on
+
+    >>> from spikecam_env.envs.tasks import TASKS
+    >>> view = View((64, 64), 40_000.0, frames_per_step=40, pictures=range(1))
+    >>> TASKS["Track"]().draw(np.random.default_rng(0), view).steps
+    500
     """
 
     top_sides_s: float = 10.0

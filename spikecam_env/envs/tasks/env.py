@@ -35,6 +35,11 @@ class TaskEnv(AimingEnv):
     Options of reset: split, as above, for this episode; episode, its number, instead of one drawn from the split.
     The camera's unit and noise follow from the seed, not from the number.
     Info: episode_number; `episode` would be in the way of wrappers and learners, which keep statistics under that name.
+
+    >>> env = TaskEnv("Track", shape=(32, 32), split="test")
+    >>> spikes, info = env.reset(seed=0, options={"episode": 3})
+    >>> spikes.shape, info["episode_number"]
+    ((40, 32, 32), 3)
     """
 
     def __init__(

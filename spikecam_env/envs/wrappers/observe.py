@@ -30,6 +30,12 @@ class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstruc
 
     Errors: InputError for an unknown observation and for an environment that gives no blocks of spikes; NotReadyError
     for a step before the first reset.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> env = ObserveSpikes(RotatingDiskEnv(shape=(16, 24)), "tfp")
+    >>> picture, info = env.reset(seed=0)
+    >>> picture.shape, picture.dtype
+    ((1, 16, 24), dtype('uint8'))
     """
 
     def __init__(self, env: gymnasium.Env, obs: str | Observation) -> None:
@@ -53,7 +59,15 @@ class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstruc
 
 
 class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
-    """The same of a vector environment with NEXT_STEP autoreset, whose N streams are seen in one call."""
+    """The same of a vector environment with NEXT_STEP autoreset, whose N streams are seen in one call.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> from spikecam_env.envs.vector import SpikeCameraVectorEnv
+    >>> cameras = VectorObserveSpikes(SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24)), "tfp")
+    >>> cameras.reset(seed=0)[0].shape
+    (2, 1, 16, 24)
+    >>> cameras.close()
+    """
 
     def __init__(self, env: gymnasium.vector.VectorEnv, obs: str | Observation) -> None:
         super().__init__(env)

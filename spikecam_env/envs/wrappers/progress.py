@@ -26,7 +26,14 @@ def progress(reward: ArrayLike, before: ArrayLike) -> NDArray[np.float64]:
 
 
 class ProgressReward(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
-    """`progress` in place of the reward."""
+    """`progress` in place of the reward.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> env = ProgressReward(RotatingDiskEnv(shape=(16, 24)))
+    >>> spikes, info = env.reset(seed=0)
+    >>> env.step(np.zeros(2))[1]
+    0.0
+    """
 
     def __init__(self, env: gymnasium.Env) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(self)
@@ -46,7 +53,16 @@ class ProgressReward(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
 
 
 class VectorProgressReward(gymnasium.vector.VectorWrapper):
-    """The same of a vector environment with NEXT_STEP autoreset: 0 in the step that begins an episode, too."""
+    """The same of a vector environment with NEXT_STEP autoreset: 0 in the step that begins an episode, too.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> from spikecam_env.envs.vector import SpikeCameraVectorEnv
+    >>> cameras = VectorProgressReward(SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24)))
+    >>> spikes, infos = cameras.reset(seed=0)
+    >>> cameras.step(np.zeros((2, 2)))[1].tolist()
+    [0.0, 0.0]
+    >>> cameras.close()
+    """
 
     def __init__(self, env: gymnasium.vector.VectorEnv) -> None:
         super().__init__(env)

@@ -53,6 +53,12 @@ class RandomizeSensor(_Randomize, gymnasium.utils.RecordConstructorArgs):
 
     ranges: see `Ranges`.  An effect that the model does not have is added, its other parameters as they are by default.
     Errors: InputError for an unknown effect or parameter, one that is no number, and a range outside its bounds.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> env = RandomizeSensor(RotatingDiskEnv(shape=(16, 24)), {"dead_time.tau_us": (0.1, 2.0)})
+    >>> spikes, info = env.reset(seed=0)
+    >>> [effect.name for effect in env.unwrapped.sensor.model.effects if effect not in env.unwrapped.model.effects]
+    ['dead_time']
     """
 
     option = "model"
@@ -73,6 +79,12 @@ class RandomizeLight(_Randomize, gymnasium.utils.RecordConstructorArgs):
     """In every episode the scene's light times a factor, whose logarithm is drawn evenly.
 
     limits: lowest and highest factor, above 0.  Raises InputError for others.
+
+    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+    >>> env = RandomizeLight(RotatingDiskEnv(shape=(16, 24)), limits=(0.1, 1.0))
+    >>> bright, dim = (int(env.reset(seed=seed)[0].sum()) for seed in (0, 1))  # spikes of the first frames
+    >>> bright > 2 * dim
+    True
     """
 
     option = "light"

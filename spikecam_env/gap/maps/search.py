@@ -67,9 +67,7 @@ class PatternModel:
             for effect in self.model.effects:
                 if effect.name in spreads and what in self.factors:
                     key = spreads[effect.name]
-                    out = out.with_effect(
-                        replace(effect, **{key: effect.parameters()[key] * self.factors[what]})  # type: ignore[arg-type]
-                    )
+                    out = out.with_effect(replace(effect, **{key: effect.parameters()[key] * self.factors[what]}))
         return out
 
 
@@ -92,7 +90,8 @@ def mean_prediction(null: Null, mean: Array, units: int) -> Prediction:
 
 def unit_means(state: PatternModel, case: MapCase, keys: Sequence[Key], units: Sequence[int]) -> Array:
     """(S,) mean statistics over units."""
-    return np.mean([values_of(map_bank(unit_maps(state.fitted, case, n)), keys) for n in units], axis=0)
+    mean: Array = np.mean([values_of(map_bank(unit_maps(state.fitted, case, n)), keys) for n in units], axis=0)
+    return mean
 
 
 def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Key, float]) -> PatternModel:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.calibration.spike_times import second_differences
 from spikecam_env.compiled import njit
@@ -19,7 +20,21 @@ BESIDE_WHOLE = 0.04
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, late, scatter, timed, odd, flips):  # type: ignore[no-untyped-def]
+def through_pixels(
+    words: NDArray[np.uint64],
+    steps: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    square: NDArray[np.float64],
+    terms: NDArray[np.int64],
+    moments: NDArray[np.float64],
+    blocks: NDArray[np.int32],
+    lengths: NDArray[np.int64],
+    late: NDArray[np.float64],
+    scatter: NDArray[np.float64],
+    timed: NDArray[np.int32],
+    odd: NDArray[np.int32],
+    flips: NDArray[np.int32],
+) -> None:
     frames = words.shape[0]
     bits = np.empty((64, (frames + 63) // 64), np.uint64)
     t = np.empty(frames + 1, np.int32)
@@ -103,7 +118,7 @@ def through_pixels(words, steps, ends, square, terms, moments, blocks, lengths, 
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _count(d, least, most, lengths):  # type: ignore[no-untyped-def]
+def _count(d: NDArray[np.int32], least: np.int32, most: np.int32, lengths: NDArray[np.int64]) -> None:
     """Add the intervals d, of least to most, to those of their length: length by length where these are few.
 
     lengths: (4, n), for intervals in turn: a count that is added to at once again waits for itself.
@@ -120,7 +135,15 @@ def _count(d, least, most, lengths):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _add_to_spikes(words, known, mean, variance, late, scatter, timed):  # type: ignore[no-untyped-def]
+def _add_to_spikes(
+    words: NDArray[np.uint64],
+    known: np.uint64,
+    mean: NDArray[np.float64],
+    variance: NDArray[np.float64],
+    late: NDArray[np.float64],
+    scatter: NDArray[np.float64],
+    timed: NDArray[np.int32],
+) -> None:
     """Take a mean and add a variance (64,) for the spikes (F,) of each of 64 pixels, bit by bit those `known`; eight
     pixels at a time, from sums over all that may fire together."""
     means, variances = np.zeros((8, 256)), np.zeros((8, 256))
@@ -142,7 +165,7 @@ def _add_to_spikes(words, known, mean, variance, late, scatter, timed):  # type:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def add_rows(octets, rows, spread, sums):  # type: ignore[no-untyped-def]
+def add_rows(octets: NDArray[np.uint8], rows: int, spread: NDArray[np.uint64], sums: NDArray[np.uint64]) -> None:
     """octets: (F, rows * each) uint8; sums: (parts, F, each), 255 rows a part, the most a byte can count."""
     parts, frames, each = sums.shape
     for part in range(parts):
@@ -153,7 +176,9 @@ def add_rows(octets, rows, spread, sums):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def through_frames(words, rows, row, coincidences):  # type: ignore[no-untyped-def]
+def through_frames(
+    words: NDArray[np.uint64], rows: int, row: NDArray[np.int32], coincidences: NDArray[np.float64]
+) -> None:
     """words: (F, rows * n) uint64, each row of pixels n whole words, padded with zeros."""
     frames = words.shape[0]
     each = words.shape[1] // rows
@@ -173,9 +198,9 @@ def through_frames(words, rows, row, coincidences):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _common(a, b):  # type: ignore[no-untyped-def]
+def _common(a: NDArray[np.uint64], b: NDArray[np.uint64]) -> np.uint64:
     """Number of bits that two rows of words (n,) have in common."""
     total = np.uint64(0)
     for i in range(a.size):
         total += ones(a[i] & b[i])
-    return total
+    return total  # type: ignore[no-any-return]

@@ -107,14 +107,16 @@ def over_pixels(take: Take, of: Callable[[Observation], Array]) -> tuple[Array, 
 
 def mean_known(values: Array, known: NDArray[np.bool_]) -> Array:
     """Mean over the last axis of what is known; 0 where nothing is."""
-    return np.where(known, values, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
+    mean: Array = np.where(known, values, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
+    return mean
 
 
 def error_known(values: Array, known: NDArray[np.bool_]) -> Array:
     """Standard error of that mean."""
     off = np.where(known, values - mean_known(values, known)[..., None], 0.0)
     count = np.maximum(known.sum(axis=-1), 1)
-    return np.sqrt((off**2).sum(axis=-1)) / count
+    error: Array = np.sqrt((off**2).sum(axis=-1)) / count
+    return error
 
 
 def largest(panels: Sequence[Panel], number: int) -> list[Panel]:
@@ -134,7 +136,8 @@ def scaled_by_twins(sd: Array, difference: Array | None) -> Array:
     if known.sum() < 3:
         return sd
     square = float(np.sum((difference[known] / sd[known]) ** 2))
-    return sd * np.sqrt(square / stats.chi2.ppf(0.1, int(known.sum()) - 1))
+    scaled: Array = sd * np.sqrt(square / stats.chi2.ppf(0.1, int(known.sum()) - 1))
+    return scaled
 
 
 def by_recording(found: Sequence[Take], of: Callable[[Observation], Array]) -> tuple[Array, Array, Array | None, Array]:

@@ -138,7 +138,8 @@ _LARGEST = 128
 def _shrunk(values: Array) -> Array:
     n = -(-max(values.shape) // _LARGEST)
     rows, columns = (size // n * n for size in values.shape)
-    return values[:rows, :columns].reshape(rows // n, n, columns // n, n).mean(axis=(1, 3))
+    shrunk: Array = values[:rows, :columns].reshape(rows // n, n, columns // n, n).mean(axis=(1, 3))
+    return shrunk
 
 
 def map_limits(values: Array) -> tuple[float, float]:

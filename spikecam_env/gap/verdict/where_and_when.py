@@ -94,7 +94,10 @@ def outlying_means(values: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_
     error = 1.2533 * np.array(
         [values[fields == f].std() / np.sqrt((fields == f).sum()) for f in range(FIELDS_PER_SIDE**2)]
     )
-    return off > np.maximum(LOCAL_NOISES * np.maximum(np.sqrt(np.mean(inside**2)), error), LEAST_OFF)
+    outlying: NDArray[np.bool_] = off > np.maximum(
+        LOCAL_NOISES * np.maximum(np.sqrt(np.mean(inside**2)), error), LEAST_OFF
+    )
+    return outlying
 
 
 def rows_and_columns(field: int, shape: tuple[int, int]) -> str:

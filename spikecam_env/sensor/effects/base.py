@@ -65,7 +65,11 @@ PARTS_OF_A_CYCLE = 32
 
 
 class Stage(IntEnum):
-    """Where in the pixel an effect acts; the order is the order of application."""
+    """Where in the pixel an effect acts; the order is the order of application.
+
+    >>> [stage.name for stage in Stage][:3]
+    ['OPTICS', 'PHOTODIODE', 'INTEGRATION']
+    """
 
     OPTICS = 1
     PHOTODIODE = 2
@@ -76,7 +80,12 @@ class Stage(IntEnum):
 
 
 class Acts(Enum):
-    """How an effect acts within a frame; its docstring says so in these words, and how far that is exact."""
+    """How an effect acts within a frame; its docstring says so in these words, and how far that is exact.
+
+    >>> from spikecam_env.sensor import CATALOGUE
+    >>> CATALOGUE["dead_time"].acts
+    <Acts.CROSSING: 'at the crossing'>
+    """
 
     CONSTANT = "constant in time"
     INTEGRATED = "integrated over the frame"
@@ -94,6 +103,11 @@ class Exposure:
     length: of a frame, in the camera's; below 1 where light bends and an effect that `wants_rise` is asked for pieces:
     the block is then one piece, `number` 0, `frame_rate_hz` one over its length, and it begins `origin` such lengths
     after the recording does.
+
+    >>> from spikecam_env.sensor import SensorModel
+    >>> unit = SensorModel.preset("ideal").draw_unit((2, 2), seed=0)
+    >>> Exposure(number=40, frame_rate_hz=40_000.0, shape=(2, 2), unit=unit, frames=2).start.ravel().tolist()
+    [40.0, 41.0]
     """
 
     number: int
@@ -125,7 +139,12 @@ class Exposure:
 
 
 class Few(NamedTuple):
-    """Charge of a few pixels: flat indices (n,), ascending, and what each gets in every frame (F, n) [thresholds]."""
+    """Charge of a few pixels: flat indices (n,), ascending, and what each gets in every frame (F, n) [thresholds].
+
+    >>> hot = Few(np.array([1]), np.array([[0.5]]))
+    >>> Charge(np.zeros((1, 1, 3))).plus(hot).values.tolist()
+    [[[0.0, 0.5, 0.0]]]
+    """
 
     pixels: NDArray[np.intp]
     charge: Array
@@ -142,6 +161,9 @@ class Charge:
     not linear in the frame, of the line with its mean and first moment.  An effect that changes charge otherwise than
     by a factor may leave it out.
     tilt: (F, 1, 1) or 0: what rises besides, pixels * tilt.
+
+    >>> Charge(np.array([[[0.2, 0.4]]])).scaled(0.5).values.tolist()
+    [[[0.1, 0.2]]]
     """
 
     pixels: Array
@@ -200,6 +222,9 @@ class Shift:
     with 1 for F, H or W; a field that differs from pixel to pixel is taken in single precision.
     Within frames (`sway`): either (F, H, n), with 1 for F or H, at the n moments asked for.
     Either may be a number.  Of several effects the factors multiply and the millivolts add.
+
+    >>> Shift(millivolts=2.0)
+    Shift(factor=1.0, millivolts=2.0)
     """
 
     factor: Array | float = 1.0
@@ -217,6 +242,9 @@ class Feedback(NamedTuple):
     twice at one moment: what would make it is lost.  At the end of the frame every pixel gets `kick` for each of its
     four neighbours that fired, and one that fired gets left (1 - exp(-T/left_tau)), T the interval that has ended.
     Thresholds of a row are times 1 + droop a, a the share of it that fired in the frame before.
+
+    >>> Feedback(lost_per_rate=0.1).lost(np.array([0.0, 0.5])).tolist()
+    [0.0, 0.05]
     """
 
     lost_per_root_rate: float = 0.0
@@ -239,6 +267,10 @@ class Bend(NamedTuple):
     mean: charge of the frame.  uneven: the largest distance of the light at any moment from it [thresholds a frame].
     moved: charge that comes at another time than if it came evenly.  bent: the largest distance of the light from the
     straight line with its mean and first moment [thresholds a frame]; off_line: the integral of that distance.
+
+    >>> even = Bend(np.full((2, 2), 0.2), *np.zeros((4, 2, 2)))
+    >>> float(even.mean.max()), float(even.uneven.max())
+    (0.2, 0.0)
     """
 
     mean: Array
@@ -253,6 +285,11 @@ class Effect:
     """Base of all effects; every hook here does nothing.  Charge is in thresholds of each pixel.
 
     strength: the parameter that says how strong the effect is.  neutral: its value at which no bit changes.
+
+    >>> from spikecam_env.sensor import CATALOGUE
+    >>> effect = CATALOGUE["dead_time"](tau_us=0.2)
+    >>> effect.stage.name, effect.parameters(), effect.neutralised()
+    ('RESET', {'tau_us': 0.2}, DeadTime(tau_us=0.0))
     """
 
     stage: ClassVar[Stage]
@@ -374,17 +411,30 @@ FRAME_HOOKS = ("begin", *BLOCK_HOOKS, *SPIKE_HOOKS)
 
 
 def effect_name(class_name: str) -> str:
-    """The name of an effect by that of its class: DeadTime is dead_time."""
+    """The name of an effect by that of its class: DeadTime is dead_time.
+
+    >>> effect_name("DeadTime")
+    'dead_time'
+    """
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", class_name).lower()
 
 
 def having(hook: str, effects: Sequence[Effect]) -> list[Effect]:
-    """The effects with a hook of their own of that name."""
+    """The effects with a hook of their own of that name.
+
+    >>> from spikecam_env.sensor import CATALOGUE
+    >>> [effect.name for effect in having("image", [CATALOGUE["optical_blur"](), CATALOGUE["dead_time"]()])]
+    ['optical_blur']
+    """
     return [effect for effect in effects if effect.overrides(hook)]
 
 
 def neighbour_sum(values: Array) -> Array:
-    """Sum over each pixel's four neighbours (..., H, W); beyond the edge there is nothing."""
+    """Sum over each pixel's four neighbours (..., H, W); beyond the edge there is nothing.
+
+    >>> neighbour_sum(np.ones((3, 3))).tolist()
+    [[2.0, 3.0, 2.0], [3.0, 4.0, 3.0], [2.0, 3.0, 2.0]]
+    """
     total = np.zeros_like(values)
     total[..., 1:, :] += values[..., :-1, :]
     total[..., :-1, :] += values[..., 1:, :]
@@ -394,7 +444,11 @@ def neighbour_sum(values: Array) -> Array:
 
 
 def check_parts(effects: Sequence[Effect], frame_rate_hz: float) -> None:
-    """Raise InputError for a reference that moves too fast within a frame."""
+    """Raise InputError for a reference that moves too fast within a frame.
+
+    >>> from spikecam_env.sensor import CATALOGUE
+    >>> check_parts([CATALOGUE["supply_ripple"](frequency_hz=50.0)], frame_rate_hz=40_000.0)  # slow: no error
+    """
     for effect in effects:
         parts = effect.parts(frame_rate_hz)
         if parts > MOST_PARTS:
@@ -406,7 +460,12 @@ def check_parts(effects: Sequence[Effect], frame_rate_hz: float) -> None:
 
 
 def build(catalogue: dict[str, type[Effect]], name: str, parameters: dict[str, Any]) -> Effect:
-    """Make an effect from its name and parameters; raises InputError for a name or parameter that is not there."""
+    """Make an effect from its name and parameters; raises InputError for a name or parameter that is not there.
+
+    >>> from spikecam_env.sensor import CATALOGUE
+    >>> build(CATALOGUE, "dead_time", {"tau_us": 0.2})
+    DeadTime(tau_us=0.2)
+    """
     if name not in catalogue:
         raise unknown_name("effect", name, catalogue)
     allowed = {f.name for f in dataclasses.fields(catalogue[name])}

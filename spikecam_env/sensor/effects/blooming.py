@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Array, Charge, Effect, Exposure, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -50,7 +50,7 @@ class Blooming(Effect):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _spill_over(x, half, share, full, out):  # type: ignore[no-untyped-def]
+def _spill_over(x: Array, half: Array, share: float, full: float, out: Array) -> None:
     """out (F, H, W), overwritten: the charge x, half more or less at a frame's ends, with what flows over."""
     frames, rows, columns = x.shape
     spill = np.zeros((rows + 2, columns + 2))  # beyond the edge there is nothing

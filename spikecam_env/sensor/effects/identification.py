@@ -13,7 +13,12 @@ from enum import Enum, auto
 
 
 class Needs(Enum):
-    """What recordings an effect needs, to be seen at all."""
+    """What recordings an effect needs, to be seen at all.
+
+    >>> from spikecam_env.sensor import CATALOGUE
+    >>> sorted(name for name, effect in CATALOGUE.items() if effect.identification.needs is Needs.DARK)
+    ['dark_current', 'dark_current_drift', 'dark_current_spread', 'dark_current_tail', 'hot_pixels']
+    """
 
     NOTHING = auto()
     MOTION = auto()
@@ -58,6 +63,11 @@ class Identification:
     start_with: of these, those that show as little without it there, and values of parameters, its own and theirs, from
     which both are fitted at once.
     experiment: what would distinguish it from others that do the same.
+
+    >>> from spikecam_env.sensor import CATALOGUE
+    >>> known = CATALOGUE["photodiode_lag"].identification
+    >>> known.family, known.fitted, known.needs.name
+    ('lag', ('fraction', 'tau_us'), 'MOTION')
     """
 
     family: str = "other"

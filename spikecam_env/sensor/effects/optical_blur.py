@@ -41,7 +41,9 @@ class OpticalBlur(Effect):
         if self.sigma_pixels < _NO_BLUR:
             return radiance
         kernel = gaussian_weights(self.sigma_pixels)
-        return convolve1d(convolve1d(radiance, kernel, axis=0, mode="nearest"), kernel, axis=1, mode="nearest")
+        columns: NDArray[np.float32] = convolve1d(radiance, kernel, axis=0, mode="nearest")
+        blurred: NDArray[np.float32] = convolve1d(columns, kernel, axis=1, mode="nearest")
+        return blurred
 
 
 @lru_cache(maxsize=64)

@@ -70,7 +70,7 @@ def _flat(values: Array, shape: tuple[int, int, int]) -> Array:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _follow(x, d, fraction, law, slow, mean, rise):  # type: ignore[no-untyped-def]
+def _follow(x: Array, d: Array, fraction: float, law: tuple[float, ...], slow: Array, mean: Array, rise: Array) -> None:
     """mean, rise (F, P), overwritten: charge of which a part is late.  x, d: (F or 1, P).  slow (P,): what lags.
 
     What lags is s(t) = L(t) - d tau + (s - x + d/2 + d tau) exp(-t/tau).

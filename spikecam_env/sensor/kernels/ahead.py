@@ -139,9 +139,9 @@ def same_light(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def _same_words(a, b):  # type: ignore[no-untyped-def]
-    use_widest_vectors()  # type: ignore[call-arg]
+def _same_words(a: NDArray[np.uint32], b: NDArray[np.uint32]) -> bool:
+    use_widest_vectors()
     different = np.uint32(0)
     for i in range(a.size):
         different |= np.uint32(a[i] ^ b[i])
-    return different == 0
+    return different == 0  # type: ignore[no-any-return]

@@ -212,7 +212,7 @@ def _block(
     feedback = _sum([e.feedback(now) for e in effects])
     light = light if light.few is None else Charge(light.values)
     few = dark.few or _NOBODY
-    work = (
+    work: tuple[Any, ...] = (
         now.number,
         now.shape[1],
         _pixels(light),

@@ -21,8 +21,10 @@ from __future__ import annotations
 
 import math
 from heapq import heappop, heappush
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.crossing import MOST_AGAIN, NEVER, crossing_between
@@ -30,6 +32,25 @@ from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
 from spikecam_env.sensor.light import on_grid as rounded
+
+Doubles = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Words = NDArray[np.uint32]
+Bytes = NDArray[np.uint8]
+Places = NDArray[np.int64]
+Polynomial = tuple[np.float32, ...]
+Reset = tuple[float, ...]
+"""The first three numbers of `Feedback`: per_root_rate, per_rate, kept."""
+Band = tuple[Places, Places, Places, Places]
+"""Of its lines: row, first pixel, width, place; see `laid_out`."""
+Waves = tuple[Doubles, Doubles]
+"""Factor and common [mV] at the nodes."""
+OfPixel = tuple[float, float, float]
+"""Its field [mV], grains_per_mV, its load."""
+Wave = tuple[Doubles, Doubles, Doubles, OfPixel]
+"""Of one pixel: nodes, factor and common there, and what is its own."""
+OfFew = tuple[Doubles, Doubles, Doubles, Doubles, Doubles]
+"""Light, dark, their factors (n,), and what comes besides (F, n)."""
 
 BAND = 1024
 """Pixels of a band: what is worked on frame after frame stays in the processor's cache."""
@@ -70,7 +91,9 @@ _INSIDE = BAND - 1  # a group's start masked with it is plainly not negative: nu
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def ramp_charge(level, curve, rest, first, out):  # type: ignore[no-untyped-def]
+def ramp_charge(
+    level: NDArray[np.int32], curve: NDArray[np.int32], rest: NDArray[np.int32], first: int, out: Doubles
+) -> None:
     """Charge of frames first .. of a key interval: out (F, P) float64 [thresholds], overwritten; see `light.Ramp`."""
     frames, pixels = out.shape
     for t in range(frames):
@@ -86,37 +109,37 @@ def ramp_charge(level, curve, rest, first, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def advance(  # type: ignore[no-untyped-def]
-    top,
-    bottom,
-    number,
-    columns,
-    light,
-    dark,
-    few,
-    extra,
-    light_factor,
-    dark_factor,
-    factor,
-    common,
-    field,
-    grains_per_mV,
-    at,
-    swayed_factor,
-    swayed_common,
-    feedback,
-    per_electron,
-    kappa_squared,
-    polynomial,
-    seed_low,
-    seed_high,
-    charge,
-    threshold,
-    fired,
-    activity,
-    crossing,
-    spikes,
-):
+def advance(
+    top: int,
+    bottom: int,
+    number: int,
+    columns: int,
+    light: Doubles,
+    dark: Doubles,
+    few: Places,
+    extra: Doubles,
+    light_factor: Doubles,
+    dark_factor: Doubles,
+    factor: Doubles,
+    common: Doubles,
+    field: Singles,
+    grains_per_mV: Doubles,
+    at: Doubles,
+    swayed_factor: Doubles,
+    swayed_common: Doubles,
+    feedback: tuple[float, ...],
+    per_electron: Doubles,
+    kappa_squared: Doubles,
+    polynomial: Polynomial,
+    seed_low: np.uint32,
+    seed_high: np.uint32,
+    charge: Doubles,
+    threshold: Doubles,
+    fired: Words,
+    activity: Doubles,
+    crossing: Doubles,
+    spikes: Bytes,
+) -> None:
     """Frames `number` .. of the rows top .. bottom.  F frames, H rows of `columns` pixels, P pixels in all.
 
     light, dark: (F or 1, P) [thresholds]; extra: (F, n), what the pixels few (n,), ascending, get in the dark besides.
@@ -294,19 +317,19 @@ def advance(  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def gets(light, dark):  # type: ignore[no-untyped-def]
+def gets(light: float, dark: float) -> float:
     """Charge [grains] of a pixel in one frame, of light and dark [thresholds], neither of which takes any away."""
-    return on_grid(min((max(light, 0.0) + max(dark, 0.0)) * _G, _MOST))
+    return on_grid(min((max(light, 0.0) + max(dark, 0.0)) * _G, _MOST))  # type: ignore[no-any-return]
 
 
 @njit(inline="always")
-def differ(values):  # type: ignore[no-untyped-def]
+def differ(values: Doubles) -> bool:
     """Whether any frame's differ from the first's."""
     return bool((values != values[0]).any())
 
 
 @njit(inline="always")
-def laid_out(top, bottom, columns, pieces, lines, pitch):  # type: ignore[no-untyped-def]
+def laid_out(top: int, bottom: int, columns: int, pieces: int, lines: int, pitch: int) -> Band:
     """Each line's row, its first pixel, how many it has, and its place in a band of so many lines."""
     line = np.arange((bottom - top) * pieces)
     rows, starts = top + line // pieces, line % pieces * BAND
@@ -314,20 +337,30 @@ def laid_out(top, bottom, columns, pieces, lines, pitch):  # type: ignore[no-unt
 
 
 @njit(inline="always")
-def copy(values, out):  # type: ignore[no-untyped-def]
+def copy(values: NDArray[Any], out: NDArray[Any]) -> None:
     for j in range(out.size):
         out[j] = values[j]
 
 
 @njit(inline="always")
-def arrive(light, dark, light_factor, dark_factor, out):  # type: ignore[no-untyped-def]
+def arrive(light: Doubles, dark: Doubles, light_factor: float, dark_factor: float, out: Doubles) -> None:
     """Charge of a row in one frame [grains]."""
     for j in range(out.size):
         out[j] = gets(light[j] * light_factor, dark[j] * dark_factor)
 
 
 @njit(inline="always")
-def references(grains_per_mV, field, phi, factor, common, load, moved, stands, limit):  # type: ignore[no-untyped-def]
+def references(
+    grains_per_mV: Doubles,
+    field: Singles,
+    phi: Doubles,
+    factor: float,
+    common: float,
+    load: float,
+    moved: Doubles,
+    stands: Doubles,
+    limit: Doubles,
+) -> None:
     """Of a line in one frame [grains]: what moves the references, where they stand at a reset, where pixels fire."""
     for j in range(limit.size):
         moved[j] = grains_per_mV[j] * (common + field[j])
@@ -338,7 +371,7 @@ def references(grains_per_mV, field, phi, factor, common, load, moved, stands, l
 
 
 @njit(inline="always")
-def collect(held, arrives, limit, used, hit):  # type: ignore[no-untyped-def]
+def collect(held: Doubles, arrives: Doubles, limit: Doubles, used: int, hit: Bytes) -> None:
     """One frame's charge; hit: whose reaches the limit."""
     for j in range(used):
         c = held[j] + arrives[j]
@@ -347,7 +380,7 @@ def collect(held, arrives, limit, used, hit):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def find_live(eights, groups, live):  # type: ignore[no-untyped-def]
+def find_live(eights: NDArray[np.uint64], groups: int, live: Places) -> int:
     """List the groups in which a pixel fires; returns their number."""
     n = 0
     for g in range(groups):
@@ -357,7 +390,16 @@ def find_live(eights, groups, live):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_high):  # type: ignore[no-untyped-def]
+def wake(
+    x: Doubles,
+    words: Words,
+    live: Places,
+    groups: int,
+    per_electron: Doubles,
+    kappa_squared: Doubles,
+    seed_low: np.uint32,
+    seed_high: np.uint32,
+) -> None:
     """What a pixel's spikes need, in the groups where one fires for the first time: its noise and its keys."""
     for g in range(groups):
         q = live[g] & _INSIDE
@@ -372,7 +414,7 @@ def wake(x, words, live, groups, per_electron, kappa_squared, seed_low, seed_hig
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire(x, words, hit, live, groups, reset, polynomial):  # type: ignore[no-untyped-def]
+def fire(x: Doubles, words: Words, hit: Bytes, live: Places, groups: int, reset: Reset, polynomial: Polynomial) -> int:
     """Reset the pixels that fire, draw their next thresholds; returns how many are at these already.
 
     x, words, hit: the scratch, as float64, uint32 and, of row HIT alone, uint8.
@@ -402,7 +444,7 @@ def fire(x, words, hit, live, groups, reset, polynomial):  # type: ignore[no-unt
 
 
 @njit(inline="always")
-def find_due(x, words, live, groups):  # type: ignore[no-untyped-def]
+def find_due(x: Doubles, words: Words, live: Places, groups: int) -> None:
     """Mark the pixels of live groups that are at their limit."""
     for g in range(groups):
         q = live[g] & _INSIDE
@@ -411,7 +453,7 @@ def find_due(x, words, live, groups):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire_due(x, words, live, groups, reset, polynomial):  # type: ignore[no-untyped-def]
+def fire_due(x: Doubles, words: Words, live: Places, groups: int, reset: Reset, polynomial: Polynomial) -> int:
     """As `fire`, of the pixels that are due; what is kept of the others is as it was, as after a spike before it in the
     frame.  Lists the groups in which some are at their limit again, and returns their number.
 
@@ -446,9 +488,21 @@ def fire_due(x, words, live, groups, reset, polynomial):  # type: ignore[no-unty
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire_within(  # type: ignore[no-untyped-def]
-    x, words, hit, live, groups, band, at, waves, field, grains_per_mV, loads, reset, polynomial
-):
+def fire_within(
+    x: Doubles,
+    words: Words,
+    hit: Bytes,
+    live: Places,
+    groups: int,
+    band: Band,
+    at: Doubles,
+    waves: Waves,
+    field: Singles,
+    grains_per_mV: Doubles,
+    loads: Doubles,
+    reset: Reset,
+    polynomial: Polynomial,
+) -> None:
     """As `fire` and `fire_due`, of a band whose references move within the frame; hit: of those that came near, those
     that fired."""
     seen = words.view(np.uint8)[_SEEN : _SEEN + BAND]
@@ -473,7 +527,17 @@ def fire_within(  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def meet(x, hit, h0, n, near, of_row, field, grains_per_mV, load):  # type: ignore[no-untyped-def]
+def meet(
+    x: Doubles,
+    hit: Bytes,
+    h0: int,
+    n: int,
+    near: Places,
+    of_row: tuple[Doubles, Waves],
+    field: Singles,
+    grains_per_mV: Doubles,
+    load: float,
+) -> None:
     """Of a line of n pixels from place h0 on, those that hit their least limit: who fires, from moment AT on, at which
     moment, at which charge (in LIMIT), and where the reference stands then."""
     at, (factor, common) = of_row
@@ -493,9 +557,19 @@ def meet(x, hit, h0, n, near, of_row, field, grains_per_mV, load):  # type: igno
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire_in_turn(  # type: ignore[no-untyped-def]
-    scratch, bits, lines, at, waves, field, grains_per_mV, loads, kick, reset, polynomial
-):
+def fire_in_turn(
+    scratch: Doubles,
+    bits: Bytes,
+    lines: Places,
+    at: Doubles,
+    waves: Waves,
+    field: Singles,
+    grains_per_mV: Doubles,
+    loads: Doubles,
+    kick: float,
+    reset: Reset,
+    polynomial: Polynomial,
+) -> None:
     """As `fire_within`, of all lines, in the order of moments: each spike kicks its neighbours [grains] at its own.
 
     lines: first pixel, width, band and place of each, (4, L) int64; loads: of each.  bits: (P,), overwritten.
@@ -550,7 +624,7 @@ def fire_in_turn(  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def kicked(x, o, j, kick):  # type: ignore[no-untyped-def]
+def kicked(x: Doubles, o: int, j: int, kick: float) -> None:
     """Give a pixel charge [grains] that brings no shot noise: its threshold loses that of as many electrons."""
     noise, jitter = x[o + _NOISE + j], x[o + _JITTER + j]
     x[o + _HELD + j] += kick
@@ -561,21 +635,23 @@ def kicked(x, o, j, kick):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def place_of(row, column, pieces, lines):  # type: ignore[no-untyped-def]
+def place_of(row: int, column: int, pieces: int, lines: Places) -> tuple[int, int]:
     """A pixel's band, where its scratch begins, and its place in it."""
     line = row * pieces + column // BAND
     return lines[2, line], lines[3, line] + column % BAND
 
 
 @njit(inline="always")
-def row_waves(row, waves):  # type: ignore[no-untyped-def]
+def row_waves(row: int, waves: Waves) -> Waves:
     """Of one row: factor and common (n,) at its nodes."""
     factor, common = waves
     return factor[row if len(factor) > 1 else 0], common[row if len(common) > 1 else 0]
 
 
 @njit(inline="always")
-def pixel_law(p, columns, at, waves, field, grains_per_mV, loads):  # type: ignore[no-untyped-def]
+def pixel_law(
+    p: int, columns: int, at: Doubles, waves: Waves, field: Singles, grains_per_mV: Doubles, loads: Doubles
+) -> Wave:
     """How one pixel's reference moves: nodes, factor and common there, field, grains_per_mV, load."""
     row = p // columns
     factor, common = row_waves(row, waves)
@@ -583,14 +659,16 @@ def pixel_law(p, columns, at, waves, field, grains_per_mV, loads):  # type: igno
 
 
 @njit(inline="always")
-def limit_at(phi, factor, common, of_pixel):  # type: ignore[no-untyped-def]
+def limit_at(phi: float, factor: float, common: float, of_pixel: OfPixel) -> float:
     """What a threshold [grains] is compared with, however low; of_pixel: its field [mV], grains_per_mV, its load."""
     field, grains_per_mV, load = of_pixel
     return (phi * factor + grains_per_mV * (common + field)) * load
 
 
 @njit(inline="always")
-def next_crossing(x, o, j, since, at, factor, common, of_pixel):  # type: ignore[no-untyped-def]
+def next_crossing(
+    x: Doubles, o: int, j: int, since: float, at: Doubles, factor: Doubles, common: Doubles, of_pixel: OfPixel
+) -> tuple[float, float]:
     """`crossing.first_crossing` of place j of the scratch that begins at o, whose charge is up to its least limit by
     the end of the frame: looked for from the node on before which it is not up to that."""
     held, gained, phi, least = x[o + _HELD + j], x[o + _ARRIVES + j], x[o + _PHI + j], x[o + _LIMIT + j]
@@ -611,7 +689,7 @@ def next_crossing(x, o, j, since, at, factor, common, of_pixel):  # type: ignore
 
 
 @njit(inline="always")
-def stands_at(moment, at, factor, common, of_pixel):  # type: ignore[no-untyped-def]
+def stands_at(moment: float, at: Doubles, factor: Doubles, common: Doubles, of_pixel: OfPixel) -> float:
     """Where the reference of the nominal threshold stands at a moment [grains]."""
     last = at.size - 1
     k = int(moment * last)
@@ -626,7 +704,17 @@ def stands_at(moment, at, factor, common, of_pixel):  # type: ignore[no-untyped-
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def spike(x, words, o, j, moment, taken, wave, reset, polynomial):  # type: ignore[no-untyped-def]
+def spike(
+    x: Doubles,
+    words: Words,
+    o: int,
+    j: int,
+    moment: float,
+    taken: float,
+    wave: Wave,
+    reset: Reset,
+    polynomial: Polynomial,
+) -> None:
     """Reset a pixel that fires at that moment, and draw its next threshold; the law is that of `fire`."""
     per_root_rate, per_rate, kept = reset
     at, factor, common, of_pixel = wave
@@ -643,7 +731,19 @@ def spike(x, words, o, j, moment, taken, wave, reset, polynomial):  # type: igno
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def stay(x, words, hit, live, groups, end, left, left_tau, once_more, reset, polynomial):  # type: ignore[no-untyped-def]
+def stay(
+    x: Doubles,
+    words: Words,
+    hit: Bytes,
+    live: Places,
+    groups: int,
+    end: float,
+    left: float,
+    left_tau: float,
+    once_more: bool,
+    reset: Reset,
+    polynomial: Polynomial,
+) -> None:
     """What stays on the photodiode at the resets of the pixels that fired; end: of the frame.  once_more: whether it
     may take them to their threshold again: where references move within the frame, it does in the next one."""
     draws = x.view(np.float32)
@@ -666,7 +766,9 @@ def stay(x, words, hit, live, groups, end, left, left_tau, once_more, reset, pol
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def cross_again(x, words, j, end, left, left_tau, reset, polynomial):  # type: ignore[no-untyped-def]
+def cross_again(
+    x: Doubles, words: Words, j: int, end: float, left: float, left_tau: float, reset: Reset, polynomial: Polynomial
+) -> None:
     """Resets of a pixel that what stayed takes to its threshold once more, MOST_AGAIN at most, in the frame whose bit
     is set already; the law is that of `fire` and `stay`."""
     per_root_rate, per_rate, kept = reset
@@ -689,7 +791,19 @@ def cross_again(x, words, j, end, left, left_tau, reset, polynomial):  # type: i
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_tau, spikes):  # type: ignore[no-untyped-def]
+def jump(
+    x: Doubles,
+    words: Words,
+    live: Places,
+    groups: int,
+    of_few: OfFew,
+    reset: Reset,
+    polynomial: Polynomial,
+    number: int,
+    left: float,
+    left_tau: float,
+    spikes: Bytes,
+) -> None:
     """All frames of a band in which every pixel goes its own way: from what happens to it to what happens next, that it
     fires or gets something else.  spikes: (F, P), set where a pixel fires.
 
@@ -761,7 +875,7 @@ def jump(x, words, live, groups, of_few, reset, polynomial, number, left, left_t
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def note(x, words, live, groups, of_few, spikes):  # type: ignore[no-untyped-def]
+def note(x: Doubles, words: Words, live: Places, groups: int, of_few: OfFew, spikes: Bytes) -> int:
     """What happened to the pixels of live groups: a spike where they are due, else another charge from here on.  Lists
     the groups in which something may happen yet, and returns their number."""
     light, dark, light_factor, dark_factor, extra = of_few
@@ -786,7 +900,7 @@ def note(x, words, live, groups, of_few, spikes):  # type: ignore[no-untyped-def
 
 
 @njit(inline="always")
-def stays_until(extra, i, at):  # type: ignore[no-untyped-def]
+def stays_until(extra: Doubles, i: int, at: int) -> int:
     """The frame in which what comes besides (F, n) to one of few is no longer what it is in frame `at`; F if none."""
     until = at + 1
     while until < extra.shape[0] and extra[until, i] == extra[at, i]:
@@ -795,13 +909,15 @@ def stays_until(extra, i, at):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def drawn(first, second, number, polynomial):  # type: ignore[no-untyped-def]
+def drawn(first: np.uint32, second: np.uint32, number: np.uint32, polynomial: Polynomial) -> float:
     """The draw of a pixel of these keys for its spike of that number: standardised."""
-    return standard(_U(first + _U(number * GOLDEN)), second, polynomial)
+    return standard(_U(first + _U(number * GOLDEN)), second, polynomial)  # type: ignore[no-any-return]
 
 
 @njit(inline="always")
-def after_reset(over, rate, limit, per_root_rate, per_rate, kept):  # type: ignore[no-untyped-def]
+def after_reset(
+    over: float, rate: float, limit: float, per_root_rate: float, per_rate: float, kept: float
+) -> tuple[float, float]:
     """Charge after a reset [grains], and how many electrons the next spike still needs [thresholds].
 
     Those up to the limit: light that falls while the node is held never reaches it, nor does its noise; of charge
@@ -813,13 +929,13 @@ def after_reset(over, rate, limit, per_root_rate, per_rate, kept):  # type: igno
 
 
 @njit(inline="always")
-def needed(electrons, per_electron, kappa_squared, draw):  # type: ignore[no-untyped-def]
+def needed(electrons: float, per_electron: float, kappa_squared: float, draw: float) -> float:
     """The threshold [grains] whose charge is spread as that of so many electrons [thresholds] and the reset."""
     return _G + _G * math.sqrt(max(electrons, 0.0) * per_electron + kappa_squared) * draw
 
 
 @njit(inline="always")
-def count_neighbours(bits, row, columns, around):  # type: ignore[no-untyped-def]
+def count_neighbours(bits: Bytes, row: int, columns: int, around: Bytes) -> None:
     """How many of the four neighbours of each pixel of a row fired: around (columns,), overwritten."""
     here = bits[row * columns : (row + 1) * columns]
     around[:] = 0
@@ -832,13 +948,13 @@ def count_neighbours(bits, row, columns, around):  # type: ignore[no-untyped-def
 
 
 @njit(inline="always")
-def add(values, out):  # type: ignore[no-untyped-def]
+def add(values: Bytes, out: Bytes) -> None:
     for j in range(values.size):
         out[j] += values[j]
 
 
 @njit(inline="always")
-def couple(kick, around, charge):  # type: ignore[no-untyped-def]
+def couple(kick: float, around: Bytes, charge: Doubles) -> None:
     """Charge [grains] with what the neighbours that fired couple in."""
     for j in range(charge.size):
         charge[j] = (charge[j] / _G + kick * around[j]) * _G

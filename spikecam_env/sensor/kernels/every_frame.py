@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from numba.np.numpy_support import carray
+from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels.intrinsics import pointer_to, prefetch, take_ticket, use_widest_vectors
@@ -70,7 +71,7 @@ from spikecam_env.sensor.light import GRAINS
 AT_ONCE = 4
 """Frames at a time, and charges of each pixel that are ready."""
 
-LOOP = 0xA341DDCE
+LOOP = 0xBE0A1089
 """Checksum of the file of `loop`, of which much is compiled in: numba's cache sees a change of this file, not of those
 it imports from."""
 
@@ -247,9 +248,17 @@ def take_back(s: Any, bit: Any, word: Any) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ignore[no-untyped-def]
+def advance(
+    worker: int,
+    tickets: NDArray[np.int64],
+    cameras: NDArray[np.int64],
+    bands: NDArray[np.int32],
+    pieces: NDArray[np.int64],
+    dense: float,
+    packed: bool,
+) -> None:
     """As `loop.advance`, with the same bits; of what is dense it makes no use."""
-    use_widest_vectors()  # type: ignore[call-arg]
+    use_widest_vectors()
     room = np.empty(_SCRATCH + 16, np.int32)
     begin = (-room.ctypes.data % 64) // 4
     s = room[begin : begin + _SCRATCH]

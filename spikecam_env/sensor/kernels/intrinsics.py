@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Concatenate, ParamSpec, cast
 
 from llvmlite import ir
 from numba import types
@@ -11,8 +12,15 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 from numpy.typing import NDArray
 
+Given = ParamSpec("Given")
 
-@intrinsic  # type: ignore[untyped-decorator]
+
+def instruction(function: Callable[Concatenate[Any, Given], Any]) -> Callable[Given, Any]:
+    """numba's `intrinsic`, with the types of a call: its first argument, the typing context, is the compiler's."""
+    return cast(Callable[Given, Any], intrinsic(function))
+
+
+@instruction
 def use_widest_vectors(typing_context: Any) -> Any:
     """Compile the function that calls this with the processor's widest registers.
 
@@ -28,7 +36,7 @@ def use_widest_vectors(typing_context: Any) -> Any:
     return types.void(), mark
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@instruction
 def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
     """The next number of a counter that threads share: adds one to tickets[row, 0] (int64), returns what it was."""
 
@@ -41,7 +49,7 @@ def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
     return types.int64(tickets, types.int64), fetch_and_add
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@instruction
 def pointer_to(typing_context: Any, address: Any, kind: Any) -> Any:
     """The pointer to numbers of this kind (np.float32, ...) at an address: for `numba.carray`.
 
@@ -55,7 +63,7 @@ def pointer_to(typing_context: Any, address: Any, kind: Any) -> Any:
     return pointer(address, kind), cast
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@instruction
 def prefetch(typing_context: Any, address: Any) -> Any:
     """Ask for the line of cache at an address, which will soon be read; any address will do."""
 
@@ -71,7 +79,7 @@ def prefetch(typing_context: Any, address: Any) -> Any:
     return types.void(types.int64), ask
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@instruction
 def two_at(typing_context: Any, address: Any) -> Any:
     """The two uint32 at an address, the first in the lower half of a uint64 (little-endian processors): one read."""
 

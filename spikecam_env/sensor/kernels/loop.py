@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 from numba.np.numpy_support import carray
+from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels.intrinsics import pointer_to, take_ticket, use_widest_vectors
@@ -334,7 +335,15 @@ LIGHT0, LIGHT1, LENGTH, FIRST, COUNT = range(5)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ignore[no-untyped-def]
+def advance(
+    worker: int,
+    tickets: NDArray[np.int64],
+    cameras: NDArray[np.int64],
+    bands: NDArray[np.int32],
+    pieces: NDArray[np.int64],
+    dense: float,
+    packed: bool,
+) -> None:
     """Frames of one or more cameras, for the bands of tiles that this thread gets hold of.
 
     worker: which of the threads at work this is.  tickets: int64 (threads, 8), shared: in [:, 0] the next band of each
@@ -351,7 +360,7 @@ def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ig
     packed: out is uint8 (F, ceil(P/8)), pixel p is bit p % 8 of byte p // 8; or else
         uint64 (F, ceil(P/8)), pixel p is byte p % 8 of word p // 8, 0 or 1.
     """
-    use_widest_vectors()  # type: ignore[call-arg]
+    use_widest_vectors()
     s = np.empty(SCRATCH, np.int32)
     f = s.view(np.float32)
     live = np.empty(TILE // GROUP + 1, np.int64)
@@ -440,9 +449,9 @@ def advance(worker, tickets, cameras, bands, pieces, dense, packed):  # type: ig
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def unpack(packed, spikes):  # type: ignore[no-untyped-def]
+def unpack(packed: NDArray[np.uint8], spikes: NDArray[np.uint64]) -> None:
     """Bytes (n,) of bits, least significant first, to 0/1 in bytes: `spikes` is (n,) uint64, eight pixels to a word."""
-    use_widest_vectors()  # type: ignore[call-arg]
+    use_widest_vectors()
     for i in range(packed.size):
         w = _Q(packed[i])
         w = (w | (w << _Q(28))) & _Q(0x0000000F0000000F)

@@ -44,7 +44,7 @@ def _of_keys(
 
 
 @njit(cache=True, nogil=True)
-def _at_keys(rows, address, size):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _at_keys(rows: NDArray[np.int64], address: int, size: int) -> NDArray[np.int64]:
     """Rows of `cuts` as pieces of `loop.advance`, the keys' pictures lying from an address on, `size` bytes from one to
     the next; none where a row needs a picture that is no key's."""
     pieces = np.empty((len(rows), loop.PIECE_COLUMNS), np.int64)

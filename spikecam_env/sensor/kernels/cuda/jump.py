@@ -7,7 +7,7 @@ likes: integers decide on which side of it the crossing lies.
 Import it only where Triton is: it comes with CUDA builds of torch.
 """
 
-# Triton reads its annotations: no `from __future__ import annotations` here.
+# Triton reads its annotations: no `from __future__ import annotations` here, and no types of arguments.
 import torch
 import triton
 import triton.language as tl
@@ -53,8 +53,8 @@ def advance(state: BatchState, segment: BatchSegment, out: torch.Tensor) -> None
     )
 
 
-@triton.jit(do_not_specialize=["count"])
-def advance_kernel(
+@triton.jit(do_not_specialize=["count"])  # type: ignore[untyped-decorator]
+def advance_kernel(  # type: ignore[no-untyped-def]
     radiance0,
     radiance1,
     light_stride,
@@ -121,18 +121,18 @@ def advance_kernel(
 
 
 @triton.jit
-def grains_per_frame(radiance, gain, dark):
+def grains_per_frame(radiance, gain, dark):  # type: ignore[no-untyped-def]
     return (tl.minimum(radiance * gain + dark, _CAP) + 0.5).to(tl.int32)
 
 
 @triton.jit
-def collected(level, curve, rest, k):
+def collected(level, curve, rest, k):  # type: ignore[no-untyped-def]
     square = k * k
     return level * k + curve * square + ((rest * square) >> 18)
 
 
 @triton.jit
-def nearest_frame(level, curve, rest, x):
+def nearest_frame(level, curve, rest, x):  # type: ignore[no-untyped-def]
     a = level.to(tl.float32)
     b = curve.to(tl.float32) + rest.to(tl.float32) * _PER_REST
     twice_x = 2.0 * x.to(tl.float32)
@@ -141,7 +141,7 @@ def nearest_frame(level, curve, rest, x):
 
 
 @triton.jit
-def drawn(counter, key, spread, polynomial):
+def drawn(counter, key, spread, polynomial):  # type: ignore[no-untyped-def]
     x = bell(counter, key)
     z = tl.load(polynomial + 7)
     for i in tl.static_range(6, -1, -1):
@@ -150,7 +150,7 @@ def drawn(counter, key, spread, polynomial):
 
 
 @triton.jit
-def bell(counter, key):
+def bell(counter, key):  # type: ignore[no-untyped-def]
     h1 = scramble(counter)
     h2 = scramble(h1 ^ key)
     fine = (byte_sum(h2, h1 + h2) << 8) | (h1 >> 24)
@@ -158,13 +158,13 @@ def bell(counter, key):
 
 
 @triton.jit
-def byte_sum(a, b):
+def byte_sum(a, b):  # type: ignore[no-untyped-def]
     t = (a & 0x00FF00FF) + ((a >> 8) & 0x00FF00FF) + (b & 0x00FF00FF) + ((b >> 8) & 0x00FF00FF)
     return (t & 0xFFFF) + (t >> 16)
 
 
 @triton.jit
-def scramble(x):
+def scramble(x):  # type: ignore[no-untyped-def]
     x = (x ^ (x >> 16)) * 0x21F0AAAD
     x = (x ^ (x >> 15)) * 0x735A2D97
     return x ^ (x >> 15)
