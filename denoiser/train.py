@@ -34,6 +34,7 @@ from denoiser.training_record import training_record
 from denoiser.weights import load_weights, pretrained_path, save_weights
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.torch_settings import torch_settings
 
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 8
@@ -113,8 +114,11 @@ def train(config: TrainConfig, *, progress: bool = True) -> Path:
     Raises InputError where `out` holds the run of another mode, or a damaged one, and where `start` is of another
     network.
     """
-    torch.set_num_threads(config.threads)
-    torch.manual_seed(config.seed)
+    with torch_settings(config.threads, config.seed):
+        return _trained(config, progress)
+
+
+def _trained(config: TrainConfig, progress: bool) -> Path:
     config.out.mkdir(parents=True, exist_ok=True)
     recipe = replace(recipe_of(config.mode), refine=config.refine)
     device = torch.device(config.device)

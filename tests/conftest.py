@@ -2,7 +2,7 @@
 
 Two processes that test have a core each, so BLAS and torch take one thread in each, and in what these start: a second
 one that waits spins, on the other's core.  A solve of 128 equations then takes 27 times the processor time, on two busy
-cores.
+cores.  What sets torch's threads for a while sets them back: one test that did not would slow all that come after.
 
 Files with slow tests come first: two processes that take file after file end together, not one with a long file last.
 """
@@ -10,7 +10,9 @@ Files with slow tests come first: two processes that take file after file end to
 from __future__ import annotations
 
 import os
+import sys
 from collections import Counter
+from collections.abc import Iterator
 
 import pytest
 
@@ -20,6 +22,18 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # read by OpenBLAS, MKL and torch
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+@pytest.fixture(autouse=True)
+def torch_keeps_its_threads() -> Iterator[None]:
+    """Every test leaves as many as it found."""
+    before = _threads_of_torch()
+    yield
+    assert before in (None, _threads_of_torch()), "torch has other threads than before: use `torch_settings`"
+
+
+def _threads_of_torch() -> int | None:
+    return sys.modules["torch"].get_num_threads() if "torch" in sys.modules else None
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

@@ -34,6 +34,7 @@ from denoiser.training_record import training_record
 from spikecam_env.checked import checked_count, checked_number, checked_seed
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.torch_settings import torch_settings
 
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 64
@@ -107,9 +108,12 @@ def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -
     `minutes` counts from here, the drawing of textures and compilation included.
     Raises InputError where `out` holds the run of another mode or width, or a damaged one.
     """
+    with torch_settings(config.threads, config.seed):
+        return _trained(config, progress)
+
+
+def _trained(config: ReconstructorConfig, progress: bool) -> Path:
     began = time.monotonic()
-    torch.set_num_threads(config.threads)
-    torch.manual_seed(config.seed)
     torch.backends.cudnn.benchmark = True
     config.out.mkdir(parents=True, exist_ok=True)
     lesson = lesson_of(config.recipe())

@@ -8,12 +8,12 @@ OUT/curve.json  rows: steps, processor seconds, episodes, their mean return, per
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import gymnasium
-import torch
 from gymnasium.spaces import Box, Dict
 from gymnasium.vector import VectorEnv
 
@@ -23,6 +23,7 @@ from spikecam_env.agents.policy import Recipe
 from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
 from spikecam_env.errors import unknown_name
+from spikecam_env.torch_settings import torch_settings
 from spikecam_env.whole import write_text_whole
 
 
@@ -122,10 +123,10 @@ def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, 
     True
     """
     ppo = ppo or budget(study)
-    envs, threads = study.make_vec(environments), torch.get_num_threads()
-    torch.set_num_threads(1)  # as many as pay for so small a network
-    try:
-        torch.manual_seed(seed)
+    with (
+        closing(study.make_vec(environments)) as envs,
+        torch_settings(threads=1, seed=seed),  # as many as pay for so small a network
+    ):
         policy = recipe_of(study, envs).network()
         run = Run.begin(policy)
         if (out / "last.pt").exists():
@@ -142,6 +143,3 @@ def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, 
 
         train(envs, run, ppo, seed, save)
         return trained()
-    finally:
-        torch.set_num_threads(threads)
-        envs.close()

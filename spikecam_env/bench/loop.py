@@ -25,6 +25,7 @@ from scenes.disk import RotatingDisk
 from scenes.protocol import Scene
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
 from spikecam_env.sensor import SpikeSensor
+from spikecam_env.torch_settings import torch_settings
 
 BLOCK = 64
 """Frames taken through the loop at a time."""
@@ -66,9 +67,7 @@ def bench_loop(
     Columns: stage, frames/s (wall clock) and x real time (40 000 frames a second), processor ms/frame, of the whole, %
     (processor's time), x the first way (of the denoiser and of the whole, processor's time: medians over blocks).
     """
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads or before)
-    try:
+    with torch_settings(threads):
         scenes: dict[str, Callable[[], Scene]] = {
             "disk": lambda: RotatingDisk(shape),
             SPACE: lambda: make_scene(SPACE, shape),
@@ -77,8 +76,6 @@ def bench_loop(
             f"{name}: scene to denoised rates": loop_table(make(), seconds, engine)
             for name, make in tqdm(scenes.items(), desc="bench", unit="scene", leave=False)
         }
-    finally:
-        torch.set_num_threads(before)
     return tables | {"on a GPU": [{"GPU": _on_a_gpu()}]}
 
 

@@ -17,6 +17,7 @@ from denoiser.online import OnlineDnSS
 from denoiser.recipe import recipe_of
 from scenes import RotatingDisk
 from spikecam_env.sensor import SpikeSensor
+from spikecam_env.torch_settings import torch_settings
 
 SHAPES = ((250, 400), (64, 64))
 STRIDES = (1, 2, 4, 8)
@@ -31,14 +32,13 @@ def bench_online(threads: tuple[int, ...] = (1, 2), seconds: float = 3.0, seed: 
     threads, frames/s, x paper (same size and threads, stride 1), x real time (40 000 frames a second), latency
     [frames].
     """
-    before = torch.get_num_threads()
     engines = ["torch", *(["openvino"] if find_spec("openvino") else [])]
     contestants = [("paper", "torch", stride) for stride in STRIDES]
     contestants += [("best", engine, recipe_of("best").layout.planes) for engine in engines]
     jobs = [(shape, count, *c) for shape in SHAPES for count in threads for c in contestants]
     rows: list[dict[str, Any]] = []
     base = 0.0
-    try:
+    with torch_settings():
         for shape, count, mode, engine, stride in tqdm(jobs, desc="bench", unit="row", leave=False):
             torch.set_num_threads(count)
             options: dict[str, Any] = {"stride": stride} if mode == "paper" else {"engine": engine}
@@ -58,8 +58,6 @@ def bench_online(threads: tuple[int, ...] = (1, 2), seconds: float = 3.0, seed: 
                     "latency, frames": online.latency,
                 }
             )
-    finally:
-        torch.set_num_threads(before)
     return rows
 
 
