@@ -241,9 +241,10 @@ def spikes_on(spikes: ArrayLike | Tensor, device: torch.device) -> Tensor:
             "(frames, rows, columns)"
         )
     there = spikes.to(device)
-    if there.numel() and there.dtype != torch.bool and not 0 <= int(there.min()) <= int(there.max()) <= 1:
+    frames = there.view(torch.uint8)
+    if there.dtype != torch.bool and bool((frames & 0xFE).any()):  # waits for the device, once
         raise InputError(f"spikes run from {int(there.min())} to {int(there.max())}; a stream holds 0 and 1 only")
-    return there.view(torch.uint8) if there.dtype == torch.int8 else there.to(torch.uint8)
+    return frames
 
 
 def unpacked_on(packed: NDArray[np.uint8] | Tensor, shape: tuple[int, int], device: torch.device) -> Tensor:

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from benchmarks import bench_cuda, gpu
+from denoiser.captured import WARM_UPS
 from scenes.disk import RotatingDisk
 from spikecam_env.sensor import SpikeSensorBatch
 
@@ -46,7 +47,13 @@ def test_a_part_without_time_is_left_out():
     assert all(list(row) == ["left out"] for rows in late.values() for row in rows)
 
 
-def test_the_recorded_camera_has_the_bits_of_the_batch():
+def test_the_recorded_camera_has_the_bits_of_the_batch(monkeypatch):
+    def recorded(step, device):
+        for _ in range(WARM_UPS):
+            step()
+        return step
+
+    monkeypatch.setattr(gpu, "captured", recorded)
     scene = RotatingDisk((13, 17), motion_per_key=gpu.EVERY_FRAME)
     camera, batch = gpu.RecordedCamera(scene, CPU), SpikeSensorBatch("scsim", scene.shape, (0,), CPU)
     for block in range(3):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from denoiser.captured import WARM_UPS
 from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
 from spikecam_env.errors import InputError, NotReadyError
@@ -50,6 +51,19 @@ def test_rates_are_those_without_a_device(frames: int, options: dict) -> None:
     worst = apart(rates(online(**options), spikes, 13), rates(online(None, **plain), spikes, 13))
     print(f"{frames} frames: {worst:.1e} apart")
     assert worst < ROUNDING
+
+
+def test_what_a_recording_runs_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a GPU does it: the pass is run some times, and then once more at each replay."""
+
+    def recorded(step, device):
+        for _ in range(WARM_UPS + 1):
+            step()
+        return lambda: step().clone()
+
+    monkeypatch.setattr("denoiser.on_device.captured", recorded)
+    spikes = stream(101)
+    np.testing.assert_array_equal(rates(online(engine="captured"), spikes, 13), rates(online(), spikes, 13))
 
 
 def test_the_cutting_of_a_stream_changes_no_bit() -> None:
@@ -122,7 +136,12 @@ def test_what_has_no_place_on_a_device_is_refused() -> None:
         OnlineDnSS.pretrained("paper", device=DEVICE)
     with pytest.raises(InputError, match="give one"):
         online(None, engine="captured")
-    for wrong in (torch.full((3, *SHAPE), 2, dtype=torch.uint8), torch.zeros((3, *SHAPE)), torch.zeros(3, 4)):
+    for wrong in (
+        torch.full((3, *SHAPE), 2, dtype=torch.uint8),
+        torch.full((3, *SHAPE), -1, dtype=torch.int8),
+        torch.zeros((3, *SHAPE)),
+        torch.zeros(3, 4),
+    ):
         with pytest.raises(InputError, match="spikes"):
             online().push(wrong)
     with pytest.raises(InputError, match="packed frames"):
