@@ -27,22 +27,22 @@ INTERVALS = (5.0, 20.0, 100.0)
 SECONDS = 1.0
 
 
-def rows(interval: float, cameras: int, device: torch.device) -> list[dict[str, Any]]:
+def rows(interval: float, cameras: int, device: torch.device, shape: tuple[int, int] = SHAPE) -> list[dict[str, Any]]:
     """The fast engine, the batch on `device` with each kernel that runs there, and the batch a frame at a time.
 
     Light rises by a tenth over 64 frames, from cameras x pixels levels within 10 % of one spike in `interval` frames.
     """
     rng = np.random.default_rng(0)
-    pixels = SHAPE[0] * SHAPE[1]
+    pixels = shape[0] * shape[1]
     start = rng.uniform(0.9, 1.1, (cameras, pixels)).astype(np.float32) / np.float32(interval)
     stop = start * np.float32(1.1)
     model = SensorModel.preset("scsim")
-    one = fast.start(model.draw_unit(SHAPE, 0), generator(0, "phase").random(pixels), 0)
+    one = fast.start(model.draw_unit(shape, 0), generator(0, "phase").random(pixels), 0)
     out = np.empty((BLOCK, pixels), dtype=np.uint8)
     segment = Segment(start[0], stop[0], BLOCK, 0, BLOCK)
     base = _rate(lambda: fast.run(one, segment, out), pixels * BLOCK)
 
-    units = [model.draw_unit(SHAPE, seed) for seed in range(cameras)]
+    units = [model.draw_unit(shape, seed) for seed in range(cameras)]
     phases = [generator(seed, "phase").random(pixels) for seed in range(cameras)]
     state = cuda.start(units, phases, range(cameras), device)
     light = [Segment(start[b], stop[b], BLOCK, 0, BLOCK) for b in range(cameras)]
@@ -54,8 +54,8 @@ def rows(interval: float, cameras: int, device: torch.device) -> list[dict[str, 
         run = _kernel(kernel)
         rate = _rate(lambda run=run: run(state, batch, spikes), spikes.numel(), device)  # type: ignore[misc]
         measured.append((kernel, cameras, BLOCK, rate))
-    sensors = SpikeSensorBatch(model, SHAPE, range(cameras), device)
-    picture = torch.from_numpy(start).reshape(cameras, *SHAPE).to(device)
+    sensors = SpikeSensorBatch(model, shape, range(cameras), device)
+    picture = torch.from_numpy(start).reshape(cameras, *shape).to(device)
     measured.append(
         (f"{sensors.kernel}, step()", cameras, 1, _rate(lambda: sensors.step(picture), picture.numel(), device))
     )

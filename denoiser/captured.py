@@ -1,4 +1,4 @@
-"""A step of training that a GPU replays: it is thousands of small kernels, whose launches take longer than they do."""
+"""Work that a GPU replays, a step of training or a denoiser's pass: many small kernels, whose launches take longer."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ WARM_UPS = 3
 """Calls before the capture: kernels are chosen and memory is taken in them.  They do what the step does."""
 
 
-def captured(step: Callable[[], Tensor], device: torch.device, generator: torch.Generator) -> Callable[[], Tensor]:
+def captured(
+    step: Callable[[], Tensor], device: torch.device, generator: torch.Generator | None = None
+) -> Callable[[], Tensor]:
     """The step; on a GPU recorded once, after WARM_UPS calls of it, and replayed from then on.
 
     step: the same work at every call, on tensors that stay where they are; its result is copied out.
-    generator: all that the step draws from.
+    generator: all that the step draws from, if it draws.
     """
     if device.type != "cuda":
         return step
@@ -26,7 +28,8 @@ def captured(step: Callable[[], Tensor], device: torch.device, generator: torch.
             step()
     torch.cuda.current_stream().wait_stream(beside)
     graph = torch.cuda.CUDAGraph()
-    graph.register_generator_state(generator)
+    if generator is not None:
+        graph.register_generator_state(generator)
     with torch.cuda.graph(graph):
         found = step()
 

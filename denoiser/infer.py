@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -69,9 +69,14 @@ def _rates(
             rate, kept = _side_by_side(network, windows, number_type, carried, device)
         else:
             rate, kept = _as_in_training(network, windows, number_type, carried, device)
-    left = [k.float().contiguous().cpu().numpy() for k in kept]
-    whole = rate.float().clamp(0.0, 1.0).contiguous().cpu().numpy()
+    left = [on_host(k.float()) for k in kept]
+    whole = on_host(rate.float().clamp(0.0, 1.0))
     return [(whole[i, : w.count], tuple(k[i] for k in left)) for i, w in enumerate(windows)]
+
+
+def on_host(tensor: Tensor) -> NDArray[Any]:
+    """As an array, C-contiguous."""
+    return tensor.contiguous().cpu().numpy()  # type: ignore[no-any-return]
 
 
 def _as_in_training(
@@ -121,8 +126,10 @@ def _stacked(carried: Sequence[Carried]) -> Carried:
     return tuple(np.stack([c[i] if c else np.zeros_like(like) for c in carried]) for i, like in enumerate(some))
 
 
-def number_type(precision: str) -> torch.dtype:
-    """ "auto" is bfloat16 where the processor multiplies in it, else float32."""
+def number_type(precision: str, device: torch.device | None = None) -> torch.dtype:
+    """ "auto" is bfloat16 where the processor, or the GPU, multiplies in it, else float32."""
+    if precision == "auto" and device is not None and device.type == "cuda":
+        return torch.bfloat16 if torch.cuda.is_bf16_supported() else torch.float32
     if precision == "auto":
         fast = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)()
         return torch.bfloat16 if fast else torch.float32

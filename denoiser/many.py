@@ -3,14 +3,17 @@
     windows of N streams -> one batch through the network -> rates of each
 
 Each stream has its own window, memory and length: one can begin anew while the others go on.  The rates are those of N
-`OnlineDnSS`, to the rounding of sums, which a batch may take in another order.
+`OnlineDnSS`, to the rounding of sums, which a batch may take in another order.  Where the denoiser has a device, all
+of it lies there (`denoiser.on_device`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from denoiser import infer
@@ -24,7 +27,7 @@ from spikecam_env.errors import InputError
 class ManyDnSS:
     """Denoisers like a given one, of as many streams of frames of one shape; output is the rate.
 
-    like: recipe, weights, stride, precision and unit; its own stream is not touched.
+    like: recipe, weights, stride, precision, unit and device; its own stream is not touched.
     Raises InputError for a denoiser with `overlap`, and for spikes of another size.
     """
 
@@ -32,10 +35,12 @@ class ManyDnSS:
         if like.overlap:
             raise InputError("overlap is True; many streams are denoised by one chain of passes each, leave it False")
         self._like, self.shape = like, checked_shape(shape)
-        self._chains = [self._chain() for _ in range(checked_count(streams, "streams"))]
+        self._count = checked_count(streams, "streams")
+        self._there = None if like.device is None else like.streams_on_device(self._count, self.shape)
+        self._chains = [self._chain() for _ in range(self._count if self._there is None else 0)]
 
     def __len__(self) -> int:
-        return len(self._chains)
+        return self._count
 
     @property
     def latency(self) -> int:
@@ -44,13 +49,24 @@ class ManyDnSS:
 
     def restart(self, which: NDArray[np.bool_]) -> None:
         """Forget these streams (N,): others begin in their place."""
+        if self._there is not None:
+            self._there.restart(which)
+            return
         for stream in np.flatnonzero(which):
             self._chains[stream] = self._chain()
 
-    def push(self, spikes: NDArray[np.uint8]) -> list[Rates]:
-        """(N, K, H, W) more frames of every stream -> N times the frames (F, H, W) they complete; F may be 0."""
-        if spikes.ndim != 4 or spikes.shape[0] != len(self) or spikes.shape[2:] != self.shape:
-            raise InputError(f"spikes are {spikes.shape}; they must be ({len(self)}, frames, *{self.shape})")
+    def push(self, spikes: Any) -> list[Any]:
+        """(N, K, H, W) uint8 more frames of every stream -> N times the frames (F, H, W) they complete; F may be 0.
+
+        Arrays; with a device, tensors there where `spikes` is a tensor.
+        """
+        given = tuple(spikes.shape)
+        if len(given) != 4 or given[0] != len(self) or given[2:] != self.shape:
+            raise InputError(f"spikes are {given}; they must be ({len(self)}, frames, *{self.shape})")
+        if self._there is not None:
+            if isinstance(spikes, torch.Tensor):
+                return self._there.push(spikes.to(self._there.device))
+            return [infer.on_host(rate) for rate in self._there.push(torch.from_numpy(spikes).to(self._there.device))]
         due = [chain.windows(chunk) for chain, chunk in zip(self._chains, spikes, strict=True)]
         done: list[list[Rates]] = [[np.empty((0, *self.shape), np.float32)] for _ in self._chains]
         for windows in _rounds(due):

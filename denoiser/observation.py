@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import torch
 from gymnasium import spaces
 from numpy.typing import NDArray
 
@@ -32,14 +33,19 @@ class Rate(Observation):
 
     mode: str | os.PathLike[str] = "best"
 
+    takes_tensors = True
+
     def space(self, view: View) -> spaces.Box:
         return picture_space(view)
 
     def start(self, view: View, streams: int) -> Denoising:
+        if view.device is not None:
+            return DenoisingThere(ManyDnSS(_denoiser(self.mode, str(view.device)), streams, view.shape), view.device)
         return Denoising(ManyDnSS(_denoiser(self.mode), streams, view.shape))
 
     def step(self, blocks: Blocks, state: Denoising) -> tuple[NDArray[np.uint8], Denoising]:
-        return state.seen(blocks.spikes.view(np.uint8)), state
+        spikes: Any = blocks.spikes
+        return state.seen(spikes.view(np.uint8) if isinstance(spikes, np.ndarray) else spikes), state
 
     def age(self, state: Denoising) -> NDArray[np.float64]:
         return np.where(state.finished > 0, state.pushed - state.finished, -1.0)
@@ -54,8 +60,8 @@ class Denoising:
     def __init__(self, denoiser: ManyDnSS) -> None:
         streams, shape = len(denoiser), denoiser.shape
         self._denoiser = denoiser
-        self._fired = np.zeros((streams, *shape), np.int64)
-        self._picture = np.zeros((streams, 1, *shape), np.uint8)
+        self._fired: Any = np.zeros((streams, *shape), np.int64)
+        self._picture: Any = np.zeros((streams, 1, *shape), np.uint8)
         self.pushed = np.zeros(streams, np.int64)
         self.finished = np.zeros(streams, np.int64)
 
@@ -66,7 +72,7 @@ class Denoising:
             array[which] = 0
         return self
 
-    def seen(self, spikes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def seen(self, spikes: Any) -> Any:
         """(N, K, H, W) more frames -> (N, 1, H, W) what is seen after them."""
         self.pushed += spikes.shape[1]
         self._fired += spikes.sum(axis=1, dtype=np.int64)
@@ -78,13 +84,38 @@ class Denoising:
         return np.where((self.finished > 0)[:, None, None, None], self._picture, noisy)
 
 
-def _denoiser(mode: Any) -> OnlineDnSS:
+class DenoisingThere(Denoising):
+    """The same with tensors on a device."""
+
+    def __init__(self, denoiser: ManyDnSS, device: torch.device) -> None:
+        super().__init__(denoiser)
+        self._fired = torch.from_numpy(self._fired).to(device)
+        self._picture = torch.from_numpy(self._picture).to(device)
+
+    def seen(self, spikes: torch.Tensor) -> torch.Tensor:
+        """(N, K, H, W) more frames -> (N, 1, H, W) what is seen after them."""
+        self.pushed += spikes.shape[1]
+        self._fired += spikes.sum(dim=1)
+        rates = self._denoiser.push(spikes)
+        finish = [stream for stream, its in enumerate(rates) if len(its)]
+        self.finished += [len(its) for its in rates]
+        if finish:
+            newest: Any = torch.stack([rates[stream][-1] for stream in finish])
+            self._picture[finish, 0] = torch.as_tensor(grey(newest))
+        pushed, there = (
+            torch.from_numpy(array).to(spikes.device)[:, None, None] for array in (self.pushed, self.finished)
+        )
+        noisy = torch.as_tensor(grey(self._fired.double() / pushed.clamp(min=1)))[:, None]
+        return torch.where(there[:, None] > 0, self._picture, noisy)
+
+
+def _denoiser(mode: Any, device: str | None = None) -> OnlineDnSS:
     if isinstance(mode, str) and mode in RECIPES:
-        return _shipped(mode)
-    return OnlineDnSS.from_file(mode, output="rate")
+        return _shipped(mode, device)
+    return OnlineDnSS.from_file(mode, output="rate", device=device)
 
 
-@lru_cache(maxsize=len(RECIPES))
-def _shipped(mode: str) -> OnlineDnSS:
+@lru_cache(maxsize=2 * len(RECIPES))
+def _shipped(mode: str, device: str | None) -> OnlineDnSS:
     """Read once a process: an episode begins in the time of a step."""
-    return OnlineDnSS.pretrained(mode, output="rate")
+    return OnlineDnSS.pretrained(mode, output="rate", device=device)

@@ -29,18 +29,6 @@ def interval_for(speed: float, motion_per_key: float) -> int:
     return int(min(max(motion_per_key / max(speed, 1e-9) + 1e-9, 1), LONGEST_INTERVAL))
 
 
-def painted(
-    shape: tuple[int, int],
-    start: int,
-    stop: int,
-    interval: int,
-    gaze: Gaze | None,
-    paint: Callable[[float, NDArray[np.float32]], None],
-) -> Keyframes:
-    """Keys that cover frames [start, stop] (`key_frames`), painted side by side by paint(frame, picture (H, W))."""
-    return paint_keys(shape, key_frames(shape, start, stop, interval, gaze), paint)
-
-
 def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaze: Gaze | None) -> NDArray[np.float64]:
     """Frames (K,) of the keys that cover [start, stop].
 

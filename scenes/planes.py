@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from importlib import import_module
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,13 +61,20 @@ class PlanarScene:
         """What is to be painted for the keys that cover frames [start, stop]."""
         raise NotImplementedError
 
-    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:
         """Keys that cover frames [start, stop]: (K,) float64 whole frames, (K, H, W) float32.
 
         Without gaze keys are multiples of a fixed interval.  With gaze there are keys at `start` and `stop`
-        too, where the camera's path may bend.  Errors: InputError unless start < stop.
+        too, where the camera's path may bend.  device: a torch device; the light is painted there, as a tensor, for
+        `SpikeSensorBatch`.  Errors: InputError unless start < stop, and for a device that is not there.
         """
-        return painted_planes([self.plane(start, stop, gaze)])[0]
+        planes = [self.plane(start, stop, gaze)]
+        return painted_planes(planes)[0] if device is None else on_device().planes_on(planes, device)[0]
+
+
+def on_device() -> Any:
+    """`scenes.planes_on_device`, imported when first asked for: torch takes seconds."""
+    return import_module("scenes.planes_on_device")
 
 
 def painted_planes(planes: Sequence[Plane], threads: int | None = None) -> list[Keyframes]:

@@ -9,11 +9,13 @@ either side of a pixel, and read between them.
 from __future__ import annotations
 
 import copy
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.keys import interval_for, painted
+from scenes.keys import interval_for, key_frames, paint_keys
+from scenes.planes import on_device
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import dead_leaves
 from spikecam_env.checked import checked_memory, checked_number, checked_shape
@@ -67,11 +69,13 @@ class SlidingTexture:
     def __repr__(self) -> str:
         return f"SlidingTexture(shape={self.shape}, velocity_px_s={self.velocity_px_s})"
 
-    def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
-        """Keys that cover frames [start, stop], see `scenes.keys.painted`."""
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:
+        """Keys that cover frames [start, stop], see `scenes.keys.key_frames`; device: as of `PlanarScene.radiance`."""
         speed = float(np.hypot(*self.velocity(gaze)))
-        interval = interval_for(speed, self.motion_per_key)
-        return painted(self.shape, start, stop, interval, gaze, lambda t, picture: self._paint(t, gaze, picture))
+        frame = key_frames(self.shape, start, stop, interval_for(speed, self.motion_per_key), gaze)
+        if device is not None:
+            return self._on(device, frame, gaze)
+        return paint_keys(self.shape, frame, lambda t, picture: self._paint(t, gaze, picture))
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame; see `scenes.protocol.Truth`."""
@@ -97,14 +101,32 @@ class SlidingTexture:
         pan, tilt = gaze.rate if gaze else (0.0, 0.0)
         return self.velocity_px_s[0] / self.frame_rate_hz - pan, self.velocity_px_s[1] / self.frame_rate_hz - tilt
 
-    def corner_at(self, frame: float, gaze: Gaze | None = None) -> tuple[float, float]:
-        """(x, y) in the picture of the texture's upper left corner [pixels]; it started at (-0.5, -0.5)."""
+    def corner_at(self, frame: Any, gaze: Gaze | None = None) -> tuple[Any, Any]:
+        """(x, y) in the picture of the texture's upper left corner [pixels], at a frame or at each of several; it
+        started at (-0.5, -0.5)."""
         seconds = frame / self.frame_rate_hz
         pan, tilt = gaze.at(frame) if gaze else (0.0, 0.0)
         return self.velocity_px_s[0] * seconds - pan - 0.5, self.velocity_px_s[1] * seconds - tilt - 0.5
 
-    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+    def _first_sample(self, frame: Any, gaze: Gaze | None) -> tuple[Any, Any]:
+        """(x, y) of the first pixel in the samples."""
         x, y = (-SAMPLES_PER_PIXEL * (corner + 0.5) for corner in self.corner_at(frame, gaze))
+        return x, y
+
+    def _on(self, device: Any, frame: NDArray[np.float64], gaze: Gaze | None) -> Keyframes:
+        there = on_device()
+        return there.repeated_on(
+            self._samples,
+            lambda samples: _in_order(samples, self._period),
+            frame,
+            self._first_sample(frame, gaze),
+            self.shape,
+            SAMPLES_PER_PIXEL,
+            device,
+        )
+
+    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+        x, y = self._first_sample(frame, gaze)
         _paint(self._samples, x % self._period, y % len(self._samples), picture)
 
 
@@ -141,6 +163,12 @@ def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]
     pixels = np.arange(np.lcm(period, SAMPLES_PER_PIXEL) // SAMPLES_PER_PIXEL + columns)
     place = (SAMPLES_PER_PIXEL * pixels + np.arange(SAMPLES_PER_PIXEL)[:, None]) % period
     return np.ascontiguousarray(samples[:, place])
+
+
+def _in_order(samples: NDArray[np.float32], period: int) -> NDArray[np.float32]:
+    """(rows, period), of `_by_phase`."""
+    place = np.arange(period)
+    return samples[:, place % SAMPLES_PER_PIXEL, place // SAMPLES_PER_PIXEL]
 
 
 @njit(cache=True, nogil=True)

@@ -141,4 +141,4 @@ def _on_a_gpu() -> str:
     """What there is to say of the GPU."""
     if not torch.cuda.is_available():
         return "not measured: these rows need a GPU, and this machine has none"
-    return "scenes and denoiser do not run there; `python -m benchmarks.bench_cuda` measures the camera"
+    return "not measured here: `python -m benchmarks.gpu` does it"

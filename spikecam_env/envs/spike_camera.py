@@ -249,6 +249,10 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         first, stop = self._gaze.frames
         return int(first), int(stop), self._gaze
 
+    def take_seat(self, sensor: Any) -> None:
+        """Have another camera, as a vector environment does on a device: with `frame`, `model` and `reset(seed)`."""
+        self._sensor = sensor
+
     def take(self, light: Keyframes, spikes: NDArray[np.uint8]) -> None:
         """A block, exposed along the camera's path: spikes (K, H, W)."""
         self._blocks = Blocks(spikes[None], (light,), self.model.frame_rate_hz)

@@ -12,6 +12,8 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from copy import deepcopy
+from dataclasses import replace
+from importlib import import_module
 from itertools import chain
 from typing import Any, TypeVar
 
@@ -43,6 +45,9 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     num_envs            N
     models              N models (presets, TOML paths, SensorModels), one an environment; default: all have `model`
     max_episode_steps   after which an episode is truncated; None is never
+    device              a torch device: cameras, planar scenes and observations ("spikes", "multibinary", "tfp", "rate")
+                        are there; actions may be tensors, and all but info are tensors there
+                        (`envs.cameras_on_device`)
     workers             threads; default NUMBA_NUM_THREADS, N at most
     options             all else, obs and obs_state too: as `single` has them
 
@@ -73,6 +78,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         max_episode_steps: int | None = None,
         workers: int | None = None,
         render_mode: str | None = None,
+        device: Any = None,
         **options: Any,
     ) -> None:
         self.num_envs = checked_count(num_envs, "num_envs")
@@ -95,6 +101,11 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         for env in self.envs:
             env.observation, env.obs_state = Spikes(), False
+        self._there: Any = None if device is None else import_module("spikecam_env.envs.cameras_on_device")
+        if self._there is not None:
+            self._there.check_on_device(self.observation, render_mode)
+            self._cameras = self._there.DeviceCameras(self.envs, device)
+            self._view = replace(self._view, device=self._cameras.device)
         self._seen: Any = None
         self._over = np.zeros(self.num_envs, bool)
         self._steps = np.zeros(self.num_envs, int)
@@ -119,7 +130,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         self._open()
         if self._seen is None:
             raise NotReadyError("the environments have no scene yet; call reset first")
-        given = np.asarray(actions)
+        given = np.asarray(actions) if self._there is None else self._there.on_host(actions)
         if given.shape[:1] != (self.num_envs,):
             raise InputError(
                 f"actions have shape {given.shape}; they must be one an environment, ({self.num_envs}, ...)"
@@ -148,11 +159,9 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     def _exposed(
         self, fresh: NDArray[np.bool_]
     ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """The next block of all, in memory of its own, and what follows; fresh (N,): which episodes begin with it."""
-        spikes = np.empty((self.num_envs, self._view.frames_per_step, *self._view.shape), np.uint8)
-        expose(self.envs, outs=list(spikes), threads=len(self._workers), each=self._each)
-        light = [env.blocks.light[0] for env in self.envs]
-        picture, self._seen = self.observation.step(Blocks(spikes, light, self._view.frame_rate_hz), self._seen)
+        """The next block of all, and what follows; fresh (N,): which episodes begin with it."""
+        blocks = self._blocks() if self._there is None else self._cameras.exposed(self._each)
+        picture, self._seen = self.observation.step(blocks, self._seen)
         age = np.broadcast_to(self.observation.age(self._seen), (self.num_envs,)).astype(np.float64)
         numbers = range(self.num_envs)
         each = self._each if any(env.renders for env in self.envs) else in_turn
@@ -163,7 +172,16 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         self._over = ends[0] | ends[1]
         info = batched(infos) | {"age": age, "_age": np.ones(self.num_envs, bool)}
         seen = with_state(picture, info["gaze"], age) if self.obs_state else picture
-        return seen, np.array(rewards, np.float64), *ends, info
+        if self._there is None:
+            return seen, np.array(rewards, np.float64), *ends, info
+        of_agents = seen, np.array(rewards, np.float64), *ends
+        return *map(self._cameras.tensors, of_agents), info  # type: ignore[return-value]
+
+    def _blocks(self) -> Blocks:
+        """The next block of all, in memory of its own."""
+        spikes = np.empty((self.num_envs, self._view.frames_per_step, *self._view.shape), np.uint8)
+        expose(self.envs, outs=list(spikes), threads=len(self._workers), each=self._each)
+        return Blocks(spikes, [env.blocks.light[0] for env in self.envs], self._view.frame_rate_hz)
 
     def _outcome(self, n: int, fresh: bool) -> Outcome:
         if fresh:

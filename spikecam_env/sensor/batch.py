@@ -92,8 +92,9 @@ class SpikeSensorBatch:
         """Expose the next frames of every camera; returns spikes (B, frames, H, W) uint8, 0 or 1, on the device.
 
         radiance: (H, W) or (B, H, W) held throughout, as an array or a tensor; Keyframes for all cameras, or a list of
-        B, on each camera's own absolute frame numbers.  Optics (blur, vignetting) act on the host: a tensor on the GPU
-        is copied there and back once a step.  Raises InputError as SpikeSensor.step does.
+        B, on each camera's own absolute frame numbers, whose light may lie on the device (`PlanarScene.radiance`).
+        Optics (blur, vignetting) act on the host: a tensor on the GPU is copied there and back.
+        Raises InputError as SpikeSensor.step does.
         """
         frames = checked_count(frames)
         pieces = self._pieces(radiance, frames)
@@ -172,7 +173,7 @@ class SpikeSensorBatch:
         self._films = lights
         films = [segments(light, int(self.frame[b]), frames) for b, light in enumerate(lights)]
         for cut in cut_alike(films):
-            seen = [self._imaging[b].seen(segment) for b, segment in enumerate(cut)]
+            seen = [imaging.seen(_on_host(s)) if imaging else s for imaging, s in zip(self._imaging, cut, strict=False)]
             yield cuda.BatchSegment.of(seen, self.device)
 
     def _still(self, pictures: torch.Tensor, frames: int) -> Iterator[cuda.BatchSegment]:
@@ -224,6 +225,15 @@ def cut_alike(films: Sequence[Iterator[Segment]]) -> Iterator[list[Segment]]:
             else next(film, None)
             for segment, film in zip(now, films, strict=True)
         ]
+
+
+def _on_host(segment: Segment) -> Segment:
+    """With its light in arrays."""
+    if not isinstance(segment.radiance0, torch.Tensor):
+        return segment
+    start = segment.radiance0.cpu().numpy()
+    stop = start if segment.radiance1 is segment.radiance0 else segment.radiance1.cpu().numpy()
+    return replace(segment, radiance0=start, radiance1=stop)
 
 
 def _checked_seeds(seeds: Any) -> tuple[int, ...]:

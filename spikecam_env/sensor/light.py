@@ -102,6 +102,11 @@ class Keyframes:
         object.__setattr__(keys, "radiance", radiance)
         return keys
 
+    @property
+    def on_device(self) -> bool:
+        """Whether the radiance is a torch tensor, as `known` takes it too: light for `SpikeSensorBatch` alone."""
+        return not isinstance(self.radiance, np.ndarray)
+
     @classmethod
     def steps(cls, frame: ArrayLike, radiance: ArrayLike) -> Keyframes:
         """Light that jumps: radiance[i] (H, W) from frame[i] until frame[i + 1], the first one also before.
@@ -306,6 +311,10 @@ def cuts(times: NDArray[np.float64], start: int, stop: int) -> NDArray[np.int64]
 def _frame_with_keys(light: Keyframes, at: int) -> Segment:
     """The frame from `at` on: the exact mean of its light, and its rise as far as a line of it stays above zero."""
     first, of_mean, of_rise = key_weights(light.frame, at, at + 1)
+    if light.on_device:  # for an engine that goes by the mean alone
+        exact: Any = zip(light.radiance[first:], of_mean.tolist(), strict=False)
+        held = sum(picture.reshape(-1).double() * weight for picture, weight in exact).float()
+        return Segment(held, held, 1, 0, 1)
     mean, rise, product = np.zeros((3, light.radiance[0].size))
     for picture, m, r in zip(light.radiance[first:], of_mean, of_rise, strict=False):
         mean += np.multiply(picture.reshape(-1), m, dtype=np.float64, out=product)
@@ -404,8 +413,8 @@ def _grains_per_frame(
 def as_light(radiance: Keyframes | ArrayLike, shape: tuple[int, int]) -> Keyframes | NDArray[np.float32]:
     """Check what a user gave as light against the sensor's shape; raises InputError."""
     if isinstance(radiance, Keyframes):
-        if radiance.radiance.shape[1:] != shape:
-            raise InputError(f"radiance is {radiance.radiance.shape[1:]} pixels, the sensor is {shape}")
+        if tuple(radiance.radiance.shape[1:]) != shape:
+            raise InputError(f"radiance is {tuple(radiance.radiance.shape[1:])} pixels, the sensor is {shape}")
         return radiance
     picture = light_values(radiance)
     if picture.shape != shape:

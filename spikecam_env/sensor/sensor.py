@@ -189,6 +189,8 @@ class SpikeSensor:
         """The arguments of `step`, checked; nothing is exposed yet."""
         frames = checked_count(frames)
         light = as_light(radiance, self.shape)
+        if isinstance(light, Keyframes) and light.on_device:
+            raise InputError("radiance is a tensor; SpikeSensor takes arrays, SpikeSensorBatch tensors on its device")
         if isinstance(light, Keyframes) and self._looks_for_bends:
             bent.check_bent(light, self.frame, frames, self._first_exposure(), self._frame_effects, self._imaging.image)
         spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)

@@ -17,10 +17,14 @@ from spikecam_env.streams.packing import packed_bytes
 class Spikes(Observation):
     """(K, H, W) int8, 0 or 1, as a `Box`, which learners take."""
 
+    takes_tensors = True
+
     def space(self, view: View) -> spaces.Space[Any]:
         return spaces.Box(0, 1, (view.frames_per_step, *view.shape), np.int8)
 
     def step(self, blocks: Blocks, state: Any) -> tuple[NDArray[np.int8], Any]:
+        if not isinstance(blocks.spikes, np.ndarray):
+            return blocks.spikes.char(), state
         return blocks.spikes.view(np.int8), state
 
 

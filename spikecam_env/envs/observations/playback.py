@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from spikecam_env.checked import checked_count
 from spikecam_env.compiled import njit
 from spikecam_env.envs.observations.protocol import Blocks, Observation, View, grey, picture_space
+from spikecam_env.errors import InputError
 
 
 class Recent(NamedTuple):
@@ -30,10 +31,13 @@ class Recent(NamedTuple):
 class TFP(Observation):
     """(1, H, W) uint8: 255 where a pixel fires in every frame.
 
-    window: frames; None is the step's own block.  Raises InputError for a window below 1.
+    window: frames; None is the step's own block.  Raises InputError for a window below 1, and of more than the step's
+    own block on a device.
     """
 
     window: int | None = None
+
+    takes_tensors = True
 
     def __post_init__(self) -> None:
         if self.window is not None:
@@ -44,11 +48,15 @@ class TFP(Observation):
 
     def start(self, view: View, streams: int) -> Recent:
         kept = max(0, (self.window or 0) - view.frames_per_step)
+        if kept and view.device is not None:
+            raise InputError(f"window is {self.window}; on a device it is {view.frames_per_step} at most, the step's")
         return Recent(np.zeros((streams, kept, *view.shape), np.uint8), np.zeros(streams, np.int64))
 
     def step(self, blocks: Blocks, state: Recent) -> tuple[NDArray[np.uint8], Recent]:
         count, kept = blocks.spikes.shape[1], state.frames.shape[1]
         window = self.window or count
+        if not isinstance(blocks.spikes, np.ndarray):
+            return grey(blocks.spikes[:, -window:].sum(dim=1).double()[:, None] / window), state
         frames = blocks.spikes.view(np.uint8)
         if kept:
             frames = np.concatenate([state.frames, frames], axis=1)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -25,18 +25,22 @@ Streams = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class View:
-    """The camera that agents look through: shape (rows, columns), K frames a step, frames a second."""
+    """The camera that agents look through: shape (rows, columns), K frames a step, frames a second.
+
+    device: the torch device that its blocks are tensors on; None: they are arrays.
+    """
 
     shape: tuple[int, int]
     frames_per_step: int
     frame_rate_hz: float = 40_000.0
+    device: Any = None
 
 
 @dataclass(frozen=True)
 class Blocks:
     """What N cameras exposed in one step.
 
-    spikes: (N, K, H, W) uint8 or int8, 0 and 1.
+    spikes: (N, K, H, W) uint8 or int8, 0 and 1; a torch tensor for an observation that takes tensors.
     light: N, what fell on each sensor, on the frames of its episode; empty where nobody knows.
     frame_rate_hz: of the spike cameras.
     """
@@ -47,7 +51,12 @@ class Blocks:
 
 
 class Observation(ABC):
-    """A law of what agents see; parameters are the fields of a frozen dataclass."""
+    """A law of what agents see; parameters are the fields of a frozen dataclass.
+
+    takes_tensors: whether blocks may be tensors; what agents see then is one.
+    """
+
+    takes_tensors: ClassVar[bool] = False
 
     @abstractmethod
     def space(self, view: View) -> spaces.Space[Any]:
@@ -84,6 +93,8 @@ def _exchanged(now: NDArray[Any], first: NDArray[Any], which: Streams) -> NDArra
 
 def grey(rate: NDArray[Any]) -> NDArray[np.uint8]:
     """Spikes a frame, 0 to 1 and cut beyond, as 0 to 255."""
+    if not isinstance(rate, np.ndarray):  # a tensor
+        return (255.0 * rate.clamp(max=1.0) + 0.5).byte()
     return np.asarray((255.0 * np.minimum(rate, 1.0) + 0.5).astype(np.uint8))
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -117,25 +118,33 @@ class BatchSegment:
 
     @classmethod
     def of(cls, segments: Sequence[Segment], device: torch.device) -> BatchSegment:
-        """Segments of like count, one a camera, or one for all."""
+        """Segments of like count, one a camera, or one for all; their light may lie on the device already."""
         held = all(s.radiance1 is s.radiance0 for s in segments)
-        radiance0 = torch.from_numpy(np.stack([s.radiance0 for s in segments])).to(device)
-        radiance1 = radiance0 if held else torch.from_numpy(np.stack([s.radiance1 for s in segments])).to(device)
-        first = np.array([s.first for s in segments])
-        length = np.array([s.length for s in segments])
-        return cls(radiance0, radiance1, *_timing(first, length, device), segments[0].count)
+        radiance0 = _stacked([s.radiance0 for s in segments], device)
+        radiance1 = radiance0 if held else _stacked([s.radiance1 for s in segments], device)
+        timing = _timing(tuple(s.first for s in segments), tuple(s.length for s in segments), device)
+        return cls(radiance0, radiance1, *timing, segments[0].count)
 
     @classmethod
     def held(cls, radiance: torch.Tensor, count: int) -> BatchSegment:
         """Light (B, P) or (1, P) that stays as it is, for `count` frames, 64 at most."""
-        timing = _timing(np.array([0]), np.array([count]), radiance.device)
-        return cls(radiance, radiance, *timing, count)
+        return cls(radiance, radiance, *_timing((0,), (count,), radiance.device), count)
 
 
-def _timing(
-    first: NDArray[np.int64], length: NDArray[np.int64], device: torch.device
-) -> tuple[torch.Tensor, torch.Tensor]:
-    twice = 2 * length
-    timing = np.stack([first, twice, -(-(1 << 18) // twice)], axis=1).astype(np.int32)
+def _stacked(pictures: Sequence[NDArray[np.float32] | torch.Tensor], device: torch.device) -> torch.Tensor:
+    """(B, P) of B pictures; a view of one that is on the device."""
+    tensors = [picture for picture in pictures if isinstance(picture, torch.Tensor)]
+    if not tensors:
+        return torch.from_numpy(np.stack(pictures)).to(device)  # type: ignore[arg-type]
+    if len(tensors) < len(pictures):
+        tensors = [torch.as_tensor(picture, device=device) for picture in pictures]
+    return (tensors[0][None] if len(tensors) == 1 else torch.stack(tensors)).to(device)
+
+
+@lru_cache(maxsize=1024)
+def _timing(first: tuple[int, ...], length: tuple[int, ...], device: torch.device) -> tuple[torch.Tensor, torch.Tensor]:
+    """Kept, since what is copied to a device waits for it, and no recording of a GPU's work may wait."""
+    twice = 2 * np.array(length)
+    timing = np.stack([np.array(first), twice, -(-(1 << 18) // twice)], axis=1).astype(np.int32)
     per_twice = (1.0 / twice).astype(np.float32)[:, None]
     return torch.from_numpy(timing).to(device), torch.from_numpy(per_twice).to(device)

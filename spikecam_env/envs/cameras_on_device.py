@@ -1,0 +1,110 @@
+"""The cameras of a vector environment as one batch on a torch device (`SpikeSensorBatch`).
+
+    paths of all cameras -> light, painted there where scenes are planar -> spikes, which stay there
+
+Where the camera looks, rewards and ends are plain Python on the host: actions go there, rewards come back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from scenes.planes_on_device import planes_on
+from spikecam_env.envs.observations import Blocks, Observation
+from spikecam_env.envs.spike_camera import Each, SpikeCameraEnv
+from spikecam_env.errors import InputError
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensorBatch
+
+
+class DeviceCameras:
+    """A batch of cameras, one for each environment, which has a `Seat` in it instead of a sensor.
+
+    Raises InputError as `SpikeSensorBatch` does: for a device that is not there, and effects from frame to frame.
+    """
+
+    def __init__(self, envs: Sequence[SpikeCameraEnv], device: str | torch.device) -> None:
+        self._envs = envs
+        self._batch = SpikeSensorBatch([env.model for env in envs], envs[0].shape, [0] * len(envs), device)
+        self._new: dict[int, int] = {}  # seeds of those that begin anew with the next block
+        for number, env in enumerate(envs):
+            env.take_seat(Seat(self, number, env.model))
+
+    @property
+    def device(self) -> torch.device:
+        """Where the cameras are."""
+        return self._batch.device
+
+    def begin(self, number: int, seed: int) -> None:
+        """A camera is another unit, at frame 0."""
+        self._new[number] = seed
+
+    def frame(self, number: int) -> int:
+        """A camera's next frame."""
+        return 0 if number in self._new else int(self._batch.frame[number])
+
+    def exposed(self, each: Each) -> Blocks:
+        """The next block of every camera, along the path that it has taken; each: asks scenes that are no planes."""
+        self._begun()
+        light = self._light(each)
+        spikes = self._batch.step(light, self._envs[0].frames_per_step)
+        for env, own, block in zip(self._envs, light, spikes, strict=True):
+            env.take(own, block)  # type: ignore[arg-type]
+        there: Any = spikes
+        return Blocks(there, light, self._envs[0].model.frame_rate_hz)
+
+    def tensors(self, values: Any) -> Any:
+        """Arrays, or a table of them, on the device."""
+        if isinstance(values, dict):
+            return {name: self.tensors(value) for name, value in values.items()}
+        return torch.as_tensor(values, device=self.device)
+
+    def _begun(self) -> None:
+        for number, env in enumerate(self._envs):
+            if not isinstance(env.sensor, Seat):
+                raise InputError(f"environment {number} has another model; with a device all episodes keep theirs")
+        mask = np.array([number in self._new for number in range(len(self._batch))])
+        self._batch.reset([self._new.get(n, seed) for n, seed in enumerate(self._batch.seeds)], mask)
+        self._new = {}
+
+    def _light(self, each: Each) -> list[Keyframes]:
+        envs: Any = self._envs
+        flat = [n for n, env in enumerate(envs) if not env.renders]
+        other = [n for n, env in enumerate(envs) if env.renders]
+        planes = [envs[n].scene.plane(*envs[n].asked) for n in flat]
+        light = dict(zip(flat, planes_on(planes, self.device), strict=True))
+        light |= zip(other, each(lambda n: envs[n].scene.radiance(*envs[n].asked), other), strict=True)
+        return [light[n] for n in range(len(envs))]
+
+
+class Seat:
+    """What an environment knows of its camera in the batch."""
+
+    def __init__(self, cameras: DeviceCameras, number: int, model: SensorModel) -> None:
+        self._cameras, self._number, self.model = cameras, number, model
+
+    @property
+    def frame(self) -> int:
+        """Of the stream, the next."""
+        return self._cameras.frame(self._number)
+
+    def reset(self, seed: int) -> None:
+        """Another unit, at frame 0."""
+        self._cameras.begin(self._number, seed)
+
+
+def check_on_device(law: Observation, render_mode: str | None) -> None:
+    """Raise InputError for an observation that takes no tensors, and for pictures for people."""
+    if not law.takes_tensors:
+        raise InputError(f"obs is {type(law).__name__}; with a device it may be 'spikes', 'multibinary', 'tfp', 'rate'")
+    if render_mode is not None:
+        raise InputError(f"render_mode is {render_mode!r}; leave it out with a device")
+
+
+def on_host(actions: Any) -> NDArray[Any]:
+    """Actions as an array, wherever they are."""
+    return np.asarray(actions.cpu() if isinstance(actions, torch.Tensor) else actions)
