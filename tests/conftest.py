@@ -17,6 +17,7 @@ from collections.abc import Iterator
 import pytest
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # read by OpenBLAS, MKL and torch as they are imported
+os.environ.setdefault("GOMP_SPINCOUNT", "10000")  # as the command has it: what is tested with two threads waits asleep
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

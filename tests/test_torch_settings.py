@@ -6,19 +6,16 @@ import pytest
 import torch
 
 from denoiser.reconstruct.train import ReconstructorConfig, train_reconstructor
-from denoiser.simulated import Bank
 from denoiser.train import TrainConfig, train
 from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.training import Study, train_agent
 from spikecam_env.torch_settings import torch_settings
 
-TINY = {"steps": 1, "batch": 1, "patch": 16, "validate_every": 1, "minutes": 1, "threads": 2}
-TRAINED = {
-    "a denoiser": lambda out: train(TrainConfig(mode="best", out=out, **TINY), progress=False),
-    "a reconstructor": lambda out: train_reconstructor(
-        ReconstructorConfig(mode="ssml", out=out, width=12, **TINY), progress=False
+LEARNERS = {
+    "denoiser.train:_trained": lambda out: train(TrainConfig(mode="best", out=out, threads=2, seed=7)),
+    "denoiser.reconstruct.train:_trained": lambda out: train_reconstructor(
+        ReconstructorConfig(mode="ssml", out=out, width=12, threads=2, seed=7)
     ),
-    "an agent": lambda out: train_agent(Study("Catch-v1"), out, PPO(steps=64, rollout=32), environments=2),
 }
 
 
@@ -41,13 +38,23 @@ def test_they_do_not_hold_after_an_error_either():
     assert torch.get_num_threads() == 1
 
 
-@pytest.mark.parametrize("what", TRAINED)
-def test_training_leaves_them_to_the_caller(what, tmp_path, monkeypatch):
-    bank = Bank.drawn(3, torch.device("cpu"), textures=1, units=1)
-    monkeypatch.setattr(Bank, "drawn", lambda *_, **__: bank)
+@pytest.mark.parametrize("place", LEARNERS)
+def test_training_takes_its_own_and_leaves_them_to_the_caller(place, tmp_path, monkeypatch):
+    """What computes is stood in for: two threads of torch spin for minutes where other work has the processors."""
+    seen = []
+    monkeypatch.setattr(place.replace(":", "."), lambda *_: seen.append((torch.get_num_threads(), torch.rand(3))))
     torch.manual_seed(5)
     expected = torch.rand(3)
     torch.manual_seed(5)
-    TRAINED[what](tmp_path)
-    assert torch.get_num_threads() == 1
-    assert torch.equal(torch.rand(3), expected)
+    LEARNERS[place](tmp_path)
+    ((threads, drawn),) = seen
+    assert threads == 2 and torch.equal(drawn, torch.rand(3, generator=torch.Generator().manual_seed(7)))
+    assert torch.get_num_threads() == 1 and torch.equal(torch.rand(3), expected)
+
+
+def test_an_agent_is_trained_so_too(tmp_path):
+    torch.manual_seed(5)
+    expected = torch.rand(3)
+    torch.manual_seed(5)
+    train_agent(Study("Catch-v1"), tmp_path, PPO(steps=64, rollout=32), environments=2)
+    assert torch.get_num_threads() == 1 and torch.equal(torch.rand(3), expected)
