@@ -22,6 +22,7 @@ from spikecam_env.agents.agent import Agent
 from spikecam_env.agents.policy import Recipe
 from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
+from spikecam_env.envs.tasks import TASKS, ReadSpin
 from spikecam_env.errors import unknown_name
 from spikecam_env.whole import write_text_whole
 
@@ -44,6 +45,11 @@ class Study:
             raise unknown_name("task", self.task, (name.split("/")[1] for name in TASK_ENVIRONMENTS))
         if self.sight not in SIGHTS:
             raise unknown_name("observation", self.sight, SIGHTS)
+
+    @property
+    def name(self) -> str:
+        """Of the task, without its size and version."""
+        return self.task.split("-")[0]
 
     @property
     def keywords(self) -> dict[str, Any]:
@@ -72,13 +78,12 @@ LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4)}
 """Steps ago of the pictures that a task is learned from; others from (0, 4)."""
 POOL = {"Saccade": 1, "ReadSpin": 1}
 """Pixels squared that are averaged; others 2.  Spokes are finer than two pixels."""
-STEPS = {"Track": 81_920, "Catch": 98_304, "Saccade": 98_304}
-"""Of training, of a task's shipped agent; others 98 304."""
 
 
 def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
     """The network for a task."""
-    name, spaces, action = study.task.split("-")[0], envs.single_observation_space, envs.single_action_space
+    name, task = study.name, TASKS[study.name]
+    spaces, action = envs.single_observation_space, envs.single_action_space
     assert isinstance(spaces, Dict) and isinstance(action, Box)
     picture = spaces["picture"]
     assert isinstance(picture, Box)
@@ -90,17 +95,13 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
         lags=LAGS.get(name, (0, 4)),
         actions=action.shape[0],
         pool=POOL.get(name, 2),
+        answers=task.further if issubclass(task, ReadSpin) else 0,
     )
 
 
-def budget(study: Study, steps: int | None = None) -> PPO:
-    """The learner's numbers for a task, with its steps or so many."""
-    return PPO(steps=steps or STEPS.get(study.task.split("-")[0], 98_304))
-
-
 def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16) -> Agent:
-    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `budget(study)`."""
-    ppo = ppo or budget(study)
+    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `PPO()`."""
+    ppo = ppo or PPO()
     envs, threads = study.make_vec(environments), torch.get_num_threads()
     torch.set_num_threads(1)  # as many as pay for so small a network
     try:
