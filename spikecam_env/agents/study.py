@@ -91,6 +91,8 @@ def cases(
     episodes: int | None = None,
 ) -> list[Case]:
     """Every cell with every seed, all cells of the first seed first; `intervals` are of LowLight."""
+    for task in tasks:
+        Study(task)  # refuses unknown names
     for sight in sights:
         if sight not in (*SIGHTS, *READY):
             raise unknown_name("observation", sight, (*SIGHTS, *READY))
@@ -104,7 +106,6 @@ def cases(
         for interval in (intervals if task.startswith("LowLight") and intervals else (None,))
     ]
     for case in found:
-        _ = case.study  # refuses unknown names
         if case.sight.startswith("shipped") and case.task not in shipped():
             raise unknown_name("agent", case.task, shipped())
     return found
