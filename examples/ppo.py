@@ -1,6 +1,6 @@
 """An agent learns to catch a ball that crosses its view in 5 to 20 ms, from the noisy spikes of a camera.
 
-run:  python examples/ppo.py            (3 to 10 minutes on one core: it catches nine balls in ten)
+run:  python examples/ppo.py            (a minute of processor time: it catches nine balls in ten)
       python examples/ppo.py 4096       (so many steps, to see it run)
 """
 
@@ -18,7 +18,7 @@ from spikecam_env.agents.playing import score_of
 from spikecam_env.agents.policy import Recipe
 from spikecam_env.agents.ppo import PPO, train
 
-STEPS = int(sys.argv[1]) if len(sys.argv) > 1 else 98_304
+STEPS = int(sys.argv[1]) if len(sys.argv) > 1 else 49_152
 EPISODES = 100 if STEPS > 10_000 else 5
 
 torch.manual_seed(0)

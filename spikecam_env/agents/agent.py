@@ -30,7 +30,7 @@ from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.untrusted import declared
 
-FORMAT = "spikecam-agent/1"
+FORMAT = "spikecam-agent/2"
 ENDING = ".pt"
 
 

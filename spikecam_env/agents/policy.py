@@ -1,13 +1,14 @@
 """The network of an agent: it finds places in the pictures, and steers by them.
 
-    maps      = conv(conv(conv(pictures)))                            (M, h, w)
+    maps      = norm(conv(conv(conv(pictures))))                      (M, h, w), of a picture together: mean 0, spread 1
     place     = sum softmax(maps) * (column, row)                     in [-1, 1], an expected place a map
     level     = log mean exp(maps)                                    how strongly something is there
     known     = mlp(places, levels, state)                            the action's mean, the value and where the target
                                                                       is are linear in it
 
 A softmax over places gives positions finer than the maps' pixels with few weights.  Source: Levine et al., JMLR 17
-(2016).
+(2016).  Without the norm the maps can grow in the first updates until softmax and tanh are saturated and no gradient
+comes back.  Source of the norm: Wu and He, ECCV 2018, with one group.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Annotated
 import torch
 from pydantic import Field
 from torch import Tensor, nn
+from torch.nn.functional import group_norm
 
 from spikecam_env.untrusted import Declared, Side
 
@@ -33,6 +35,7 @@ class Recipe(Declared):
     pool      pixels squared that are averaged before anything else
     maps      whose places are found
     width     of the convolutions and, times four, of what steers
+    answers   that an action can give, its last numbers; 0 where the task asks nothing
     """
 
     channels: Annotated[int, Field(ge=1, le=256)]
@@ -43,6 +46,7 @@ class Recipe(Declared):
     pool: Annotated[int, Field(ge=1, le=8)] = 2
     maps: Annotated[int, Field(ge=1, le=64)] = 12
     width: Annotated[int, Field(ge=1, le=64)] = 16
+    answers: Annotated[int, Field(ge=0, le=16)] = 0
 
     def network(self) -> Policy:
         """With weights at random."""
@@ -77,11 +81,12 @@ class Policy(nn.Module):
         self.mean, self.value, self.place = (nn.Linear(4 * width, numbers) for numbers in (recipe.actions, 1, 2))
         nn.init.orthogonal_(self.mean.weight, 0.01)
         nn.init.zeros_(self.mean.bias)
+        self.mean.bias.data[recipe.actions - recipe.answers :] = SILENCE
         self.log_sigma = nn.Parameter(torch.full((recipe.actions,), LOG_SIGMA))
 
     def forward(self, pictures: Tensor, state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """See the class."""
-        maps = self.eye(pictures.float() * (GAIN / self.recipe.high))
+        maps = group_norm(self.eye(pictures.float() * (GAIN / self.recipe.high)), 1)
         features = torch.cat([self._places(maps), ((state - self.middle) / self.spread).clamp(-5, 5)], dim=1)
         known = self.trunk(features)
         return self.mean(known), self.value(known)[:, 0], self.place(known)
@@ -122,6 +127,9 @@ GAIN = 2.0
 """Of pictures, so that the first layer sees values of the order of one where the light is 0.05 to 0.6."""
 SHARPNESS = 4.0
 """Of the softmax at the start."""
+SILENCE = -1.0
+"""Mean, at the start, of the numbers that answer: at 0 more than half of the steps say something by chance, which ends
+the episode before the camera has come anywhere."""
 LOG_SIGMA = -0.5
 """Of the actions at the start, sigma 0.6: the whole range is tried."""
 

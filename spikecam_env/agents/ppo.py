@@ -36,7 +36,7 @@ Ended = tuple[float, ...]  # (return, performance, success) of an episode
 class PPO:
     """steps: of all environments together; rollout: of each between updates; leg: updates; place: w."""
 
-    steps: int = 98_304
+    steps: int = 49_152
     rollout: int = 64
     leg: int = 16
     epochs: int = 4

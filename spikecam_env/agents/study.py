@@ -18,10 +18,11 @@ import numpy as np
 from pydantic import Field
 from tqdm import tqdm
 
-from spikecam_env.agents.agent import Agent
+from spikecam_env.agents.agent import Agent, shipped
 from spikecam_env.agents.playing import Actor, episodes_of, score_of
+from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.tracker import Tracker
-from spikecam_env.agents.training import SIGHTS, Study, budget, train_agent
+from spikecam_env.agents.training import SIGHTS, Study, train_agent
 from spikecam_env.checked import checked_number
 from spikecam_env.datasets.ray_cluster import connected
 from spikecam_env.envs.tasks.low_light import LowLight
@@ -32,17 +33,18 @@ from spikecam_env.whole import write_text_whole
 T = TypeVar("T")
 R = TypeVar("R")
 
-TRACKERS = {"tracker": "tfp", "tracker-rate": "rate", "tracker-clean": "clean"}
-"""The classical tracker, which does not learn, by what it sees."""
+SEEN = {"": "tfp", "-rate": "rate", "-clean": "clean"}
+READY = {f"{who}{ending}": sight for who in ("tracker", "shipped") for ending, sight in SEEN.items()}
+"""Who learns nothing in a study, by what is seen: the classical tracker, and the shipped agent, trained on `tfp`."""
 
 
 class Case(Declared):
     """A cell and a seed.
 
     task      an id
-    sight     a name of `training.SIGHTS`, or of TRACKERS
+    sight     a name of `training.SIGHTS`, or of READY
     interval  mean interval of a pixel [frames], of LowLight alone; None is the task's own light
-    steps     of training; 0 of a tracker
+    steps     of training; 0 of READY
     episodes  of the test split that judge; None is `playing.episodes_of` the task
     """
 
@@ -62,7 +64,7 @@ class Case(Declared):
     def study(self) -> Study:
         """What is put before the learner."""
         light = {} if self.interval is None else {"task": LowLight(mean_interval=(self.interval, self.interval))}
-        return Study(self.task, TRACKERS.get(self.sight, self.sight), light)
+        return Study(self.task, READY.get(self.sight, self.sight), light)
 
     @property
     def folder(self) -> str:
@@ -89,30 +91,33 @@ def cases(
     episodes: int | None = None,
 ) -> list[Case]:
     """Every cell with every seed, all cells of the first seed first; `intervals` are of LowLight."""
+    for task in tasks:
+        Study(task)  # refuses unknown names
     for sight in sights:
-        if sight not in (*SIGHTS, *TRACKERS):
-            raise unknown_name("observation", sight, (*SIGHTS, *TRACKERS))
+        if sight not in (*SIGHTS, *READY):
+            raise unknown_name("observation", sight, (*SIGHTS, *READY))
     for interval in intervals:
         checked_number(interval, "interval", 1.0, unit="frames")
     found = [
-        Case(task=task, sight=sight, interval=interval, seed=seed, steps=_steps(task, sight, steps), episodes=episodes)
+        Case(task=task, sight=sight, interval=interval, seed=seed, steps=_steps(sight, steps), episodes=episodes)
         for seed in seeds
         for task in tasks
         for sight in sights
         for interval in (intervals if task.startswith("LowLight") and intervals else (None,))
     ]
     for case in found:
-        _ = case.study  # refuses unknown names
+        if case.sight.startswith("shipped") and case.task not in shipped():
+            raise unknown_name("agent", case.task, shipped())
     return found
 
 
 def measure(case: Case, out: Path) -> Result:
-    """Train, unless it is a tracker, and play the test episodes; out: folder in which its run is kept."""
+    """Train, unless nothing is to be learned, and play the test episodes; out: folder in which its run is kept."""
     curve: tuple[dict[str, float], ...] = ()
-    if case.sight not in TRACKERS:
+    if case.sight not in READY:
         folder = out / case.folder
         folder.mkdir(parents=True, exist_ok=True)
-        curve = tuple(train_agent(case.study, folder, budget(case.study, case.steps), case.seed).training["curve"])
+        curve = tuple(train_agent(case.study, folder, PPO(steps=case.steps), case.seed).training["curve"])
     env = case.study.make(split="test")
     try:
         score = score_of(actor_of(case, out, env), env, case.episodes or episodes_of(case.task))
@@ -122,9 +127,11 @@ def measure(case: Case, out: Path) -> Result:
 
 
 def actor_of(case: Case, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
-    """That plays a case: the tracker, or the agent whose training is kept in `out`."""
+    """That plays a case: the tracker, the shipped agent, or the one whose training is kept in `out`."""
     inner: Any = env.unwrapped
-    return Tracker(inner) if case.sight in TRACKERS else Agent.load(out / case.folder / "agent.pt")
+    if case.sight.startswith("tracker"):
+        return Tracker(inner)
+    return Agent.load(case.task if case.sight in READY else out / case.folder / "agent.pt")
 
 
 def study(wanted: Sequence[Case], out: Path, *, jobs: int = 1, ray: str | None = None) -> list[Result]:
@@ -196,5 +203,5 @@ def _row(cell: tuple[str, str, float | None], found: list[Result]) -> dict[str, 
     }
 
 
-def _steps(task: str, sight: str, steps: int | None) -> int:
-    return 0 if sight in TRACKERS else budget(Study(task, sight), steps).steps
+def _steps(sight: str, steps: int | None) -> int:
+    return 0 if sight in READY else steps or PPO.steps

@@ -22,6 +22,7 @@ from spikecam_env.agents.agent import Agent
 from spikecam_env.agents.policy import Recipe
 from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
+from spikecam_env.envs.tasks import TASKS, ReadSpin
 from spikecam_env.errors import unknown_name
 from spikecam_env.torch_settings import torch_settings
 from spikecam_env.whole import write_text_whole
@@ -50,6 +51,11 @@ class Study:
             raise unknown_name("observation", self.sight, SIGHTS)
 
     @property
+    def name(self) -> str:
+        """Of the task, without its size and version."""
+        return self.task.split("-")[0]
+
+    @property
     def keywords(self) -> dict[str, Any]:
         """Of an environment."""
         return {"obs_state": True, **SIGHTS[self.sight], **self.options}
@@ -76,8 +82,6 @@ LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4)}
 """Steps ago of the pictures that a task is learned from; others from (0, 4)."""
 POOL = {"Saccade": 1, "ReadSpin": 1}
 """Pixels squared that are averaged; others 2.  Spokes are finer than two pixels."""
-STEPS = {"Track": 81_920, "Catch": 98_304, "Saccade": 98_304}
-"""Of training, of a task's shipped agent; others 98 304."""
 
 
 def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
@@ -89,7 +93,8 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
     (64, 64)
     >>> cameras.close()
     """
-    name, spaces, action = study.task.split("-")[0], envs.single_observation_space, envs.single_action_space
+    name, task = study.name, TASKS[study.name]
+    spaces, action = envs.single_observation_space, envs.single_action_space
     assert isinstance(spaces, Dict) and isinstance(action, Box)
     picture = spaces["picture"]
     assert isinstance(picture, Box)
@@ -101,20 +106,12 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
         lags=LAGS.get(name, (0, 4)),
         actions=action.shape[0],
         pool=POOL.get(name, 2),
+        answers=task.further if issubclass(task, ReadSpin) else 0,
     )
 
 
-def budget(study: Study, steps: int | None = None) -> PPO:
-    """The learner's numbers for a task, with its steps or so many.
-
-    >>> budget(Study("Catch-v1")).steps, budget(Study("Catch-v1"), steps=4096).steps
-    (98304, 4096)
-    """
-    return PPO(steps=steps or STEPS.get(study.task.split("-")[0], 98_304))
-
-
 def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16) -> Agent:
-    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `budget(study)`.
+    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `PPO()`.
 
     >>> from pathlib import Path
     >>> from spikecam_env.agents.ppo import PPO
@@ -122,7 +119,7 @@ def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, 
     >>> Path("agent.pt").is_file()
     True
     """
-    ppo = ppo or budget(study)
+    ppo = ppo or PPO()
     with (
         closing(study.make_vec(environments)) as envs,
         torch_settings(threads=1, seed=seed),  # as many as pay for so small a network

@@ -42,8 +42,9 @@ class Agents:
         "frame1000",
         "tracker",
     )
-    """What agents see: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30, frame1000; the classical
-    tracker: tracker (sees tfp), tracker-rate, tracker-clean."""
+    """What agents see: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30, frame1000; without
+    training: tracker (classical, sees tfp), tracker-rate, tracker-clean; shipped (the task's shipped agent, trained on
+    tfp, sees it), shipped-rate, shipped-clean."""
     intervals: tuple[float, ...] = ()
     """Mean intervals [frames] at which LowLight-v1 is learned and played, each a row."""
     seeds: Annotated[int, Checked(checked_count, most=MOST_SEEDS)] = 5

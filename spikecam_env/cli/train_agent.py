@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -29,7 +29,7 @@ class TrainAgent:
     obs: str = "tfp"
     """What the agent sees: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30 or frame1000."""
     steps: Count | None = None
-    """Steps of all environments together.  Default: as many as the shipped agent of the task had."""
+    """Steps of all environments together.  Default: as many as the shipped agents had."""
     seed: Seed = 0
     """Seed of network, actions, episodes and cameras."""
     environments: Annotated[int, Checked(checked_count, most=MOST_ENVIRONMENTS)] = 16
@@ -38,14 +38,14 @@ class TrainAgent:
     """Train by PPO from rewards alone, without the auxiliary loss that asks for the target's place."""
 
     def run(self) -> None:
-        from spikecam_env.agents.training import Study, budget, train_agent
+        from spikecam_env.agents.ppo import PPO
+        from spikecam_env.agents.training import Study, train_agent
         from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.table import table
 
         study = Study(self.task.removeprefix("spikecam_env/"), self.obs)
         with out_folder(self.out):
-            ppo = budget(study, self.steps)
-            ppo = replace(ppo, place=0.0) if self.plain else ppo
+            ppo = PPO(steps=self.steps or PPO.steps, place=0.0 if self.plain else PPO.place)
             agent = train_agent(study, self.out, ppo, self.seed, self.environments)
         print(table(agent.training["curve"][-10:]))
         print(f"wrote agent.pt, curve.json and last.pt in {self.out}")

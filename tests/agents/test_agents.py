@@ -16,11 +16,12 @@ from spikecam_env.agents import study as studies
 from spikecam_env.agents.agent import Agent, shipped
 from spikecam_env.agents.history import History
 from spikecam_env.agents.playing import score_of
-from spikecam_env.agents.policy import Recipe
+from spikecam_env.agents.policy import LOG_SIGMA, Recipe
 from spikecam_env.agents.ppo import PPO, _gain
 from spikecam_env.agents.tracker import Tracker
 from spikecam_env.agents.training import Study, train_agent
 from spikecam_env.cli.main import run as command
+from spikecam_env.envs.tasks.read_spin import SAID
 from spikecam_env.errors import InputError
 
 SMALL = PPO(steps=17 * 2 * 8, rollout=8, epochs=1)
@@ -46,6 +47,36 @@ def test_the_place_of_a_map_is_where_it_is_high() -> None:
     maps[0, 0, 6, 2] = 20.0
     x, y, _ = policy._places(maps)[0].tolist()
     assert (x, y) == pytest.approx((-0.5, 0.5), abs=1e-3)
+
+
+def test_maps_of_any_scale_give_the_same_action_and_pass_the_gradient_on() -> None:
+    torch.manual_seed(0)
+    policy = Recipe(channels=1, shape=(32, 32), high=255, lags=(0,), actions=1).network()
+    pictures, state = torch.randint(0, 256, (8, 1, 32, 32), dtype=torch.uint8), torch.zeros(8, 3)
+
+    def taught() -> tuple[torch.Tensor, float]:
+        policy.zero_grad()
+        _, value, _ = policy(pictures, state)
+        value.square().sum().backward()
+        return value.detach(), float(policy.trunk[0].weight.grad.norm())
+
+    value, gradient = taught()
+    policy.eye[4].weight.data *= 1000
+    policy.eye[4].bias.data *= 1000
+    large_value, large_gradient = taught()
+    print(f"gradient of the first layer that steers: {gradient:.3g}, with maps a thousandfold {large_gradient:.3g}")
+    assert large_value.tolist() == pytest.approx(value.tolist(), rel=0.05)
+    assert large_gradient == pytest.approx(gradient, rel=0.05)
+
+
+def test_an_agent_that_is_to_read_says_nothing_before_it_learns() -> None:
+    recipe = Recipe(channels=1, shape=(32, 32), high=255, lags=(0,), actions=6, answers=4)
+    mean = recipe.network().mean.bias.detach()
+    said = torch.distributions.Normal(mean[2:], torch.tensor(LOG_SIGMA).exp()).cdf(torch.tensor(SAID))
+    one_of_them = 1 - float(said.prod())
+    print(f"an answer by chance in {100 * one_of_them:.1f} % of the steps")
+    assert mean[:2].tolist() == [0, 0]
+    assert 1 / 100 < one_of_them < 1 / 25  # in the 25 steps that the way takes, and not never in the 250
 
 
 def test_gain_is_the_discounted_sum_of_surprises_to_the_end_of_an_episode() -> None:
@@ -119,7 +150,8 @@ def test_the_tracker_is_as_good_as_the_oracle(task: str, episodes: int, obs: str
 
 
 @pytest.mark.parametrize(
-    "task, least, episodes", [("Catch-v1", 0.6, 20), ("Saccade-v1", 0.5, 10), ("Track-v1", 0.7, 1)]
+    "task, least, episodes",
+    [("Catch-v1", 0.6, 20), ("Saccade-v1", 0.5, 10), ("Track-v1", 0.7, 1), ("LowLight-v1", 0.7, 1)],
 )
 def test_a_shipped_agent_does_its_task(task: str, least: float, episodes: int) -> None:
     agent = Agent.load(task)
@@ -163,3 +195,13 @@ def test_a_study_goes_on_from_its_record(tmp_path: Path, monkeypatch, capsys) ->
     assert sorted(film.name for film in tmp_path.glob("*.mp4")) == ["Catch-v1-frame30-0.mp4", "Catch-v1-tracker-0.mp4"]
     rows = [row.split() for row in first.splitlines() if row.startswith("Catch-v1")]
     assert [row[1] for row in rows] == ["tracker", "frame30"] and float(rows[0][3]) == 1.0
+
+
+def test_a_study_plays_the_agent_that_comes_with_the_package(tmp_path: Path) -> None:
+    result = studies.measure(studies.Case(task="Catch-v1", sight="shipped", episodes=5), tmp_path)
+    agent = Agent.load("Catch-v1")
+    env = agent.make(split="test")
+    assert result.score == score_of(agent, env, 5) > 0
+    env.close()
+    with pytest.raises(InputError, match=r"ReadDigit-v1.*Catch-v1"):
+        studies.cases(["ReadDigit-v1"], ["shipped"], [], range(1), None)

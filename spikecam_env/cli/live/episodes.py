@@ -75,7 +75,6 @@ def episode(env: gymnasium.Env[Any, Any], player: Player, seed: int) -> Iterator
     if not isinstance(camera, AimingEnv):
         raise TypeError(f"{type(camera).__name__} is no AimingEnv: it has no target")
     camera.action_space.seed(seed)
-    player.begin()
     seen, info = env.reset(seed=seed)
     step, reward, total, over = 0, 0.0, 0.0, False
     while True:

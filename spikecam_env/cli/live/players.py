@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,13 +17,12 @@ from spikecam_env.errors import unknown_name
 
 @dataclass(frozen=True)
 class Player:
-    """act: see `envs.score.Policy`; begin: called before each episode; sees: keywords of the environment it needs.
+    """act: see `envs.score.Policy`; sees: keywords of the environment it needs.
 
     actions: numbers of its action, None where it suits every environment.
     """
 
     act: Policy
-    begin: Callable[[], object] = tuple
     sees: tuple[tuple[str, Any], ...] = (("obs", "tfp"),)
     actions: int | None = None
 
@@ -36,12 +35,13 @@ def player(name: str) -> Player:
     if name in BASELINES:
         return Player(BASELINES[name])
     from spikecam_env.agents.agent import Agent, is_file, shipped
+    from spikecam_env.agents.playing import policy_of
 
     if not is_file(name) and name not in shipped():
         raise unknown_name("policy", name, (*BASELINES, *shipped()))
     agent = Agent.load(name)
     sees = (("obs", agent.obs), ("obs_state", True))
-    return Player(lambda seen, env: agent.act(seen), agent.begin, sees, agent.policy.recipe.actions)
+    return Player(policy_of(agent), sees, agent.policy.recipe.actions)
 
 
 def steering(held: Iterable[str]) -> Policy:
