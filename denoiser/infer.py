@@ -76,7 +76,7 @@ def _rates(
 
 def on_host(tensor: Tensor) -> NDArray[Any]:
     """As an array, C-contiguous."""
-    return tensor.contiguous().cpu().numpy()  # type: ignore[no-any-return]
+    return tensor.contiguous().cpu().numpy()
 
 
 def _as_in_training(

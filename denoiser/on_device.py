@@ -110,8 +110,8 @@ class DeviceStreams:
         carried = tuple(torch.where(goes_on, before[rows], 0.0) for before in self._carried)
         spikes = windows.frames.to(self._type).contiguous(memory_format=torch.channels_last)
         with torch.autocast(self.device.type, self._type, enabled=self._type != torch.float32):
-            rates, left = self._network(spikes, planes, carried)
-        rates = rates.float().clamp(0.0, 1.0)
+            found, left = self._network(spikes, planes, carried)
+        rates: Tensor = found.float().clamp(0.0, 1.0)
         self._windows.put(rows, learned(self.layout, windows, rates))
         for before, now in zip(self._carried, left, strict=True):
             before[rows] = now.float()

@@ -114,8 +114,7 @@ class SlidingTexture:
         return x, y
 
     def _on(self, device: Any, frame: NDArray[np.float64], gaze: Gaze | None) -> Keyframes:
-        there = on_device()
-        return there.repeated_on(
+        found: Keyframes = on_device().repeated_on(
             self._samples,
             lambda samples: _in_order(samples, self._period),
             frame,
@@ -124,6 +123,7 @@ class SlidingTexture:
             SAMPLES_PER_PIXEL,
             device,
         )
+        return found
 
     def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
         x, y = self._first_sample(frame, gaze)

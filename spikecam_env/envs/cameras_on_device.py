@@ -53,7 +53,7 @@ class DeviceCameras:
         light = self._light(each)
         spikes = self._batch.step(light, self._envs[0].frames_per_step)
         for env, own, block in zip(self._envs, light, spikes, strict=True):
-            env.take(own, block)  # type: ignore[arg-type]
+            env.take(own, block)
         there: Any = spikes
         return Blocks(there, light, self._envs[0].model.frame_rate_hz)
 

@@ -175,7 +175,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         if self._there is None:
             return seen, np.array(rewards, np.float64), *ends, info
         of_agents = seen, np.array(rewards, np.float64), *ends
-        return *map(self._cameras.tensors, of_agents), info  # type: ignore[return-value]
+        return *map(self._cameras.tensors, of_agents), info
 
     def _blocks(self) -> Blocks:
         """The next block of all, in memory of its own."""

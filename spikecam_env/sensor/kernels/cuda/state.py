@@ -135,7 +135,7 @@ def _stacked(pictures: Sequence[NDArray[np.float32] | torch.Tensor], device: tor
     """(B, P) of B pictures; a view of one that is on the device."""
     tensors = [picture for picture in pictures if isinstance(picture, torch.Tensor)]
     if not tensors:
-        return torch.from_numpy(np.stack(pictures)).to(device)  # type: ignore[arg-type]
+        return torch.from_numpy(np.stack(pictures)).to(device)
     if len(tensors) < len(pictures):
         tensors = [torch.as_tensor(picture, device=device) for picture in pictures]
     return (tensors[0][None] if len(tensors) == 1 else torch.stack(tensors)).to(device)
