@@ -16,22 +16,15 @@ from scipy import stats
 from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, own_variance, with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.compare.thresholds import TO_PREFER
 
 Array = NDArray[np.float64]
-
-LEAST_CHANCE = 0.01
-"""Chance of so large a lead below which a candidate is no rival."""
-
-APART = 3.0
-"""Noises by which twins of two candidates have to differ for it to be their laws."""
 
 
 def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Prediction, other: Prediction) -> bool:
     """Whether `measured` may as well be of `other`; null: what both were added to.  draws: of the model as given, whose
     noise is made as large as that of `null`."""
     observed = lead(null, measured, best, other)
-    if observed < TO_PREFER:
+    if observed < null.settings.deviance.tie:
         return True
     noise = np.array([d.values for d in draws])
     noise = noise - noise.mean(axis=0)
@@ -43,16 +36,16 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
     by_chance = [lead(null, np.where(known, middle + n, np.nan), best, other) for n in noise]
     above = observed - np.mean(by_chance)
     sd = np.std(by_chance, ddof=1) * np.sqrt(1 + 1 / len(noise))
-    return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > LEAST_CHANCE)
+    return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > null.settings.searching.least_chance)
 
 
 def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:
     """((S,) what `other` most likely gives, (S,) the variance of that): where twins of the two do not clearly differ,
-    both
-    say what it gives.  Its own chance, taken for its law, would be held against it."""
+    both say what it gives.  Its own chance, taken for its law, would be held against it."""
     apart, own2, others2 = best.mean - other.mean, own_variance(null, other), own_variance(null, best)
     both2 = np.maximum(own2 + others2, 1e-300)
-    share = np.where(np.abs(apart) > APART * np.sqrt(both2), 0.0, own2 / both2)
+    clearly = np.abs(apart) > null.settings.judging.apart * np.sqrt(both2)
+    share = np.where(clearly, 0.0, own2 / both2)
     return other.mean + share * apart, (1.0 - share) * own2
 
 

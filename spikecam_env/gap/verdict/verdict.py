@@ -17,7 +17,7 @@ from spikecam_env.gap.compare.distance import adjusted, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.result import Conclusion, NamedEffect, Remainder, Statistic
-from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
+from spikecam_env.gap.search.forward import SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.comparison import Comparison
@@ -31,9 +31,6 @@ from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-CHANCE_P = 0.002
-"""Adjusted p-value from which what no candidate explains may be chance; set on the trial's part `tune`."""
 
 
 def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> Conclusion:
@@ -57,7 +54,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
         notes=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in found])),
         gap=gap_of(case, null, comparison.values, comparison.given, last, usable_floor(floor)),
         statistics=statistics_rows(comparison, last.mean, left),
-        ranking=ranking(rounds, found),
+        ranking=ranking(rounds, found, null.settings.deviance.accept),
         not_testable=comparison.not_testable,
         patched=with_strengths(model, off),
         remainder=remainder if verdict == "named" else None,
@@ -113,7 +110,7 @@ def with_patterns_of(model: SensorModel, found: SensorModel) -> SensorModel:
 
 def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> bool:
     """Whether nothing was found, and the alarm was a weak one."""
-    return not found and comparison.smallest_p > CHANCE_P
+    return not found and comparison.smallest_p > comparison.null.settings.judging.chance_p
 
 
 def second_left_out(case: Case) -> bool:
@@ -157,7 +154,8 @@ def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> dic
 
 def enough_effort(case: Case) -> int:
     """Budget with which another effect would have been looked for beside those found, in tens."""
-    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + CAMPAIGNS_PER_EFFECT + 1) / 10)
+    another = case.settings.searching.campaigns_per_effect
+    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + another + 1) / 10)
 
 
 def tied(found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from spikecam_env.gap.search import choice, forward, neighbours, rivals
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
 from spikecam_env.gap.search.neighbours import is_missed, try_without_earlier
 from spikecam_env.gap.search.round import is_improvement
+from spikecam_env.gap.settings import Deviance, DiagnosisSettings, Searching
 from spikecam_env.gap.statistics import Key
 from spikecam_env.sensor import CATALOGUE
 
@@ -122,7 +123,6 @@ def test_a_later_effect_has_to_remove_4_to_be_fitted_with_those_before_it(remove
     monkeypatch.setattr(forward, "is_significant", lambda *_: True)
     monkeypatch.setattr(forward, "is_small_share", lambda *_: False)
     monkeypatch.setattr(forward, "is_improvement", lambda *_: True)
-    monkeypatch.setattr(forward, "MOST_EFFECTS", 2)
     monkeypatch.setattr(forward, "is_discrepant", lambda *_: True)
     monkeypatch.setattr(forward, "try_cancelling_pair", lambda problem, names, rounds: rounds)
     monkeypatch.setattr(Problem, "standing_on", lambda problem, *_: problem)
@@ -140,9 +140,10 @@ def test_a_later_effect_has_to_remove_4_to_be_fitted_with_those_before_it(remove
         conditions=(),
         observations=(),
         scenes_only=False,
+        settings=DiagnosisSettings(),
         budget=SimpleNamespace(allows=lambda *_, **__: True),
     )
-    n = null()
+    n = replace(null(), settings=DiagnosisSettings(searching=Searching(most_effects=2)))
     forward.forward_selection(Problem(case, MODEL, n, n.mean, n.mean), [], None)
     assert asked == joined
 
@@ -207,17 +208,17 @@ def test_an_earlier_effect_has_to_be_missed_by_15_to_be_kept(missed: float, kept
         "confirmed",
         lambda problem, found: found if found.model is both.model else replace(found, misfit=100.0 + missed),
     )
-    after = try_without_earlier(SimpleNamespace(), both, {"dead_time": np.zeros(COUNT)})
+    after = try_without_earlier(SimpleNamespace(settings=DiagnosisSettings()), both, {"dead_time": np.zeros(COUNT)})
     assert ("dead_time" in {e.name for e in after.model.effects}) is kept
 
 
 @pytest.mark.parametrize("missed, plainly", [(100.0, False), (220.0, True)])
 def test_an_effect_missed_by_150_is_kept_without_a_simulation(missed: float, plainly: bool):
-    problem = SimpleNamespace(misfit=lambda predicted: 100.0 + missed)
+    problem = SimpleNamespace(misfit=lambda predicted: 100.0 + missed, settings=DiagnosisSettings())
     assert is_missed(problem, some_fit("dead_time", 100.0), np.zeros(COUNT)) is plainly
 
 
 @pytest.mark.parametrize("above, asked", [(10.0, 3), (22.0, 2)])
 def test_a_fit_15_above_the_best_confirmed_is_not_confirmed(above: float, asked: int):
     fits = [some_fit(name, misfit) for name, misfit in (("a", 100.0), ("b", 101.0), ("c", 100.0 + above))]
-    assert len(confirmed_in_order(fits, lambda f: f)[0]) == asked
+    assert len(confirmed_in_order(fits, lambda f: f, Deviance().keep)[0]) == asked
