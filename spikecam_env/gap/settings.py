@@ -12,14 +12,17 @@ measured table a property of each group of statistics: its floor (`statistics.FL
 numerics       a step of a derivative, a regularisation, a limit against overflow or endless loops.
 layout         rows, decimals and sizes of a page.
 
-The others stay where they are used.  `tools/settings_page.py` makes the page docs/reference/diagnosis_settings.md
-from the declarations below; `tests/gap/test_settings.py` changes each of them by a factor of two.
+The others stay where they are used.  `tools/site/settings.py` makes docs/reference/diagnosis_settings.md from the
+declarations below.  `tests/gap/test_settings.py` changes each of them by a factor of two.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
+
+from spikecam_env.errors import unknown_name
 
 CHOICE = "a choice; the blind trial measures it with the others"
 TUNED = "set on the blind trial's part `tune`"
@@ -377,7 +380,7 @@ class MapSettings:
 
 @dataclass(frozen=True)
 class DiagnosisSettings:
-    """Every setting of a diagnosis, by stage; `dataclasses.replace` changes some.
+    """Every setting of a diagnosis, by stage.
 
     >>> DiagnosisSettings().deviance.keep
     15.0
@@ -394,6 +397,21 @@ class DiagnosisSettings:
     concluding: Concluding = field(default_factory=Concluding)
     bounding: Bounding = field(default_factory=Bounding)
     maps: MapSettings = field(default_factory=MapSettings)
+
+    @classmethod
+    def of(cls, changes: Mapping[str, Any]) -> DiagnosisSettings:
+        """The defaults with some settings changed, as `changed` lists them.  Raises InputError for an unknown name.
+
+        >>> DiagnosisSettings.of({"deviance.tie": 8.0}).deviance.dismiss
+        16.0
+        """
+        known, out = [f"{stage}.{name}" for stage, name, _ in every_setting()], cls()
+        for name, value in changes.items():
+            if name not in known:
+                raise unknown_name("setting", name, known)
+            stage, key = name.split(".")
+            out = replace(out, **{stage: replace(getattr(out, stage), **{key: value})})
+        return out
 
     def changed(self) -> dict[str, Any]:
         """Settings that differ from their defaults: {"stage.name": value}."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import chain, repeat
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted import COUNT, FREE, NAME, TWINS, found_at, null, scripted, some_fit, with_reset
 from small import MODEL, effect, unit
 
-from spikecam_env.gap.candidates.strength import with_effect
-from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.fit.candidate import Fit, fit
+from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.gauss_newton import descend
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import with_fitted_shapes
@@ -21,66 +20,6 @@ from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
 from spikecam_env.gap.search.neighbours import is_missed, try_without_earlier
 from spikecam_env.gap.search.round import is_improvement
 from spikecam_env.gap.settings import Deviance, DiagnosisSettings, Searching
-from spikecam_env.gap.statistics import Key
-from spikecam_env.sensor import CATALOGUE
-
-COUNT, TWINS = 20, 6
-NAME = "incomplete_reset"
-FREE = [(NAME, "fraction"), (NAME, "tau_us")]
-
-
-def null() -> Null:
-    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
-    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
-    return Null(keys, values.mean(axis=0), np.ones(COUNT), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
-
-
-def with_reset(fraction: float):
-    return with_effect(MODEL, NAME, {"fraction": fraction, "tau_us": 300.0})
-
-
-def law(model) -> np.ndarray:
-    """Half of the statistics in proportion to the fraction, as many to its product with a root of the time constant."""
-    there = next((e.parameters() for e in model.effects if e.name == NAME), {"fraction": 0.0, "tau_us": 300.0})
-    power = np.where(np.arange(COUNT) < COUNT // 2, 0.0, 0.5)
-    return 20.0 * there["fraction"] / 0.02 * (there["tau_us"] / 300.0) ** power
-
-
-@dataclass(frozen=True, eq=False)
-class Scripted(Problem):
-    """Misfits as they are listed, one after another, and twins by a law.  predicted: fractions that were simulated."""
-
-    script: object = None
-    predicted: list[float] = field(default_factory=list)
-
-    def misfit(self, predicted=None) -> float:
-        return next(self.script)
-
-    def predict(self, model, base, count, only=None) -> Prediction:
-        self.predicted.append(next(e.parameters()["fraction"] for e in model.effects if e.name == NAME))
-        values = self.null.mean + law(model)
-        return Prediction(values, np.full(COUNT, 0.4), self.null.sd, (Draw(TWINS - 1, values, None),))
-
-    def affected(self, names, change=None) -> list[int]:
-        return [0]
-
-
-def scripted(*misfits) -> Scripted:
-    n = null()
-    measured = n.mean + law(with_reset(0.02))
-    return Scripted(SimpleNamespace(jobs=1, base=unit()), MODEL, n, measured, measured, script=chain(*misfits))
-
-
-def found_at(fraction: float, misfit: float) -> Fit:
-    n, there = null(), with_reset(fraction)
-    prediction = Prediction(n.mean + law(there), n.sd, n.sd)
-    return Fit(NAME, {"fraction": fraction, "tau_us": 300.0}, {}, prediction, unit(), np.zeros(COUNT), misfit, there)
-
-
-def some_fit(name: str, misfit: float) -> Fit:
-    model = MODEL.with_effect(effect(name)) if name in CATALOGUE else MODEL
-    return replace(found_at(0.02, misfit), name=name, model=model)
 
 
 @pytest.mark.parametrize("promised, steps", [(0.7, 0), (1.5, 1)])
