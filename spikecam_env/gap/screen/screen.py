@@ -27,9 +27,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """A candidate by its template.  start: parameters to fit from.  misfit: that it would leave.
+    """A candidate by its template.
 
-    expected: (S,) change of the statistics there.  white: s^2 of the unit there, over the refit's.
+    Args:
+        name: of the candidate.
+        start: parameters to fit from.
+        misfit: that it would leave.
+        expected: (S,) change of the statistics at the start.
+        white: s^2 of the unit at the start, over the refit's.
     """
 
     name: str
@@ -47,9 +52,18 @@ def screen(
     names: Sequence[str],
     line_hz: float | None = None,
 ) -> list[Screened]:
-    """Candidates by the misfit that their best template of each shape, scaled, would leave; least first.
+    """Scale templates to a measurement, and keep the best of each candidate and shape.
 
-    line_hz: frequency of the strongest line of the measured spectra, to start periodic candidates from.
+    Args:
+        templates: the bank.
+        conditions: of the recordings.
+        null: what the model predicts without a candidate.
+        measured: (S,) statistics, NaN where they take no part.
+        names: of the candidates.
+        line_hz: frequency [Hz] of the strongest line of the measured spectra, from which periodic candidates start.
+
+    Returns:
+        Candidates by the misfit that they would leave, the least first.
     """
     at = _places(templates, conditions, null.keys)
     d = in_noise(null, measured)

@@ -32,8 +32,12 @@ START_US = 1.0
 
 
 def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
-    """Both added to the model, at the strength that suits what is seen best, as a fit of the second; None where only a
-    wrong sign would do, or one of them is not among the candidates `names`."""
+    """Fit both effects at once, by one strength.
+
+    Returns:
+        A fit of the second whose model has both.  None if only a strength of the wrong sign would do, or if one of
+        them is not among the candidates `names`.
+    """
     if not set(PAIR) <= set(names):
         return None
     frame_rate_hz, settings = problem.case.frame_rate_hz, problem.settings

@@ -22,10 +22,20 @@ def confirmed_in_order(
     known: Sequence[Fit] = (),
     enough: float = np.inf,
 ) -> tuple[list[Fit], list[Fit]]:
-    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, two
-    at least, until one, as much better as that made the others, would be `margin` above the best.
+    """Confirm fits, which rest on one twin each, by more twins, from the best on.
 
-    known: confirmed before.  enough: misfit that one has to come down to, for any to be confirmed.
+    At least two are confirmed.  Confirmation ends at a fit that would be `margin` above the best one, even if it got
+    as much better as any did.
+
+    Args:
+        fits: in any order.
+        confirm: simulates a fit with more twins.
+        margin: misfit above the best that chance cannot explain.
+        known: fits that were confirmed before.
+        enough: misfit that a fit has to come down to for any to be confirmed.
+
+    Returns:
+        (confirmed fits, the best first; the others).
     """
     waiting, done, better = sorted(fits, key=lambda f: f.misfit), list(known), 0.0
     while waiting:
@@ -38,12 +48,19 @@ def confirmed_in_order(
 
 
 def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) -> tuple[list[Fit], tuple[str, ...]]:
-    """(fits, the chosen one first; names of its rivals).  What may as well be true as the first, by the recordings to
-    fit, or leaves hardly more, is put in order by all recordings, and has to be a rival by them.  A parameter more has
-    to explain more: what has one is chosen where it leaves a tie less, and is a rival where it leaves as much less
-    as any parameter would (PER_PARAMETER).
+    """Choose among confirmed fits, and find the rivals of the chosen one.
 
-    here: what the candidates were added to.  draws: of the model as given.
+    All recordings decide between those that the recordings to fit do not separate from the first.  A fit with one more
+    parameter is chosen if its misfit is smaller by a tie.  It is a rival if its misfit is smaller by what a parameter
+    without a meaning removes (PER_PARAMETER).
+
+    Args:
+        here: what the candidates were added to.
+        draws: campaigns of the model as given.
+        confirmed: fits, the best first.
+
+    Returns:
+        (fits, the chosen one first; names of its rivals).
     """
     if not confirmed:
         return [], ()

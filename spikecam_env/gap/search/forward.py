@@ -128,10 +128,15 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
 
 
 def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Round]:
-    """The rounds with the last one's best together with what was found before, and all of it refined, while the budget
-    allows, unless it is a stand-in: the first, or one more bend, that has little to say and leaves something.
+    """The rounds with the last one's best effect beside all found before, and their parameters refined together.
 
-    The last one's best was judged by the model that it was added to; all together are by the one given (problem).
+    Effects that are no longer needed are left out.  Nothing is refined beyond the budget, or if the last effect is a
+    stand-in (`is_stand_in`).
+
+    Args:
+        problem: the model as given, by which all effects are judged together.
+        rounds: up to the last, whose best effect was judged by the model that it was added to.
+        chance: misfit of noise alone.
     """
     *before, last = rounds
     best = last.fits[0]
@@ -155,7 +160,7 @@ def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Rou
 
 
 def is_stand_in(problem: Problem, last: Round, best: Fit, chance: float, later: bool) -> bool:
-    """Whether the first effect, or one more bend, has little to say and leaves something."""
+    """Whether the first effect, or a second bend, removes little and leaves something: it may stand for another."""
     if later and not is_second_bend(last, best):
         return False
     little = is_small_share(last, best.misfit, chance, later, problem.settings.searching)

@@ -93,8 +93,7 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
 
 
 def with_pairs(fits: Sequence[Fit], of_pairs: Sequence[Fit], tie: float) -> list[Fit]:
-    """Fits of single candidates, with those of pairs in place of the first effect's where they leave less by more than
-    a tie."""
+    """Fits of single candidates; a pair's replaces its first effect's if it leaves less misfit by more than a tie."""
     alone = {f.name: f.misfit for f in fits}
     better = {f.name: f for f in of_pairs if f.misfit < alone.get(f.name, np.inf) - tie}
     return [*better.values(), *(f for f in fits if f.name not in better)]

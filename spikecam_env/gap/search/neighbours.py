@@ -42,8 +42,17 @@ Array = NDArray[np.float64]
 def try_other_starts(
     problem: Problem, found: Fit, before: float, screened: Sequence[Screened], tries: Mapping[Screened, Fit]
 ) -> list[Fit]:
-    """Fits, at most one, of a candidate from other starts than its fit, shaped, where one removes nearly as much as it
-    does before that.  before: misfit of none.  tries: fits from starts that were made before."""
+    """Fit a candidate from other starts than that of its best fit, and its shape from the best of them.
+
+    Args:
+        found: its best fit.
+        before: misfit without it.
+        screened: all starts, the best first.
+        tries: fits that were made from starts before.
+
+    Returns:
+        The shaped fit, if one of the starts removes nearly as much as `found` does; else nothing.
+    """
     began = min((s for s in tries if s.name == found.name), key=lambda s: tries[s].misfit)
     searching = problem.settings.searching
     starts = other_starts(began, screened, before, searching.worth)
@@ -76,8 +85,13 @@ def other_starts(began: Screened, screened: Sequence[Screened], before: float, w
 
 
 def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[Fit, Round]:
-    """(fit, round) with the effect of an earlier round put against its runners-up again, now that `best` has another
-    beside it: alone, a wrong one may have stood for both."""
+    """Compare the effect of an earlier round with its runners-up again, beside the effect that was found later.
+
+    Alone, a wrong effect may have stood for both.
+
+    Returns:
+        (the fit of all effects, the earlier round), with the effect that is better now.
+    """
     first, searching = turn.fits[0], problem.settings.searching
     least = turn.misfit - searching.worth * (turn.misfit - first.misfit)
     has = {e.name for e in best.model.effects}
@@ -103,8 +117,16 @@ def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[F
 
 
 def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: Sequence[str]) -> tuple[Round, Errors]:
-    """(round, errors) with the runner-up of the last round in place of its best, where all that was found together with
-    it leaves less by more than a tie.  names: of all effects found, the round's last."""
+    """Try the runner-up of the last round in place of its best, all parameters refined together.
+
+    Args:
+        last: the round.
+        errors: of all parameters, beside the best.
+        names: of all effects found, the round's last.
+
+    Returns:
+        (round, errors): with the runner-up if it leaves less misfit by more than a tie, else as given.
+    """
     for other in runner_up(last, names, problem.settings.searching.same_share):
         if not problem.allows(f"others in place of {names[-1]}"):
             continue
@@ -138,11 +160,15 @@ def may_try_without_earlier(problem: Problem, count: int) -> bool:
 
 
 def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Array]) -> Fit:
-    """All effects found so far together; one that is no longer needed is left out again.
+    """All effects found so far together, without those that are no longer needed.
 
-    problem: before any was added.  earlier: (S,) what each effect changed when it was added, by name; one whose change
-    is plainly missed is not simulated without.  Two twins may scatter little where the many that `found` stands on have
-    shown that campaigns do not.
+    Errors stay as large as the many twins of `found` have shown them: two twins may scatter little by chance.
+
+    Args:
+        problem: before any effect was added.
+        found: the fit of all effects.
+        earlier: (S,) what each effect changed when it was added, by name.  An effect whose change is plainly missed is
+            kept without a simulation.
     """
     both = confirmed(problem, resettled(problem, found, found.model))
     both = no_more_certain(problem, both, found.prediction)
@@ -156,8 +182,7 @@ def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Arra
 
 
 def is_missed(problem: Problem, found: Fit, change: Array) -> bool:
-    """Whether a prediction less a change of its statistics leaves plainly more: twins without it would say the
-    same."""
+    """Whether a prediction without a change (S,) leaves so much more misfit that no simulation is needed."""
     without = replace(found.prediction, mean=found.prediction.mean - change)
     return problem.misfit(without) > found.misfit + problem.settings.deviance.keep_untried
 
@@ -166,8 +191,12 @@ def is_missed(problem: Problem, found: Fit, change: Array) -> bool:
 
 
 def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Round]) -> list[Round]:
-    """Rounds that find two bends that cancel, where those of the search leave something and began with a bend; those of
-    the search where the two leave no less."""
+    """Try two bends that cancel, if the search began with a bend and leaves something.
+
+    Returns:
+        Rounds that find the two, if they leave less misfit than the search by what an effect has to remove; else the
+        rounds of the search.
+    """
     first, last = rounds[0], rounds[-1]
     null = problem.null
     if not first.fits or not candidate(first.fits[0].name).bends_response:
@@ -205,8 +234,9 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
 
 
 def try_more_draws(problem: Problem, found: Fit) -> Fit:
-    """The fit, by as many draws as the null has where those it stands on are too few to say whether it leaves anything,
-    and by ten times as many units where what it leaves is of the pattern."""
+    """The fit by more draws, if its few twins do not show whether it leaves anything.
+
+    It gets as many draws as the null model has, and ten times as many units if it leaves something of the pattern."""
     null, many = problem.null, 10 * problem.settings.twins.drawn_units
     pattern = found.prediction.units is not None and is_significant(null, of_pattern(problem, found), found.prediction)
     if pattern:

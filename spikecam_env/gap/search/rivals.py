@@ -21,8 +21,17 @@ Array = NDArray[np.float64]
 
 
 def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Prediction, other: Prediction) -> bool:
-    """Whether `measured` may as well be of `other`; null: what both were added to.  draws: of the model as given, whose
-    noise is made as large as that of `null`."""
+    """Whether a measurement does not separate one candidate from another.
+
+    It does if the lead of the best is larger than chance makes it in campaigns in which the other is true.
+
+    Args:
+        null: what both were added to.
+        draws: campaigns of the model as given; their noise is made as large as that of `null`.
+        measured: (S,) statistics, NaN where they take no part.
+        best: what the best candidate predicts.
+        other: what the other predicts.
+    """
     observed = lead(null, measured, best, other)
     if observed < null.settings.deviance.tie:
         return True
@@ -40,8 +49,13 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
 
 
 def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:
-    """((S,) what `other` most likely gives, (S,) the variance of that): where twins of the two do not clearly differ,
-    both say what it gives.  Its own chance, taken for its law, would be held against it."""
+    """What a candidate most likely gives: where its twins do not clearly differ from the best's, the mean of both.
+
+    Otherwise the chance of its few twins would count as its law.
+
+    Returns:
+        ((S,) mean, (S,) its variance).
+    """
     apart, own2, others2 = best.mean - other.mean, own_variance(null, other), own_variance(null, best)
     both2 = np.maximum(own2 + others2, 1e-300)
     clearly = np.abs(apart) > null.settings.judging.apart * np.sqrt(both2)
@@ -50,8 +64,10 @@ def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array,
 
 
 def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
-    """Misfit by which `best` is better than `other`, each at the strength that suits `seen`, in the noise of both: two
-    twins of each do not show whose campaigns scatter more, and the log variance would decide."""
+    """Misfit by which `best` is better than `other`, each at the strength that suits `seen` (S,) best.
+
+    Both are judged in the mean of their noises.  Two twins of each do not show which one's campaigns scatter more, and
+    the logarithm of the variance would decide."""
     both = [rescaled(null, seen, p) for p in (other, best)]
     spread = np.sqrt(np.mean([p.spread**2 for p in both], axis=0))
     left = [residual_and_misfit(null, seen, replace(p, spread=spread))[1] for p in both]

@@ -49,14 +49,16 @@ def has_candidate(turn: Round, here: Null) -> bool:
 
 
 def is_second_bend(turn: Round, found: Fit) -> bool:
-    """Whether a fit bends the rate curve beside an effect that does: others of them fit in its error, and what is less
-    than is asked of a first effect says nothing."""
+    """Whether a fit bends the rate curve beside an effect that bends it too.
+
+    A bend fits the error of another, so it has to remove as much misfit as a first effect."""
     return candidate(found.name).bends_response and any(candidate(e.name).bends_response for e in turn.model.effects)
 
 
 def is_visible(here: Null, found: Fit) -> bool:
-    """Whether an effect does anything that a statistic would show, in the mean or by how campaigns scatter (a few hot
-    pixels are in some units); of one whose course is random always."""
+    """Whether an effect changes the mean or the scatter of a statistic clearly.
+
+    Scatter counts since a few hot pixels are in some units only.  An effect of random course is always visible."""
     there = found.prediction
     change = np.hypot(there.mean - here.mean, np.sqrt(np.maximum(there.spread**2 - here.sd**2, 0.0))) / here.noise
     return candidate(found.name).random_course or bool(change.max() > here.settings.searching.least_change)

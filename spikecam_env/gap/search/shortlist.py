@@ -35,8 +35,9 @@ def line_of(case: Case) -> float | None:
 
 
 def screened_beside(here: Problem, names: Sequence[str], templates: Templates) -> list[Screened]:
-    """Candidates by what their templates leave, best first; of those that act through what the model has already, by
-    templates of their own."""
+    """Candidates by the misfit that their templates leave, the best first.
+
+    Candidates that act through an effect of the model get templates that are simulated on this campaign."""
     null, shown = here.null, here.case.conditions
     found = screen(templates, shown, null, here.seen, names, line_of(here.case))
     if through := acting_through(names, here.model, shown):
@@ -53,12 +54,18 @@ def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
 def starts_to_fit(
     shapes: Sequence[Screened], before: float, searching: Searching, groups: Collection[str] = ()
 ) -> list[Screened]:
-    """The best by their templates, the fewest and those that explain enough of what the best does; one that takes
-    several twins a try is tried for that alone.  before: misfit of none.
+    """Which candidates to fit, and from where: the best by their templates.
 
-    groups: of statistics that stand out.  Where the pattern does, with all that only change it, whose statistics are
-    not in proportion to their strength; where motion does, with all that show by it alone, in every shape: templates
-    are of other pictures.
+    Those are `fewest_fitted`, and up to `most_fitted` if they explain enough of what the best explains.  A candidate
+    that takes several twins a try has to explain enough in any case.
+
+    Args:
+        shapes: candidates by their templates of each shape, the best first.
+        before: misfit of none.
+        searching: how many are fitted.
+        groups: of statistics that stand out.  If the pattern does, all candidates that only change it are fitted too:
+            its statistics are not in proportion to their strength.  If motion does, all that show by it alone are, in
+            every shape: templates are of other pictures.
     """
     screened = best_of_each(shapes)
     if not screened:

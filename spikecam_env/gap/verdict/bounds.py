@@ -45,10 +45,21 @@ MORE_EFFORT = "a larger --effort: enough had been simulated"
 def bounds(
     case: Case, model: SensorModel, null: Null, measured: Array, names: Sequence[str], templates: Templates
 ) -> tuple[list[Bound], list[tuple[str, str]]]:
-    """(upper bounds of effects that were not found, names of those that have none with what would give one).
+    """Upper bounds of effects that were not found.
 
-    model, null: what explains the campaign.  measured: (S,) its statistics.  templates: where to begin.  Of an
-    effect of several shapes the bound is of the one that shows least; of one of either sign, of its size.
+    The bound of an effect of several shapes is that of the shape that shows least; of an effect of either sign, that
+    of its size.
+
+    Args:
+        case: the campaign.
+        model: that explains it.
+        null: what that predicts.
+        measured: (S,) statistics.
+        names: of the effects.
+        templates: strengths to begin from.
+
+    Returns:
+        (bounds; names of effects without a bound, each with what would give one).
     """
     if case.scenes_only:
         case = replace(case, base=unit_under(case, model))
@@ -122,7 +133,7 @@ def excess_of(score: Score | None, measured: Array) -> float:
 
 
 def bound_of(measured: Array, shape: ScoredShape) -> Bound | tuple[str, str]:
-    """The least strength that was refuted and has none above it that was not; or the name, with what is needed."""
+    """The least refuted strength above which no tested strength is open; without one the name, with what is needed."""
     probe, name, key = shape.probe, shape.probe.name, strength_of(shape.probe.name)
     settings = probe.settings
     resolution, overshoot = settings.bounding.resolution, settings.bounding.overshoot
@@ -156,8 +167,9 @@ def bound_of(measured: Array, shape: ScoredShape) -> Bound | tuple[str, str]:
 
 
 def first_strength(shape: ScoredShape) -> Parameters:
-    """The parameters at a strength that is likely to be refuted: above where the bound is expected, and of what is
-    counted twice RULE_OF_THREE at least, where more of the strength makes them more."""
+    """The parameters at a strength that is likely to be refuted: above where the bound is expected.
+
+    Counted things are expected at least twice RULE_OF_THREE times there, if their number grows with the strength."""
     assert shape.score is not None
     name, key, at = shape.probe.name, strength_of(shape.probe.name), dict(shape.score.parameters)
     at[key] *= shape.probe.settings.bounding.overshoot * shape.expected / abs(at[key])

@@ -22,10 +22,11 @@ Array = NDArray[np.float64]
 
 
 def explains(null: Null, values: Array, predicted: Prediction) -> bool:
-    """Whether a prediction leaves chance of measured statistics (S,), or little beside what the null model leaves.
+    """Whether a prediction leaves nothing of measured statistics (S,) but chance, or a remainder.
 
-    Both are in the noise of the null model.  The noise of a prediction holds a share of what it changes, beside which
-    what it leaves would look small.
+    A remainder is small in all (`most_left`) and wherever it is left (`most_left_there`), beside what the null model
+    leaves.  Both are measured in the noise of the null model: that of the prediction contains a share of the change
+    that it predicts, so that what it leaves would look small.
     """
     off, limits = is_left(null, values, predicted), null.settings.concluding
     before, after = (in_noise(null, values, mean) for mean in (null.mean, predicted.mean))
