@@ -4,7 +4,8 @@
 
 Of many twins of the standard design twelve are drawn at a time, and one more to be measured.  By group, how far the
 logarithm of a standard deviation (with its floor) is off that of all; how often Holm's smallest p-value is below
-ALARM_LEVEL, which should be as often as that says; and the share of statistics on which SHIFT noises would be seen.
+the alarm's level, which should be as often as that says; and the share of statistics on which SHIFT noises would be
+seen.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from tqdm import tqdm
 
-from spikecam_env.gap.baseline.alarm import ALARM_LEVEL
-from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
+from spikecam_env.gap.compare.distance import adjusted, deviates
 from spikecam_env.gap.compare.prediction import Null, null_of
 from spikecam_env.gap.fit.standard_case import standard_case
+from spikecam_env.gap.settings import Judging
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import constrained_refit
 
@@ -49,9 +50,9 @@ if __name__ == "__main__":
         moderated = null_of([banks[i] for i in few], list(whole.keys))
         for how, null in (("scatter", as_they_scatter(moderated, values[few])), ("moderated", moderated)):
             off[how].append(np.log(null.noise / exact))
-            alarms[how] += adjusted(deviates(null, values[measured])).min() < ALARM_LEVEL
+            alarms[how] += adjusted(deviates(null, values[measured])).min() < Judging().alarm
             p = 2.0 * ndtr(-np.abs(deviates(null, values[measured] + SHIFT * exact)))
-            seen[how] += float(np.mean(p * p.size < GATE)) / DRAWS
+            seen[how] += float(np.mean(p * p.size < Judging().gate)) / DRAWS
     print(f"{'':>10s} {'scatter':>10s} {'moderated':>10s}")
     for name in dict.fromkeys(group.tolist()):
         rms = [float(np.sqrt(np.mean(np.square(np.array(off[how])[:, group == name])))) for how in off]

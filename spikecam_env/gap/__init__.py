@@ -13,6 +13,7 @@ from spikecam_env.gap.diagnose import diagnose
 from spikecam_env.gap.ladder import ladder
 from spikecam_env.gap.report.page import write_report
 from spikecam_env.gap.result import Diagnosis
+from spikecam_env.gap.settings import DiagnosisSettings
 
 __all__ = [
     "KINDS",
@@ -21,6 +22,7 @@ __all__ = [
     "CampaignRecording",
     "Dark",
     "Diagnosis",
+    "DiagnosisSettings",
     "Disk",
     "Flat",
     "Label",

@@ -40,6 +40,7 @@ from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
@@ -69,6 +70,7 @@ def diagnose(
     templates: Templates | None = None,
     static_only: bool = False,
     search: str = "forward",
+    settings: DiagnosisSettings | None = None,
     progress: bool = True,
 ) -> Diagnosis:
     """Find where a measured campaign and a model disagree, which effect is missing, and how large it is.
@@ -77,7 +79,8 @@ def diagnose(
     candidates: names to try, default the whole catalogue; exclude: names to leave out.  Same seed, same answer.
     jobs: threads, which change no bit.  effort: times the campaign may be simulated before nothing more is begun that
     an answer can do without, such as a third effect; infinite for whatever it takes.  static_only: of unknown scenes
-    that move, look at the pixels that do not.  search: `forward`, or `race`, which is experimental.  Raises InputError
+    that move, look at the pixels that do not.  search: `forward`, or `race`, which is experimental.  settings: tuned
+    numbers, by default `DiagnosisSettings()`.  Raises InputError
     for an unreadable campaign, an unknown name, no effort, or too few static recordings of known light to refit the
     unit by.
     """
@@ -85,17 +88,18 @@ def diagnose(
         raise unknown_name("search", search, SEARCHES)
     if not effort > 0:
         raise InputError(f"effort {effort:g}: it must be above 0")
+    settings = settings or DiagnosisSettings()
     stages = Stages(progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     tested = model if isinstance(model, SensorModel) else SensorModel.load(model)
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
-        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only, search)
+        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only, search, settings)
         found = of_spikes(measured, tested, asked, templates, stages)
     else:
         with stages.timed("maps"):
-            found = Findings(*diagnose_maps(measured, tested, names, seed, jobs))
+            found = Findings(*diagnose_maps(measured, tested, names, seed, jobs, settings))
     conclusion = found.conclusion
     model_name = tested.name if isinstance(model, SensorModel) else str(model)
     return Diagnosis(
@@ -127,6 +131,7 @@ def diagnose(
         static_only=static_only,
         remainder=conclusion.remainder,
         search=search,
+        settings=settings.changed(),
     )
 
 
@@ -154,6 +159,7 @@ class Asked:
     twin_count: int
     static_only: bool = False
     search: str = "forward"
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
 
 def of_spikes(
@@ -167,7 +173,7 @@ def of_spikes(
     if motion and not seen.recordings:
         return Findings(moves(tested, motion, static_only=asked.static_only), None, motion=motion)
     with stages.timed("refit"):
-        case = case_of_observed(measured, seen, asked.seed, asked.jobs)
+        case = case_of_observed(measured, seen, asked.seed, asked.jobs, asked.settings)
         notes = [*static_note(motion), *label_unit_note(case.nominal_per_label, case.base)]
     comparison = comparison_of(case, tested, asked, stages)
     case, null, values = comparison.case, comparison.null, comparison.values
@@ -195,7 +201,7 @@ def of_spikes(
     )
 
 
-def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
+def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: DiagnosisSettings | None = None) -> Case:
     """Observe and refit a campaign; recordings at another V_d than most, and rates only, are left to SNEE.
 
     Raises InputError where a recording of steady light moves.
@@ -203,7 +209,7 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1) -> Case:
     seen, motion = without_motion(observed(campaign), static_only=False)
     if motion:
         raise InputError(f"{motion[0].text}; a static recording is needed")
-    return case_of_observed(campaign, seen, seed, jobs)
+    return case_of_observed(campaign, seen, seed, jobs, settings or DiagnosisSettings())
 
 
 def observed(campaign: Campaign) -> Observed:
@@ -224,7 +230,7 @@ def observed(campaign: Campaign) -> Observed:
     return Observed(part.recordings, tuple(conditions), seen)
 
 
-def case_of_observed(campaign: Campaign, all_seen: Observed, seed: int, jobs: int) -> Case:
+def case_of_observed(campaign: Campaign, all_seen: Observed, seed: int, jobs: int, settings: DiagnosisSettings) -> Case:
     """Refit the unit by what was observed; labels in another unit are counted anew."""
     seen = all_seen.seen
     conditions = [
@@ -232,7 +238,8 @@ def case_of_observed(campaign: Campaign, all_seen: Observed, seed: int, jobs: in
         for c, o in zip(all_seen.conditions, seen, strict=True)
     ]
     case = case_of(campaign.shape, conditions, seen, seed, jobs, campaign.frame_rate_hz)
-    factor = nominal_per_label(case.base)
+    case = replace(case, settings=settings)
+    factor = nominal_per_label(case.base, settings.unit.usual)
     if factor == 1.0:
         return case
     case = case.of([in_nominal_units(c, factor) for c in conditions], seen)
@@ -251,7 +258,8 @@ def comparison_of(case: Case, tested: SensorModel, asked: Asked, stages: Stages)
     with stages.timed("audit"):
         contradictions = upheld(case, tested, audit(case))
         case = trimmed(case, contradictions)
-        case = replace(case, budget=Budget(asked.effort * len(case.conditions), verdict_known=bool(contradictions)))
+        limit, overrun = asked.effort * len(case.conditions), case.settings.twins.overrun
+        case = replace(case, budget=Budget(limit, verdict_known=bool(contradictions), overrun=overrun))
     names, not_testable = testable(asked.names, case.conditions)
     lacking = missing_effects(case, tested, names)
     model = with_missing(tested, lacking)
@@ -259,7 +267,7 @@ def comparison_of(case: Case, tested: SensorModel, asked: Asked, stages: Stages)
     with stages.timed("twins"):
         null = model_null(case, model, asked.twin_count)
         differs = lacking or off.parameters
-        given = model_null(replace(case, base=off.nominal), tested, TWINS_AS_GIVEN) if differs else null
+        given = model_null(replace(case, base=off.nominal), tested, case.settings.twins.to_confirm) if differs else null
     return Comparison(
         case=case,
         tested=tested,
@@ -273,10 +281,6 @@ def comparison_of(case: Case, tested: SensorModel, asked: Asked, stages: Stages)
         names=tuple(names),
         not_testable=tuple(not_testable),
     )
-
-
-TWINS_AS_GIVEN = 2
-"""Twins of a model as given, where the null model is another: its gap is large beside what two leave open."""
 
 
 def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:

@@ -45,9 +45,6 @@ Array = NDArray[np.float64]
 
 LADDER_FORMAT = "spikecam-ladder/1"
 
-TWINS = 2
-"""Twins of a rung that is not the last: its distance is large beside what two leave open."""
-
 
 @dataclass(frozen=True)
 class Rung:
@@ -154,7 +151,8 @@ def climbed(judge: Judge, first: SensorModel, lacking: Sequence[Missing], progre
     """The first model, then what the refit found missing, one after another: each time the one that takes away most."""
 
     def simulated(model: SensorModel, found: Missing | None, *, last: bool) -> Rung:
-        mean = judge.null.mean if last else aligned_mean(model_null(judge.case, model, TWINS), judge.null)
+        few = judge.case.settings.twins.to_confirm  # the distance is large beside what these leave open
+        mean = judge.null.mean if last else aligned_mean(model_null(judge.case, model, few), judge.null)
         return judge.rung(model, mean, found)
 
     rungs = [simulated(first, None, last=not lacking)]

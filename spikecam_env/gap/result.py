@@ -241,7 +241,8 @@ class Diagnosis:
     candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
     simulated.  simulated: recordings that were, but for the page's own.  effect_files: of a user's own effects, among
     the model's and those that were tried.  motion: of recordings said to be static; static_only: whether the pixels
-    that move were left out.  search: by what search it was found.
+    that move were left out.  search: by what search it was found.  settings: those that were not the defaults, by
+    "stage.name".
     """
 
     verdict: str
@@ -272,6 +273,7 @@ class Diagnosis:
     static_only: bool = False
     remainder: Remainder | None = None
     search: str = "forward"
+    settings: dict[str, Any] = field(default_factory=dict)
 
     @property
     def static_share(self) -> float:
@@ -315,6 +317,7 @@ class Diagnosis:
             "simulated": self.simulated,
             "stages_s": self.stages,
             "elapsed_s": sum(self.stages.values()),
+            **({"settings": self.settings} if self.settings else {}),
         }
 
     def write(self, folder: Path) -> None:

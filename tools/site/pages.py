@@ -4,6 +4,7 @@
 <!-- generated: api MODULE -->      what a module offers
 <!-- generated: formats -->         the table of file formats
 <!-- generated: benchmarks -->      speed by version
+<!-- generated: settings -->        settings of a diagnosis
 <!-- generated: page FILE -->       a page at the root
 
 A link to a file of the repository becomes a download of it; a link to a folder, its name.  A link called by the name
@@ -17,7 +18,7 @@ import re
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 
-from tools.site import benchmarks, commands
+from tools.site import benchmarks, commands, settings
 from tools.site.docstrings import rendered
 from tools.site.public import docstring_of, home_of, kind_of, names_of
 
@@ -35,12 +36,15 @@ def filled_in(text: str, page: str) -> str:
 
 
 def generated(what: str, of: str = "") -> str:
-    """The reference of the command line or of a module, tables of formats or of benchmarks, or a page at the root."""
+    """The reference of the command line or of a module, tables of formats, benchmarks or settings, or a page at the
+    root."""
     if what == "api":
         return "\n".join(_module(of))
     if what == "page":
         return _from_root(of)
-    return {"commands": commands.page, "formats": _formats, "benchmarks": benchmarks.page}[what]()
+    return {"commands": commands.page, "formats": _formats, "benchmarks": benchmarks.page, "settings": settings.page}[
+        what
+    ]()
 
 
 def _formats() -> str:

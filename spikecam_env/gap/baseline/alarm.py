@@ -13,15 +13,12 @@ from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]
 
-ALARM_LEVEL = 0.02
-"""Adjusted p-value below which there is a discrepancy: one false alarm in fifty
-campaigns; measured, 2.0 % of 200 (`python -m benchmarks.moderated_variances`)."""
-
 
 def is_discrepant(null: Null, values: Array) -> bool:
     """Whether statistics (S,), NaN where they take no part, differ from the null model beyond chance."""
     z = deviates(null, values)
-    return bool(adjusted(np.append(z, of_all_recordings(null.keys, z, "intervals"))).min() < ALARM_LEVEL)
+    smallest = adjusted(np.append(z, of_all_recordings(null.keys, z, "intervals"))).min()
+    return bool(smallest < null.settings.judging.alarm)
 
 
 def with_held_out_motion(case: Case) -> Case:

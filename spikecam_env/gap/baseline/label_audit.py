@@ -16,7 +16,7 @@ from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.missing_frames import dropped
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.orientation import flipped
-from spikecam_env.gap.compare.distance import GATE, adjusted, deviates
+from spikecam_env.gap.compare.distance import adjusted, deviates
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.twins.case import Case
@@ -176,7 +176,7 @@ def agrees_when_relabelled(case: Case, model: SensorModel, label: Contradiction)
     again = case.of(conditions, case.observations)
     null = model_null(again, model, RELABEL_TWINS)
     of = np.array([k.recording == name and k.group != "rates" for k in null.keys])
-    return not adjusted(deviates(null, values_of(again.bank, null.keys))[of]).min() < GATE
+    return not adjusted(deviates(null, values_of(again.bank, null.keys))[of]).min() < null.settings.judging.gate
 
 
 def relabelled(condition: Condition, factor: float) -> Condition:

@@ -13,7 +13,7 @@ from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, twins
-from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS, drawn_banks
+from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.indirect_inference import inferred_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
@@ -24,11 +24,12 @@ Array = NDArray[np.float64]
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
     """The prediction of `count` twins, and of twice as many for recordings in motion: each of their statistics is of
     one recording alone, so that no other one pools its variance (`pooled_variance`)."""
-    base = unit_under(case, model)
-    drawn = drawn_banks(model, case.base, case.conditions, case.shape, DRAWN_UNITS, case.seed)
+    base, units = unit_under(case, model), case.settings.twins.drawn_units
+    limits = case.settings.twins.spread_limits
+    drawn = drawn_banks(model, case.base, case.conditions, case.shape, units, case.seed, limits)
     made = twins(case, model, base, range(count))
     banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]
-    null = null_of(banks, list(case.bank), [t.base for t in made if t.base])
+    null = null_of(banks, list(case.bank), [t.base for t in made if t.base], case.settings)
     own = [values_of(t.pattern, null.keys) for t in made]
     null = replace(null, draws=tuple(replace(d, pattern=p) for d, p in zip(null.draws, own, strict=False)))
     moving = [i for i, c in enumerate(case.conditions) if c.moves and c.use == "fit"]
@@ -40,8 +41,8 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         null,
         mean=np.where(of_pattern, values.mean(axis=0), null.mean),
         sd=np.where(of_pattern, values.std(axis=0, ddof=1), null.sd),
-        freedom=np.where(of_pattern, DRAWN_UNITS - 1, null.freedom),
-        twins=np.where(of_pattern, DRAWN_UNITS, null.twins),
+        freedom=np.where(of_pattern, units - 1, null.freedom),
+        twins=np.where(of_pattern, units, null.twins),
         weight=np.where(of_pattern, 1.0 / recordings_per_statistic(null.keys, case.conditions), 1.0),
     )
 
@@ -51,9 +52,8 @@ def unit_under(case: Case, model: SensorModel) -> BaseFit:
     of jitter, by indirect inference."""
     base = constrained_refit(model, case.base)
     if case.scenes_only:
-        base = inferred_unit(
-            model, base, case.base, [t.base for t in twins(case, model, base, range(50, 54)) if t.base]
-        )
+        simulated = [t.base for t in twins(case, model, base, range(50, 54)) if t.base]
+        base = inferred_unit(model, base, case.base, simulated, case.settings.unit.identifiable)
     return base
 
 

@@ -14,12 +14,6 @@ from spikecam_env.gap.statistics import Key
 
 Array = NDArray[np.float64]
 
-HEAVY = 8.0
-"""Degrees of freedom of the loss: statistics far off count by their logarithm."""
-
-GATE = 0.005
-"""Adjusted p-value of the residuals of a named effect below which something is left."""
-
 
 def effect_size(null: Null, measured: Array, change: Array) -> float:
     """Largest change among the measured statistics (S,), in units of their noise."""
@@ -98,7 +92,7 @@ def adjusted(z: Array) -> Array:
 
 def is_significant(null: Null, rho: Array, predicted: Prediction | None = None) -> bool:
     """Whether the residuals of a prediction, or of the null model, are beyond chance."""
-    return bool(adjusted(normal_deviates(null, rho, predicted)).min() < GATE)
+    return bool(adjusted(normal_deviates(null, rho, predicted)).min() < null.settings.judging.gate)
 
 
 def residual(null: Null, measured: Array, predicted: Prediction) -> Array:
@@ -114,9 +108,14 @@ def residual_and_misfit(null: Null, measured: Array, predicted: Prediction) -> t
     rho = residual(null, measured, predicted)
     wider = (total_variance(null, predicted) - predicted.error**2) / (null.sd**2 + null.floor**2)
     log_variance = np.where(np.isfinite(measured), null.weight * np.log(wider), 0.0)
-    return rho, robust_squares(rho, null.weight) + float(log_variance.sum())
+    return rho, loss(null, rho) + float(log_variance.sum())
 
 
-def robust_squares(rho: Array, weight: Array | float = 1.0) -> float:
-    """Heavy-tailed sum of squares; about the sum of the weights for noise alone."""
-    return float(np.sum(weight * (HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))
+def loss(null: Null, rho: Array) -> float:
+    """Heavy-tailed sum of squares of residuals (S,), by the weights and the settings of a null model."""
+    return robust_squares(rho, null.settings.judging.heavy, null.weight)
+
+
+def robust_squares(rho: Array, heavy: float, weight: Array | float = 1.0) -> float:
+    """Heavy-tailed sum of squares; about the sum of the weights for noise alone.  heavy: degrees of freedom."""
+    return float(np.sum(weight * (heavy + 1.0) * np.log1p(rho**2 / heavy)))

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.pooled_variance import moderated
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.statistics import Key, floor_of
 from spikecam_env.gap.unit.refit import BaseFit
 
 Array = NDArray[np.float64]
-
-TOLERANCE = 0.05
-"""Relative error of an effect's simulated change: laws are first order, and simulated with noise."""
 
 PAIR_NOISE = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6,
               "spectrum": 0.7, "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
@@ -62,6 +60,7 @@ class Null:
 
     floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  freedom: (S,) degrees of freedom
     of sd.  weight: (S,) how much each says of its own: several recordings show one fixed pattern, which counts once.
+    settings: by which distances from it are judged.
     """
 
     keys: tuple[Key, ...]
@@ -72,6 +71,7 @@ class Null:
     freedom: Array | float
     weight: Array | float = 1.0
     draws: tuple[Draw, ...] = ()
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
     def noise(self) -> Array:
@@ -84,14 +84,28 @@ class Null:
         return Prediction(self.mean, self.sd / np.sqrt(self.twins), self.sd, self.draws)
 
 
-def null_of(banks: Sequence[Mapping[Key, float]], keys: Sequence[Key], refits: Sequence[BaseFit] = ()) -> Null:
+def null_of(
+    banks: Sequence[Mapping[Key, float]],
+    keys: Sequence[Key],
+    refits: Sequence[BaseFit] = (),
+    settings: DiagnosisSettings | None = None,
+) -> Null:
     """From simulated campaigns 0, 1, ..., for the statistics in `keys` that all of them have."""
     there = tuple(k for k in keys if all(k in b for b in banks))
     values = np.array([[b[k] for k in there] for b in banks])
     floor = np.maximum([floor_of(k) for k in there], 1e-9)
     variances, freedom = moderated(there, values.var(axis=0, ddof=1), len(banks) - 1)
     draws = tuple(Draw(n, v, r) for n, (v, r) in enumerate(zip(values, refits, strict=False)))
-    return Null(there, values.mean(axis=0), np.sqrt(variances), floor, len(banks), freedom, draws=draws)
+    return Null(
+        there,
+        values.mean(axis=0),
+        np.sqrt(variances),
+        floor,
+        len(banks),
+        freedom,
+        draws=draws,
+        settings=settings or DiagnosisSettings(),
+    )
 
 
 def paired(null: Null, made: Sequence[Draw]) -> Prediction:
@@ -152,13 +166,13 @@ def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
 
 
 def total_variance(null: Null, predicted: Prediction) -> Array:
-    """(S,) variance of measured less predicted; a prediction is exact to TOLERANCE of its effect."""
+    """(S,) variance of measured less predicted; a prediction is exact to the tolerance of its effect."""
     return predicted.spread**2 + predicted.error**2 + null.floor**2 + law_error(null, predicted) ** 2
 
 
 def law_error(null: Null, predicted: Prediction) -> Array:
     """(S,) error of a prediction's laws."""
-    return TOLERANCE * (predicted.mean - null.mean if predicted.own is None else predicted.own)
+    return null.settings.judging.tolerance * (predicted.mean - null.mean if predicted.own is None else predicted.own)
 
 
 def pooled(keys: Sequence[Key], values: Array) -> Array:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.distance import HEAVY, residual_and_misfit, robust_squares
+from spikecam_env.gap.compare.distance import residual_and_misfit, robust_squares
 from spikecam_env.gap.compare.prediction import (
-    TOLERANCE,
     Null,
     Prediction,
     from_drawn_units,
@@ -18,15 +17,13 @@ from spikecam_env.gap.compare.prediction import (
     total_variance,
     with_change_scaled,
 )
+from spikecam_env.gap.settings import Judging
 
 Array = NDArray[np.float64]
 
 ERROR_DAMPING = 5e-4
 """Damping of the normal matrix that errors follow from: a step may be held back, an error must not be.  What it holds
 back is open."""
-
-TWINS_FOR_COVARIANCE = 4
-"""Twins of an effect from which the covariance of a step by its own chance is estimated."""
 
 MEDIAN_SQUARE = 0.455
 """Of the square of a normal deviate."""
@@ -56,16 +53,16 @@ def step_of(
     If most statistics are far off, residuals are scaled by their median; otherwise all would count as outliers.
 
     Statistics are not independent: the covariance is of where the null's own draws would have led the step,
-    and, where there are TWINS_FOR_COVARIANCE of the effect, its own (other pixels have its traps), with the floors and
-    TOLERANCE of the effect, all of one sign, on top; of the fixed pattern, of drawn units: all recordings show one.
+    and, where there are as many of the effect as in the end, its own (other pixels have its traps), with the floors and
+    the tolerance of the effect, all of one sign, on top; of the fixed pattern, of drawn units: all recordings show one.
     Where two parameters do nearly the same, noise of the jacobian would seem to separate them: the squares of it
     that are expected in the normal matrix are subtracted (errors in variables).
     """
-    noise2 = total_variance(null, predicted)
+    noise2, heavy = total_variance(null, predicted), null.settings.judging.heavy
     gap = np.nan_to_num(measured - predicted.mean)
     concerned = np.isfinite(measured) & np.any(jacobian != 0, axis=1)
     usual = max(float(np.median((gap**2 / noise2)[concerned])) / MEDIAN_SQUARE, 1.0) if concerned.any() else 1.0
-    w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2 / usual) / noise2
+    w = np.isfinite(measured) * null.weight * (heavy + 1) / (heavy + gap**2 / noise2 / usual) / noise2
     normal = jacobian.T @ (w[:, None] * jacobian)
     scale = np.diag(normal) + 1e-12
     step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
@@ -106,11 +103,11 @@ def step_covariance(solve: Array, draws: Sequence[Array] | Array) -> Array:
 
 
 def own_step_covariance(null: Null, predicted: Prediction, solve: Array) -> Array:
-    """(n, n) covariance of a step by the effect's own chance: of its draws where TWINS_FOR_COVARIANCE of them
+    """(n, n) covariance of a step by the effect's own chance: of its draws where as many as in the end
     move a statistic, of drawn units where they show it, elsewhere as of independent ones."""
     variances = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
     without = {d.number: d.values for d in null.draws}
-    draws = predicted.draws if len(predicted.draws) >= TWINS_FOR_COVARIANCE else ()
+    draws = predicted.draws if len(predicted.draws) >= null.settings.twins.in_the_end else ()
     change = np.array([d.values - without[d.number] for d in draws])
     shown = from_drawn_units(null, predicted)
     simulated = np.any(np.nan_to_num(change) != 0, axis=0) & ~shown
@@ -141,16 +138,16 @@ def change_of(
     return change, np.sqrt(own2), clear
 
 
-def scale_of(
-    gap: Array, effect: Array, of_gap: Array, of_effect: Array, tolerance: float = TOLERANCE
-) -> tuple[float, float]:
+def scale_of(gap: Array, effect: Array, of_gap: Array, of_effect: Array, judging: Judging) -> tuple[float, float]:
     """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
 
-    gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.
+    gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.  judging: the loss, and
+    the tolerance of the effect.
     Only statistics on which the simulated effect is clear of its own noise count: the noise of the others would drag
     the scale to 0 (regression dilution).  Under a heavy-tailed loss there are many minima: it is followed down from
     every ratio that many statistics agree on.
     """
+    heavy, tolerance = judging.heavy, judging.tolerance
     clear = is_clear(effect, of_gap + of_effect)
     if not clear.any():
         return 0.0, np.inf
@@ -161,11 +158,11 @@ def scale_of(
         scale, total = float(start), 0.0
         for _ in range(8):
             noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
-            w = (HEAVY + 1.0) / (HEAVY + (gap - scale * effect) ** 2 / noise2) / noise2
+            w = (heavy + 1.0) / (heavy + (gap - scale * effect) ** 2 / noise2) / noise2
             total = float(np.sum(w * effect**2))
             scale = float(np.sum(w * effect * gap)) / max(total, 1e-300)
         noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
-        left = robust_squares((gap - scale * effect) / np.sqrt(noise2))
+        left = robust_squares((gap - scale * effect) / np.sqrt(noise2), heavy)
         best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))
     return best[1], best[2]
 
@@ -174,7 +171,7 @@ def scale_to(null: Null, measured: Array, predicted: Prediction) -> tuple[float,
     """(scale, sd) of a prediction's change from the null that comes nearest to the measured one."""
     known = np.isfinite(measured)
     gap, effect = (np.where(known, v - null.mean, 0.0) for v in (measured, predicted.mean))
-    return scale_of(gap, effect, null.noise**2, own_variance(null, predicted))
+    return scale_of(gap, effect, null.noise**2, own_variance(null, predicted), null.settings.judging)
 
 
 def is_clear(effect: Array, variance: Array) -> NDArray[np.bool_]:

@@ -13,34 +13,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.candidates.strength import TARGET_SIZE, amplified, bounded, with_effect
+from spikecam_env.gap.candidates.strength import amplified, bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import effect_size
 from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
-from spikecam_env.gap.compare.thresholds import TO_CONTINUE
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import TWINS_OF_RANDOM_COURSE, twins_of
-from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED, extrapolated_unit, has_converged
+from spikecam_env.gap.fit.recordings import twins_of
+from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-MOST_TWINS = 5
-"""Most twins for the fit of one candidate's strength."""
-
-VISIBLE = 4.0
-"""Least effect size [noises] of a simulated effect from which its strength is scaled."""
-
 LEAST_FACTOR = 1e-3
 """Least factor by which a strength is multiplied at once; and that of a strength whose fit does not go on."""
-
-LEAST_LOG_STEP = 0.05
-"""Least step of a strength's logarithm between two twins for a slope."""
-
-ROUND_OFF = (0.7, 1.4)
-"""Range of factors within which a strength is scaled without another twin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,29 +72,31 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
     strength is right to a third and the unit has settled; the last step is a scaling of what was simulated, without
     another twin."""
     what, null, seen = candidate(name), problem.null, problem.seen
+    fitting, how = problem.settings.fitting, problem.settings.twins
     strength, power = what.strength, what.power
     expected = np.full(len(null.keys), np.inf) if expected is None else expected
-    parameters, times = amplified(name, bounded(name, parameters), effect_size(null, seen, expected))
+    parameters, times = amplified(name, bounded(name, parameters), effect_size(null, seen, expected), how)
     start = constrained_refit(problem.model, problem.case.base)
     bare = constrained_refit(with_effect(problem.model, name, parameters), start)
     base = replace(bare, white=white**times * bare.white)
-    least = problem.misfit() - TO_CONTINUE
+    least = problem.misfit() - problem.settings.deviance.compare
     only = problem.affected([name], expected * times)
     last: tuple[float, Prediction] | None = None
     slope: Array | None = None
     settled_once = False
-    for turn in range(MOST_TWINS):
-        at_last = turn == MOST_TWINS - 1
+    for turn in range(fitting.most_tries):
+        at_last = turn == fitting.most_tries - 1
         tried = with_effect(problem.model, name, parameters)
-        predicted = problem.predict(tried, base, twins_of(name), only)
+        predicted = problem.predict(tried, base, twins_of(name, how), only)
         size = effect_size(null, seen, predicted.mean - null.mean)
-        stronger = parameters if at_last else until_visible(name, parameters, size)
+        stronger = parameters if at_last else until_visible(name, parameters, size, fitting.visible)
         if stronger != parameters:
-            base = extrapolated_unit(bare, base, abs(stronger[strength] / parameters[strength]) ** power)
+            times = abs(stronger[strength] / parameters[strength]) ** power
+            base = extrapolated_unit(bare, base, times, how.most_extrapolated)
             parameters, only = stronger, problem.affected([name])
             continue
         assumed, base = base, problem.settled_unit(tried, base, predicted)
-        if not settled_once and not at_last and not has_converged(assumed, base):
+        if not settled_once and not at_last and not has_converged(assumed, base, how.converged):
             settled_once = True
             continue
         scale, sd = scale_to(null, seen, predicted)
@@ -117,16 +106,16 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
         now = parameters[strength], predicted
         slope = slope_between(problem, last, now) if power == 2.0 else None
         factor, last = factor_to(problem, name, predicted, scale, slope), now
-        weak = abs(scale) * size < VISIBLE or (
-            what.is_linear and 1 / MOST_EXTRAPOLATED < scale < 1 and scale * size < TARGET_SIZE
+        weak = abs(scale) * size < fitting.visible or (
+            what.is_linear and 1 / how.most_extrapolated < scale < 1 and scale * size < how.target_size
         )
-        near = weak or ROUND_OFF[0] < factor < ROUND_OFF[1]
+        near = weak or fitting.round_off[0] < factor < fitting.round_off[1]
         if at_last or (near and turn):
             break
         if weak:
             continue
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
-        base = extrapolated_unit(bare, base, factor**power)
+        base = extrapolated_unit(bare, base, factor**power, how.most_extrapolated)
         only = problem.affected([name], (predicted.mean - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
@@ -137,16 +126,17 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
     rho, left = problem.residual_and_misfit(predicted)
     sds = {strength: abs(final[strength]) * (sd / max(abs(scale), 1e-9) / power)}
     there = with_effect(problem.model, name, final)
-    return Fit(name, final, sds, predicted, extrapolated_unit(bare, base, moved), rho, left, there)
+    unit = extrapolated_unit(bare, base, moved, how.most_extrapolated)
+    return Fit(name, final, sds, predicted, unit, rho, left, there)
 
 
-def until_visible(name: str, parameters: dict[str, float], size: float) -> dict[str, float]:
-    """The parameters at a strength that shows by twice VISIBLE, or where its bounds end; as they are where it shows.
-    size: noises that it shows by."""
-    if size >= VISIBLE:
+def until_visible(name: str, parameters: dict[str, float], size: float, visible: float) -> dict[str, float]:
+    """The parameters at a strength that shows by twice `visible` noises, or where its bounds end; as they are where it
+    shows.  size: noises that it shows by."""
+    if size >= visible:
         return parameters
     strength = candidate(name).strength
-    more = (2 * VISIBLE / max(size, 0.2)) ** (1 / candidate(name).power)
+    more = (2 * visible / max(size, 0.2)) ** (1 / candidate(name).power)
     return bounded(name, {**parameters, strength: parameters[strength] * more})
 
 
@@ -167,7 +157,11 @@ def slope_between(
 ) -> Array | None:
     """(S,) change of the statistics for one more of a strength's logarithm, by twins at two of them; None where these
     are not two.  What goes with the square of a strength saturates where other noise is, or is a logarithm of both."""
-    if one is None or not one[0] * other[0] > 0 or abs(step := float(np.log(other[0] / one[0]))) < LEAST_LOG_STEP:
+    if (
+        one is None
+        or not one[0] * other[0] > 0
+        or abs(step := float(np.log(other[0] / one[0]))) < problem.settings.fitting.small_step
+    ):
         return None
     null = problem.null
     both = (one[1].mean != null.mean) & (other[1].mean != null.mean)
@@ -185,7 +179,7 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
     for _ in range(2):
         there = with_effect(problem.model, name, bounded(name, parameters))
         base = constrained_refit(there, problem.case.base)
-        predicted = problem.predict(there, base, TWINS_OF_RANDOM_COURSE, only)
+        predicted = problem.predict(there, base, problem.settings.twins.of_random_course, only)
         factor, sd = likeliest(problem.null, problem.seen, predicted)
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
         if 0.5 < factor < 2.0:

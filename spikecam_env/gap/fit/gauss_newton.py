@@ -17,7 +17,6 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import Null, Prediction, own_variance
 from spikecam_env.gap.compare.step import change_of, step_of
-from spikecam_env.gap.compare.thresholds import BY_CHANCE, TO_STEP
 from spikecam_env.gap.fit.coordinates import moved_value
 from spikecam_env.gap.fit.predict import settled_unit
 from spikecam_env.gap.fit.problem import Problem
@@ -26,21 +25,6 @@ from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-MOST_STEPS = 4
-"""Steps of a descent at most."""
-
-SMALL_STEP = 0.05
-"""Largest step of a logarithm that needs no other."""
-
-LONG_STEP = 0.5
-"""Step of a logarithm beyond which derivatives are taken anew."""
-
-SURPRISE = 3.0
-"""Noises by which a step has to surprise for derivatives to be corrected by it."""
-
-LONGEST_STEP = 0.7
-"""Largest step of a logarithm at once; none is further than what is open of its parameter before (`prior_sd`)."""
 
 PROBES = 2
 """Times that a model is probed: under the unit there was, and under the one that it then shows."""
@@ -51,9 +35,8 @@ WHITE = ("the unit", "white")
 WHITE_STEP = -0.2
 """Step of the logarithm of WHITE to take a derivative by."""
 
-STRENGTH_STEP, STRENGTH_STEPS = 6.0, (0.25, 1.0)
-"""Noises by which a strength's step, to take a derivative by, is to show; and the steps of its logarithm within which
-that is."""
+STRENGTH_STEPS = (0.25, 1.0)
+"""Steps of a strength's logarithm to take a derivative by, at least and at most."""
 
 Probe = Callable[[SensorModel, BaseFit], Prediction]
 """What a model and a unit give."""
@@ -77,47 +60,51 @@ class Descent:
 
 
 def descend(
-    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, free: Free, to_step: float = TO_STEP
+    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, free: Free, to_step: float | None = None
 ) -> Descent:
     """From a model and its unit down to the parameters `free` that suit what is seen best.
 
-    Where steps have come to leave more, the best of where they led, the first of several within TO_STEP; and no step
+    Where steps have come to leave more, the best of where they led, the first of several that are as good; and no step
     further that promises little and goes as far as one may.
-    to_step: misfit that a step has to promise, and the one before it to have removed.
+    to_step: misfit that a step has to promise, and the one before it to have removed; by default that of an effect
+    that was chosen.
     """
-    null = problem.null
+    null, fitting, deviance = problem.null, problem.settings.fitting, problem.settings.deviance
+    to_step = deviance.stop if to_step is None else to_step
     at, base = at_settled_unit(probe, null, model, base, free)
     columns, noise = derivatives(problem, probe, model, base, at, free)
-    before, longest = prior_sd(free), longest_of(free)
+    before, longest = prior_sd(free), longest_of(free, fitting.longest_step)
     tried = []
-    for turn in range(MOST_STEPS):
+    for turn in range(fitting.most_steps):
         step, covariance = step_of(null, problem.seen, at, columns, noise, before)
         step = np.clip(step, -longest, longest)
         left, promised = (problem.misfit(p) for p in (at, replace(at, mean=at.mean + columns @ step)))
         tried.append((left, Descent(model, base, at, columns, noise, covariance)))
         model, base = moved(model, unit_after(model, base, null, at, free), free, step)
         little = left - promised < to_step or (turn > 0 and 0 <= tried[-2][0] - left < to_step)
-        if turn == MOST_STEPS - 1 or little or np.all(np.abs(step) < SMALL_STEP):
+        if turn == fitting.most_steps - 1 or little or np.all(np.abs(step) < fitting.small_step):
             break
         after, base = at_settled_unit(probe, null, model, base, free)
-        if np.abs(step).max() < LONG_STEP:
+        if np.abs(step).max() < fitting.long_step:
             own = np.sqrt(own_variance(null, at) + own_variance(null, after))
-            columns = broyden(columns, step, after.mean - at.mean, own)
+            columns = broyden(columns, step, after.mean - at.mean, problem.settings.judging.apart * own)
         else:
             columns, noise = derivatives(problem, probe, model, base, after, free)
         at = after
     least = min(t[0] for t in tried)
     guess = little and bool(np.any(np.abs(step) >= longest))
-    if guess or left > least + BY_CHANCE:
-        return next(where for there, where in tried if there < least + TO_STEP)
+    if guess or left > least + deviance.by_chance:
+        return next(where for there, where in tried if there < least + deviance.stop)
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, noise, covariance)
 
 
 def broyden(columns: Array, step: Array, change: Array, noise: Array | float = 0.0) -> Array:
-    """(S, n) derivatives that give the change (S,) that a step (n,) turned out to make, where there are any and it is
-    clear of its noise (S,): that of a short step, as a slope, would look like knowledge of the parameters."""
+    """(S, n) derivatives that give the change (S,) that a step (n,) turned out to make, where there are any.
+
+    noise: (S,) largest surprise that is chance.  As a slope, that of a short step would look like knowledge of the
+    parameters."""
     surprise = change - columns @ step
-    corrected = (columns != 0) & (np.abs(surprise) > SURPRISE * noise)[:, None]
+    corrected = (columns != 0) & (np.abs(surprise) > noise)[:, None]
     return np.asarray(columns + corrected * np.outer(surprise, step) / (step @ step))
 
 
@@ -140,7 +127,7 @@ def derivatives(
     is.  What one parameter of an effect clearly moves says of its others that they do not, or how far."""
     null = problem.null
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
-    sizes = np.array([derivative_step(name, key, peak) for name, key in free])
+    sizes = np.array([derivative_step(name, key, peak, problem.settings.judging.shows) for name, key in free])
     with ThreadPoolExecutor(problem.case.jobs) as pool:
         steps = [moved(model, base, [what], np.array([size])) for what, size in zip(free, sizes, strict=True)]
         there = [made for made, _ in pool.map(lambda step: at_settled_unit(probe, null, step[0], step[1], free), steps)]
@@ -157,7 +144,7 @@ def at_settled_unit(
     """(what a model gives under a unit that has settled, that unit): probed once more where it had not."""
     made = probe(model, base)
     there = unit_after(model, base, null, made, free)
-    return (made, base) if has_converged(base, there) else (probe(model, there), there)
+    return (made, base) if has_converged(base, there, null.settings.twins.converged) else (probe(model, there), there)
 
 
 def unit_after(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:
@@ -175,18 +162,18 @@ def prior_sd(free: Free) -> Array:
     )
 
 
-def longest_of(free: Free) -> Array:
-    """(n,) largest step of each logarithm at once."""
-    return np.minimum(prior_sd(free), LONGEST_STEP)
+def longest_of(free: Free, longest: float) -> Array:
+    """(n,) largest step of each logarithm at once: `longest`, and no further than what was open of it before."""
+    return np.minimum(prior_sd(free), longest)
 
 
-def derivative_step(name: str, key: str, peak: float) -> float:
+def derivative_step(name: str, key: str, peak: float, shows: float) -> float:
     """Step of a logarithm to take a derivative by, long enough to show above the twins' own noise.
 
-    peak: noises by which the effect shows.
+    peak: noises by which the effect shows.  shows: noises by which the step is to.
     """
     if (name, key) == WHITE:
         return WHITE_STEP
     if key != candidate(name).strength:
         return candidate(name).shape_step
-    return float(np.clip(STRENGTH_STEP / max(peak, 1e-9), *STRENGTH_STEPS))
+    return float(np.clip(shows / max(peak, 1e-9), *STRENGTH_STEPS))

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.prediction import Prediction
 from spikecam_env.gap.compare.step import step_of
-from spikecam_env.gap.compare.thresholds import BY_CHANCE
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.fit.confirm import TWINS_IN_THE_END, confirmed
+from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.coordinates import error_of, is_apart
 from spikecam_env.gap.fit.gauss_newton import WHITE, Free, Probe, descend, longest_of, moved, prior_sd
 from spikecam_env.gap.fit.problem import Problem
@@ -22,12 +21,6 @@ from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-AGREEMENT = 3.0
-"""Standard errors by which a parameter may move when held-out recordings are fitted too."""
-
-OWN_SHARE = 0.9
-"""Share of a refit's s^2 that is the unit's own, below which it is fitted together with the noise of the effects."""
 
 Errors = dict[str, dict[str, float]]
 """Standard deviation of each parameter, by effect and name."""
@@ -50,7 +43,7 @@ def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tupl
         return open_, errors, False
     whole, known, _ = _refined(everywhere, refined, names)
     suit = everywhere.is_explained(open_.prediction) or everywhere.is_explained(whole.prediction)
-    if not (suit and agree(refined, whole, errors)):
+    if not (suit and agree(refined, whole, errors, problem.settings.judging.apart)):
         return open_, errors, False
     return replace(whole, misfit=problem.misfit(whole.prediction)), known, True
 
@@ -69,8 +62,8 @@ def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, E
     if free:
         end = descend(problem, _probe(problem, found, names), now, base, free)
         now, base, columns = end.model, end.base, end.columns
-    best = confirmed(problem, replace(found, model=now, base=base), TWINS_IN_THE_END)
-    if best.misfit > problem.misfit(found.prediction) + BY_CHANCE:
+    best = confirmed(problem, replace(found, model=now, base=base), problem.settings.twins.in_the_end)
+    if best.misfit > problem.misfit(found.prediction) + problem.settings.deviance.by_chance:
         best = found
     if free:
         covariance = step_of(null, seen, best.prediction, columns, end.noise, prior_sd(free))[1]
@@ -88,8 +81,8 @@ def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, E
 
 
 def is_noisy(problem: Problem, base: BaseFit) -> bool:
-    """Whether effects take so much of the refit's s^2 that the unit `base` has less than OWN_SHARE of it."""
-    return 0 < base.white < OWN_SHARE * problem.case.base.white
+    """Whether effects take so much of the refit's s^2 that the unit `base` has less than `own_share` of it."""
+    return 0 < base.white < problem.settings.unit.own_share * problem.case.base.white
 
 
 def to_refine(problem: Problem, found: Fit, names: Sequence[str]) -> list[tuple[str, str]]:
@@ -112,7 +105,7 @@ def simulated_for(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[l
     if Candidates(tuple(names)).all_pattern:
         return [], 1
     only = with_held_out(problem.case, problem.affected(names, found.prediction.mean - problem.null.mean))
-    return only, max(twins_of(name) for name in names)
+    return only, max(twins_of(name, problem.settings.twins) for name in names)
 
 
 def no_smaller(known: Mapping[str, float], before: Mapping[str, float]) -> dict[str, float]:
@@ -127,18 +120,18 @@ def _stepped(problem: Problem, best: Fit, free: Free, columns: Array, step: Arra
     scatter is in the parameters that it led to."""
     predicted = replace(best.prediction, mean=best.prediction.mean + columns @ step)
     rho, left = problem.residual_and_misfit(predicted)
-    if np.any(np.abs(step) > longest_of(free)) or left > best.misfit:
+    if np.any(np.abs(step) > longest_of(free, problem.settings.fitting.longest_step)) or left > best.misfit:
         return best
     model, base = moved(best.model, best.base, free, step)
     return replace(best, model=model, base=base, prediction=predicted, rho=rho, misfit=left)
 
 
-def agree(before: Fit, after: Fit, errors: Errors) -> bool:
-    """Whether parameters moved within their errors."""
+def agree(before: Fit, after: Fit, errors: Errors, apart: float) -> bool:
+    """Whether parameters moved by less than `apart` of their errors."""
     then = {e.name: e.parameters() for e in after.model.effects}
     here = {e.name: e.parameters() for e in before.model.effects}
     known = [(n, k, sd) for n, by in errors.items() for k, sd in by.items() if sd > 0]
-    return not any(is_apart(n, k, then[n][k], here[n][k], AGREEMENT * sd) for n, k, sd in known)
+    return not any(is_apart(n, k, then[n][k], here[n][k], apart * sd) for n, k, sd in known)
 
 
 def _probe(problem: Problem, found: Fit, names: Sequence[str]) -> Probe:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, paired, values_of, with_pattern_moved
 from spikecam_env.gap.twins.case import Case, twins
-from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS, drawn_banks
+from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.false_spikes import false_spikes_of
 from spikecam_env.gap.unit.indirect_inference import inferred_unit
 from spikecam_env.gap.unit.refit import BaseFit
@@ -18,9 +18,6 @@ from spikecam_env.gap.unit.traps import traps_of
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-MANY_UNITS = 240
-"""Units to draw for the pattern where DRAWN_UNITS of them are too few to show the measured value."""
 
 
 def predict_by_twins(
@@ -40,10 +37,13 @@ def predict_by_twins(
 
 
 def with_drawn_pattern(
-    case: Case, model: SensorModel, null: Null, predicted: Prediction, count: int = DRAWN_UNITS
+    case: Case, model: SensorModel, null: Null, predicted: Prediction, count: int | None = None
 ) -> Prediction:
-    """A prediction with its pattern statistics replaced by those of `count` units of the model."""
-    drawn = drawn_banks(model, case.base, case.conditions, case.shape, count, case.seed)
+    """A prediction with its pattern statistics replaced by those of `count` units of the model; where None, of as many
+    as the null model has."""
+    count = null.settings.twins.drawn_units if count is None else count
+    limits = null.settings.twins.spread_limits
+    drawn = drawn_banks(model, case.base, case.conditions, case.shape, count, case.seed, limits)
     values = np.array([values_of(b, null.keys) for b in drawn])
     known = np.isfinite(values).all(axis=0)
     values = np.where(known, values, 0.0)
@@ -57,4 +57,6 @@ def settled_unit(model: SensorModel, base: BaseFit, null: Null, predicted: Predi
     """Indirect inference: adjust the unit until its twin with the effect refits to the null twin's refit without it."""
     [without] = [d.refit for d in null.draws if d.number == predicted.draws[-1].number]
     there = predicted.draws[-1].refit
-    return inferred_unit(model, base, without, [there]) if without and there else base
+    if not (without and there):
+        return base
+    return inferred_unit(model, base, without, [there], null.settings.unit.identifiable)

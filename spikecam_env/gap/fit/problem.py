@@ -12,8 +12,8 @@ from spikecam_env.gap.compare.distance import freedom_of, is_significant, residu
 from spikecam_env.gap.compare.prediction import Null, Prediction, law_error, own_variance
 from spikecam_env.gap.fit.predict import predict_by_twins, settled_unit, with_drawn_pattern
 from spikecam_env.gap.fit.recordings import recordings_affected
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 
@@ -40,6 +40,11 @@ class Problem:
         return Problem(case, model, null, values_to_fit(case, null, values), values)
 
     @property
+    def settings(self) -> DiagnosisSettings:
+        """By which it is diagnosed."""
+        return self.null.settings
+
+    @property
     def fitted_to_all(self) -> Problem:
         """The same, to be fitted to all recordings."""
         return replace(self, seen=self.values)
@@ -64,7 +69,7 @@ class Problem:
         """What another model gives (`predict_by_twins`)."""
         return predict_by_twins(self.case, model, base, self.null, count, only)
 
-    def with_pattern(self, model: SensorModel, predicted: Prediction, count: int = DRAWN_UNITS) -> Prediction:
+    def with_pattern(self, model: SensorModel, predicted: Prediction, count: int | None = None) -> Prediction:
         """A prediction with the pattern of units of another model (`with_drawn_pattern`)."""
         return with_drawn_pattern(self.case, model, self.null, predicted, count)
 
@@ -90,7 +95,7 @@ def values_to_fit(case: Case, null: Null, values: Array) -> Array:
 
 
 def standing_on(null: Null, predicted: Prediction) -> Null:
-    """Predictions of a model with effects already added, known no better than TOLERANCE of what they changed."""
+    """Predictions of a model with effects already added, known no better than the tolerance of what they changed."""
     floor = np.sqrt(null.floor**2 + law_error(null, predicted) ** 2 + own_variance(null, predicted))
     freedom = freedom_of(null, predicted)
     return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, freedom=freedom, draws=predicted.draws)

@@ -9,23 +9,17 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.settings import Twins
 from spikecam_env.gap.twins.case import Case, refit_recordings
 
 Array = NDArray[np.float64]
 
-TWINS_OF_RANDOM_COURSE, TWINS_OF_EVENTS = 6, 3
-"""Twins of an effect that makes statistics scatter; and of a sparse one (few events, few random pixels) or a
-`mixed` one, which cannot be simulated stronger to exceed one twin's noise, so several twins are averaged."""
 
-AFFECTED = 5.0
-"""Noises by which a statistic of a recording has to change, or to be off, for the recording to be simulated: of 600
-statistics one is off by so many in one campaign of 3000 by chance."""
-
-
-def twins_of(name: str) -> int:
-    """Number of twins for an effect."""
+def twins_of(name: str, settings: Twins) -> int:
+    """Number of twins for an effect: several of a sparse one (few events, few random pixels) or a `mixed` one, which
+    cannot be simulated stronger to exceed one twin's noise, so that several are averaged."""
     what = candidate(name)
-    return TWINS_OF_EVENTS if what.events or what.few_pixels or what.mixed else 1
+    return settings.of_events if what.events or what.few_pixels or what.mixed else 1
 
 
 def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int]:
@@ -34,7 +28,8 @@ def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: 
     With those that the refit rests on: the refit takes up the effects' mean, and the others are judged by that refit.
     Of effects that leave steady uniform light alone, only the others, where the refit does not rest on them.
     """
-    seen = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean))) > AFFECTED * null.noise
+    off = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean)))
+    seen = off > null.settings.judging.clear * null.noise
     shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
     fitted = {i for i, c in enumerate(case.conditions) if c.use == "fit"}
     which = {i for i in fitted if case.conditions[i].name in shows} or fitted

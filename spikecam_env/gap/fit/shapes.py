@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Prediction
-from spikecam_env.gap.compare.thresholds import TO_STEP_SHAPE
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import error_of
 from spikecam_env.gap.fit.gauss_newton import Descent, Free, descend
@@ -25,20 +24,18 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-SHAPING_SHARE = 0.5
-"""Share of what the best fit removes that one has to remove for its shape to be fitted."""
-
 
 def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> list[Fit]:
-    """Those of the fits whose other parameters can matter; before: misfit of none.
+    """Those of the fits whose other parameters can matter: that remove enough of what the best removes.
 
-    One with no other parameter that leaves nothing but chance, and less than they do, is not beaten by more parameters.
+    A fit with no other parameter that leaves nothing but chance, and less than they do, is not beaten by more
+    parameters.  before: misfit of none.
     """
     least = min((f.misfit for f in fits), default=np.inf)
     simple = min((f for f in fits if not candidate(f.name).has_shapes), key=lambda f: f.misfit, default=None)
     explained = simple is not None and not is_significant(problem.null, simple.rho, simple.prediction)
     enough = simple.misfit if simple and explained else np.inf
-    near = before - SHAPING_SHARE * (before - least)
+    near = before - problem.settings.searching.worth * (before - least)
     return [f for f in fits if candidate(f.name).has_shapes and f.misfit < min(near, enough)]
 
 
@@ -46,13 +43,13 @@ def with_fitted_shapes(problem: Problem, found: Fit, names: Sequence[str] = ()) 
     """The fit with all that is fitted of its candidate at its best; or of several effects `names`, at once."""
     names = names or (found.name,)
     only = problem.affected(names, found.prediction.mean - problem.null.mean)
-    count = max(twins_of(name) for name in names)
+    count = max(twins_of(name, problem.settings.twins) for name in names)
 
     def probe(there: SensorModel, base: BaseFit) -> Prediction:
         return problem.predict(there, constrained_refit(there, base), count, only)
 
     free = [(name, key) for name in names for key in candidate(name).fitted]
-    end = descend(problem, probe, found.model, found.base, free, TO_STEP_SHAPE)
+    end = descend(problem, probe, found.model, found.base, free, problem.settings.deviance.compare)
     shaped = where_ended(problem, found, end, free)
     return found if shaped.misfit > found.misfit else shaped
 

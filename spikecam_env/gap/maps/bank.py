@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from spikecam_env.campaign.reading import Campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.statistics import Key, pattern, texture
 from spikecam_env.sensor import SensorModel
 
@@ -27,7 +28,9 @@ class RateMap:
 
 @dataclass(frozen=True)
 class MapCase:
-    """All of a campaign.  response: medians of lit maps less the dark's, by name.  dark: median dark level."""
+    """All of a campaign.  response: medians of lit maps less the dark's, by name.  dark: median dark level.
+
+    settings: by which it is diagnosed."""
 
     shape: tuple[int, int]
     maps: tuple[RateMap, ...]
@@ -35,6 +38,7 @@ class MapCase:
     dark: float
     seed: int
     jobs: int
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
     def statistics(self) -> dict[Key, float]:
@@ -42,7 +46,7 @@ class MapCase:
         return map_bank(self.maps)
 
 
-def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> MapCase:
+def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: DiagnosisSettings | None = None) -> MapCase:
     """The rates of a campaign in known, steady light."""
     maps = []
     for r in campaign.recordings:
@@ -56,7 +60,7 @@ def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1) -> MapCase:
     dark = dark_of(maps)
     level = float(np.median(dark)) if dark is not None else 0.0
     response = {m.shown.name: float(np.median(m.rate)) - level for m in maps if m.shown.kind != "dark"}
-    return MapCase(campaign.shape, tuple(maps), response, level, seed, jobs)
+    return MapCase(campaign.shape, tuple(maps), response, level, seed, jobs, settings or DiagnosisSettings())
 
 
 def spread_evenly(rate: Array, frames: int) -> Array:

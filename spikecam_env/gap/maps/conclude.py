@@ -17,7 +17,6 @@ from spikecam_env.gap.fit.coordinates import interval_of
 from spikecam_env.gap.maps.bank import MapCase, with_use
 from spikecam_env.gap.maps.search import (
     FITTED_SPREADS,
-    LEAST_IMPROVEMENT,
     LINEAR_PARAMETERS,
     MapFit,
     PatternModel,
@@ -33,17 +32,11 @@ from spikecam_env.gap.result import (
     Statistic,
     why_rejected,
 )
-from spikecam_env.gap.unit.usual import USUAL
+from spikecam_env.gap.settings import MapSettings
+from spikecam_env.gap.unit.usual import unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
-
-MOST_SQUARE_LEFT = 0.08
-"""Share of the mean square beyond chance that may be left when something is named.  Of a mean square, and not of a
-robust deviance: statistics of maps are hundreds of noises off."""
-
-LARGEST_RELATIVE_SD = 0.5
-"""Relative standard deviation of a strength below which an effect is significant: two standard deviations."""
 
 MOST_RELATIVE_SD = 10.0
 """Standard deviation of a parameter's logarithm from which no error is stated: of an effect that does nothing."""
@@ -71,7 +64,7 @@ def conclude_maps(
     square = [float(np.mean(((values - mean) / null.noise) ** 2)) for mean in (null.mean, predicted)]
     left = (square[1] - 1.0) / max(square[0] - 1.0, 1e-9)
     significant = is_significant(null, rho)
-    explained = not rounds or not significant or left < MOST_SQUARE_LEFT
+    explained = not rounds or not significant or left < case.settings.maps.most_left
     parameters = spreads_off(case, last.state) if last else {}
     effects = significant_effects(case, null, values, rounds)
     found = [e.name for e in effects]
@@ -91,7 +84,7 @@ def conclude_maps(
         gap=gap_of_maps(case, null, values, predicted),
         statistics=map_statistics(case, null, values, predicted, rho),
         ranking=tuple(
-            ranked_fit(fit, was[0].misfit, r[0].name, fit is r[0] and r is not rejected)
+            ranked_fit(fit, was[0].misfit, r[0].name, fit is r[0] and r is not rejected, case.settings.maps)
             for was, r in itertools.pairwise([*rounds, rejected])
             for fit in r
         ),
@@ -106,7 +99,7 @@ def significant_effects(
     """The best of each round after the first, where its strength is significant in the end."""
     found = []
     for fits in rounds[1:]:
-        if has_clear_strength(rounds[-1][0], fits[0].name):
+        if has_clear_strength(rounds[-1][0], fits[0].name, case.settings.maps.largest_sd):
             instead = {f.name: gap_of_maps(case, null, values, f.predicted).removed for f in fits[1:]}
             found.append(named_effect(fits, rounds[-1][0], instead))
     return tuple(found)
@@ -129,7 +122,7 @@ def patched_model(case: MapCase, tested: SensorModel, last: MapFit | None) -> Se
     if last is None:
         return tested
     patched = at_measured_dark(last.state, case)
-    for name in (n for n in last.state.added if not has_clear_strength(last, n)):
+    for name in (n for n in last.state.added if not has_clear_strength(last, n, case.settings.maps.largest_sd)):
         patched = patched.without(name)
     return patched
 
@@ -138,7 +131,7 @@ def spreads_off(case: MapCase, state: PatternModel) -> dict[str, dict[str, float
     """Spreads of the model that this unit has in another amount than units differ by: as `baseline.off_nominal`."""
     found = {}
     for what, factor in state.factors.items():
-        if 1 / USUAL < factor < USUAL:
+        if not unusual(factor, case.settings.unit.usual):
             continue
         for effect in state.model.effects:
             if effect.name in FITTED_SPREADS[what]:
@@ -166,9 +159,10 @@ def named_effect(tried: Sequence[MapFit], last: MapFit, instead: dict[str, float
     )
 
 
-def has_clear_strength(last: MapFit, name: str) -> bool:
-    """Whether an effect's strength is more than two standard deviations in the end: a later one may take its place."""
-    return last.sd[f"{name}.{CATALOGUE[name].strength}"] < LARGEST_RELATIVE_SD
+def has_clear_strength(last: MapFit, name: str, largest_sd: float) -> bool:
+    """Whether an effect's strength is known in the end to a relative standard deviation: a later one may take its
+    place."""
+    return last.sd[f"{name}.{CATALOGUE[name].strength}"] < largest_sd
 
 
 def fit_estimates(tried: MapFit, name: str) -> dict[str, Estimate]:
@@ -186,12 +180,11 @@ def _estimate(name: str, key: str, value: float, sd: float) -> Estimate:
     return Estimate(value, own, interval_of(name, key, value, own, by_steps=linear))
 
 
-def ranked_fit(t: MapFit, before: float, best: str, accepted: bool) -> Ranked:
+def ranked_fit(t: MapFit, before: float, best: str, accepted: bool, settings: MapSettings) -> Ranked:
     """A row of the ranking.  best: the candidate of its round that leaves least."""
     worst = float(np.abs(t.rho).max())
-    reason = (
-        f"leaves {worst:.1f} noises at worst" if accepted else why_rejected(t.misfit, before, best, LEAST_IMPROVEMENT)
-    )
+    against = why_rejected(t.misfit, before, best, settings.least_improvement)
+    reason = f"leaves {worst:.1f} noises at worst" if accepted else against
     return Ranked(t.name, candidate(t.name).family, before, t.misfit, fit_estimates(t, t.name), accepted, reason)
 
 

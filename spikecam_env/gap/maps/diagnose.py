@@ -14,30 +14,34 @@ from spikecam_env.gap.compare.prediction import null_of, values_of
 from spikecam_env.gap.maps.bank import MapCase, map_bank, read_maps, unit_maps
 from spikecam_env.gap.maps.conclude import conclude_maps
 from spikecam_env.gap.maps.evidence import evidence_of_maps
-from spikecam_env.gap.maps.search import PREDICTED_UNITS, PatternModel, search_maps, spreads_matched
+from spikecam_env.gap.maps.search import PatternModel, search_maps, spreads_matched
 from spikecam_env.gap.result import Conclusion, Evidence
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.sensor import SensorModel
-
-MAP_ALARM = 0.02
-"""Adjusted p-value below which there is a discrepancy at all: as `baseline.alarm`, one false alarm in fifty."""
 
 
 def diagnose_maps(
-    campaign: Campaign, model: SensorModel, names: Sequence[str], seed: int = 0, jobs: int = 1
+    campaign: Campaign,
+    model: SensorModel,
+    names: Sequence[str],
+    seed: int = 0,
+    jobs: int = 1,
+    settings: DiagnosisSettings | None = None,
 ) -> tuple[Conclusion, Evidence]:
     """Find what fixed pattern a model lacks, from rates alone.
 
-    names: of candidates.  seed, jobs: as in `diagnose.diagnose`.  Raises InputError where no rates are in known light.
+    names: of candidates.  seed, jobs, settings: as in `diagnose.diagnose`.  Raises InputError where no rates are in
+    known light.
     """
-    case = read_maps(campaign, seed, jobs)
+    case = read_maps(campaign, seed, jobs, settings)
     tested = [n for n in names if candidate(n).is_pattern and shows_in_maps(n, case)]
     measured = case.statistics
     given = spreads_matched(PatternModel(model, {}), case, measured)
-    banks = [map_bank(unit_maps(given.fitted, case, n)) for n in range(PREDICTED_UNITS)]
-    null = null_of(banks, list(measured))
+    banks = [map_bank(unit_maps(given.fitted, case, n)) for n in range(case.settings.maps.units)]
+    null = null_of(banks, list(measured), settings=case.settings)
     null = replace(null, sd=np.maximum(null.sd, 1e-3 * null.floor))
     values = values_of(measured, null.keys)
-    alarm = adjusted(deviates(null, values)).min() < MAP_ALARM
+    alarm = adjusted(deviates(null, values)).min() < case.settings.judging.alarm
     rounds, rejected = search_maps(case, given, null, values, tested) if alarm else ([], [])
     not_testable = [(n, needs(n)) for n in names if n not in tested]
     conclusion = conclude_maps(case, model, null, values, rounds, rejected, not_testable)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.maps.bank import MapCase, dark_of, unit_levels
-from spikecam_env.gap.maps.search import PREDICTED_UNITS, MapFit, PatternModel
+from spikecam_env.gap.maps.search import MapFit, PatternModel
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
@@ -27,7 +27,7 @@ def evidence_of_maps(case: MapCase, given: PatternModel, last: MapFit | None) ->
         return BaseFit(gain.ravel(), dark.ravel(), flat, flat, 0.0, np.zeros((0, gain.size)), flat == 0)
 
     def levels(model: SensorModel) -> tuple[Array, Array]:
-        fresh, level = unit_levels(model, case, PREDICTED_UNITS)
+        fresh, level = unit_levels(model, case, case.settings.maps.units)
         return fresh.ravel(), level.ravel()
 
     nothing = (None,) * len(case.maps)

@@ -16,27 +16,14 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import HEAVY, is_significant, residual, robust_squares
+from spikecam_env.gap.compare.distance import is_significant, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.maps.bank import MapCase, map_bank, unit_maps, with_use
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.twins.fresh_units import SPREAD_LIMITS
 from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS as UNIT_SPREADS
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
-
-PREDICTED_UNITS = 8
-"""Drawn units over which a model's predictions are averaged."""
-
-MAP_FIT_STEPS = 6
-"""Gauss-Newton steps of a fit."""
-
-LEAST_IMPROVEMENT = 25.0
-"""Least reduction in deviance to add an effect; larger than for spikes, since statistics of one map are dependent."""
-
-MOST_MAP_EFFECTS = 5
-"""Largest number of effects that one diagnosis of maps names."""
 
 FITTED_SPREADS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
 """What is scaled to fit how pixels differ: parameters of effects, by what they spread."""
@@ -107,7 +94,9 @@ def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Key, floa
             ]
             off = [measured[k] - simulated[k] for k in keys if k in measured and k in simulated]
             if off and any(e.name in FITTED_SPREADS[what] for e in state.model.effects):
-                factors[what] = float(np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *SPREAD_LIMITS))
+                factors[what] = float(
+                    np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *case.settings.twins.spread_limits)
+                )
         state = replace(state, factors=factors)
     return state
 
@@ -119,14 +108,14 @@ def search_maps(
     was tried last and did not help."""
     rounds = [[fit_candidate(case, given, null, values, "")]]
     left = list(names)
-    while left and len(rounds) <= MOST_MAP_EFFECTS:
+    while left and len(rounds) <= case.settings.maps.most_effects:
         now = rounds[-1][0]
         if not is_significant(null, now.rho):
             break
         with ThreadPoolExecutor(case.jobs) as pool:
             tried = list(pool.map(lambda n, start=now.state: fit_candidate(case, start, null, values, n), left))
         tried.sort(key=lambda t: t.misfit)
-        if tried[0].misfit > now.misfit - LEAST_IMPROVEMENT:
+        if tried[0].misfit > now.misfit - case.settings.maps.least_improvement:
             return rounds, tried
         rounds.append(tried)
         left = [t.name for t in tried[1:] if t.misfit < now.misfit]
@@ -141,12 +130,12 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array,
         state = PatternModel(with_effect(state.model, name, default), state.factors, (*state.added, name))
     varied = [("", w) for w in FITTED_SPREADS if w in state.factors]
     varied += [(n, p) for n in state.added for p in fitted_parameters(n)]
-    use = with_use(case, null.keys, "fit")
+    use, settings, heavy = with_use(case, null.keys, "fit"), case.settings.maps, null.settings.judging.heavy
     sd = dict.fromkeys((f"{n}.{p}" for n, p in varied), np.nan)
     damping, best, least = FIRST_DAMPING, state, np.inf
-    for _ in range(MAP_FIT_STEPS):
+    for _ in range(settings.steps):
         at = unit_means(state, case, null.keys, [0])
-        now = robust_squares(residual(null, values, mean_prediction(null, at, 1))[use])
+        now = robust_squares(residual(null, values, mean_prediction(null, at, 1))[use], heavy)
         if now > least:
             damping *= 8.0
         else:
@@ -164,9 +153,9 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array,
             state = _moved(state, f, float(s))
         if np.abs(step).max() < 0.01:
             break
-    predicted = unit_means(best, case, null.keys, range(PREDICTED_UNITS))
-    rho = residual(null, values, mean_prediction(null, predicted, PREDICTED_UNITS))
-    return MapFit(name, best, sd, predicted, rho, robust_squares(rho[use]))
+    predicted = unit_means(best, case, null.keys, range(settings.units))
+    rho = residual(null, values, mean_prediction(null, predicted, settings.units))
+    return MapFit(name, best, sd, predicted, rho, robust_squares(rho[use], heavy))
 
 
 def fitted_parameters(name: str) -> tuple[str, ...]:
@@ -194,7 +183,8 @@ def _step(
     rho = residual(null, values, mean_prediction(null, predicted, 1))
     gap = np.nan_to_num(values - predicted)
     noise = np.where(np.abs(rho) > 1e-9, np.abs(gap) / np.maximum(np.abs(rho), 1e-9), null.noise)
-    w = np.where(use, (HEAVY + 1) / (HEAVY + rho**2) / noise**2, 0.0)
+    heavy = null.settings.judging.heavy
+    w = np.where(use, (heavy + 1) / (heavy + rho**2) / noise**2, 0.0)
     square = jacobian.T @ (w[:, None] * jacobian) + 1e-9 * np.eye(jacobian.shape[1])
     step = np.linalg.solve(square + damping * np.diag(np.diag(square)), jacobian.T @ (w * gap))
     return np.asarray(step, np.float64), np.asarray(np.linalg.inv(square), np.float64)

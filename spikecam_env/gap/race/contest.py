@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal
-from spikecam_env.gap.compare.thresholds import TO_CONFIRM
 from spikecam_env.gap.fit.confirm import confirmed, with_dark_levels_open
 from spikecam_env.gap.fit.joint import refined_together
 from spikecam_env.gap.fit.problem import Problem
@@ -20,8 +19,9 @@ from spikecam_env.gap.race.hypothesis import Fidelity, Hypothesis, added_to, bes
 from spikecam_env.gap.race.neighbours import Start
 from spikecam_env.gap.search.choice import chosen_of
 from spikecam_env.gap.search.neighbours import try_more_draws
+from spikecam_env.gap.settings import Deviance
 
-TIE = TO_CONFIRM
+TIE = Deviance().keep
 """Score by which a hypothesis has to be worse than the best to go no further: by chance, two twins differ by ten."""
 
 

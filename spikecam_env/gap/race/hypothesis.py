@@ -13,13 +13,13 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
-from spikecam_env.gap.compare.thresholds import TO_PREFER
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.joint import Errors
 from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.settings import Deviance
 from spikecam_env.gap.unit.refit import constrained_refit
 
-PRICE = TO_PREFER
+PRICE = Deviance().tie
 """Deviance that a parameter costs.  By Schwarz's criterion, the logarithm of the number of observations, it is 6.5 for
 the 660 statistics of the standard design."""
 

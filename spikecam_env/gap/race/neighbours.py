@@ -11,7 +11,7 @@ from functools import partial
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import in_noise, robust_squares
+from spikecam_env.gap.compare.distance import in_noise, loss
 from spikecam_env.gap.fit.confirm import confirmed, resettled
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.race.hypothesis import Fidelity, Hypothesis, added_to, beside, nothing_added
@@ -106,7 +106,7 @@ class Field:
         if len(one.effects) >= MOST_EFFECTS:
             return []
         before = deviance(beside(problem, one))
-        chosen = starts_to_fit(self.screened(problem, one, self.names), before)
+        chosen = starts_to_fit(self.screened(problem, one, self.names), before, problem.settings.searching)
         return [self.start(problem, one, s, before) for s in chosen]
 
     def standing_out(self, problem: Problem, one: Hypothesis) -> list[Start]:
@@ -116,8 +116,9 @@ class Field:
         here = beside(problem, one)
         before, groups = deviance(here), groups_that_stand_out(here.null, in_noise(here.null, here.seen))
         found = self.screened(problem, one, self.names)
-        near = starts_to_fit(found, before)
-        return [self.start(problem, one, s, before) for s in starts_to_fit(found, before, groups) if s not in near]
+        searching = problem.settings.searching
+        near, wider = (starts_to_fit(found, before, searching, of) for of in ((), groups))
+        return [self.start(problem, one, s, before) for s in wider if s not in near]
 
     def start(self, problem: Problem, one: Hypothesis, screened: Screened, before: float) -> Start:
         """A candidate's strength beside a hypothesis."""
@@ -151,7 +152,7 @@ def fits_its_shape(name: str) -> bool:
 
 def deviance(here: Problem) -> float:
     """Of a problem, in the noise that templates are scaled in."""
-    return robust_squares(in_noise(here.null, here.seen), here.null.weight)
+    return loss(here.null, in_noise(here.null, here.seen))
 
 
 def identity(one: Hypothesis) -> Hypothesis:

@@ -18,7 +18,7 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import LACKING, candidate
 from spikecam_env.gap.compare.prediction import with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit.candidate import ROUND_OFF, Fit
+from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -85,8 +85,9 @@ def fit_pair(here: Problem, pair: Pair) -> Fit:
     """Both effects at the strengths that suit what is seen best, from the best of their starts."""
     unit = constrained_refit(here.model, here.case.base)
     best, factor = min((scaled_once(here, pair, s, unit) for s in pair.starts(here)), key=lambda t: t[0].misfit)
+    round_off = here.settings.fitting.round_off
     for _ in range(MOST_TWINS - 1):
-        if ROUND_OFF[0] < factor < ROUND_OFF[1]:
+        if round_off[0] < factor < round_off[1]:
             break
         again, factor = scaled_once(here, pair, parameters_in(best.model, pair), best.base)
         best = min((best, again), key=lambda f: f.misfit)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from spikecam_env.gap.baseline.alarm import with_held_out_motion
-from spikecam_env.gap.compare.thresholds import TO_PREFER
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.race.contest import Heat, contest
 from spikecam_env.gap.race.hypothesis import (
@@ -21,10 +20,11 @@ from spikecam_env.gap.race.hypothesis import (
 from spikecam_env.gap.race.neighbours import Field
 from spikecam_env.gap.race.rounds import rounds_of
 from spikecam_env.gap.screen.templates import Templates
-from spikecam_env.gap.search.forward import ANOTHER, CAMPAIGNS_PER_EFFECT
+from spikecam_env.gap.search.forward import ANOTHER
 from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.settings import Deviance
 
-TO_ACCEPT = TO_PREFER
+TO_ACCEPT = Deviance().tie
 """Score by which a neighbour has to be better: a likelihood ratio of 20, and the price of its parameters."""
 
 
@@ -67,7 +67,7 @@ def may_go_on(problem: Problem, best: Hypothesis) -> bool:
     count = len(best.effects)
     if not count:
         return True
-    cost = CAMPAIGNS_PER_EFFECT * len(problem.case.conditions)
+    cost = problem.settings.searching.campaigns_per_effect * len(problem.case.conditions)
     return problem.allows(ANOTHER.get(count, "a fourth effect"), cost, needed=count == 1)
 
 

@@ -43,6 +43,10 @@ def reproduce_section(d: Diagnosis, campaign_command: str = "") -> Iterator[str]
     yield table(("stage", "seconds"), [*rows, ("all", f"{sum(d.stages.values()):.1f}")], numbers=(1,))
     if d.simulated:
         yield element("p", f"{d.simulated} recordings were simulated to find this.")
+    if d.settings:
+        yield element(
+            "p", f"Settings other than the defaults: {', '.join(f'{k} = {v}' for k, v in d.settings.items())}."
+        )
 
 
 def command_of(d: Diagnosis) -> str:

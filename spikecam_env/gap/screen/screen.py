@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import in_noise, robust_squares
-from spikecam_env.gap.compare.prediction import TOLERANCE, Null, pair_noise_share, pooled
+from spikecam_env.gap.compare.distance import in_noise, loss
+from spikecam_env.gap.compare.prediction import Null, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.screen.templates import Template, Templates
@@ -27,9 +27,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """A candidate by its template.  start: parameters to fit from.  misfit: that it would leave.
+    """A candidate by its template.
 
-    expected: (S,) change of the statistics there.  white: s^2 of the unit there, over the refit's.
+    Args:
+        name: of the candidate.
+        start: parameters to fit from.
+        misfit: that it would leave.
+        expected: (S,) change of the statistics at the start.
+        white: s^2 of the unit at the start, over the refit's.
     """
 
     name: str
@@ -47,9 +52,18 @@ def screen(
     names: Sequence[str],
     line_hz: float | None = None,
 ) -> list[Screened]:
-    """Candidates by the misfit that their best template of each shape, scaled, would leave; least first.
+    """Scale templates to a measurement, and keep the best of each candidate and shape.
 
-    line_hz: frequency of the strongest line of the measured spectra, to start periodic candidates from.
+    Args:
+        templates: the bank.
+        conditions: of the recordings.
+        null: what the model predicts without a candidate.
+        measured: (S,) statistics, NaN where they take no part.
+        names: of the candidates.
+        line_hz: frequency [Hz] of the strongest line of the measured spectra, from which periodic candidates start.
+
+    Returns:
+        Candidates by the misfit that they would leave, the least first.
     """
     at = _places(templates, conditions, null.keys)
     d = in_noise(null, measured)
@@ -64,7 +78,7 @@ def screen(
             else _in_proportion(entry, null, d, shift)
         )
         if now is None and candidate(entry.name).of_motion:
-            now = Screened(entry.name, dict(entry.parameters), robust_squares(d, null.weight), shift * null.noise)
+            now = Screened(entry.name, dict(entry.parameters), loss(null, d), shift * null.noise)
         if now is None:
             continue
         if line_hz and "frequency_hz" in entry.parameters:
@@ -77,15 +91,16 @@ def screen(
 def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Screened | None:
     """A template scaled to the measured distances `d`, in noise; None where only a wrong sign would do."""
     own2 = pair_noise_share(null.keys) ** 2 * (shift != 0)
-    scale, _ = scale_of(d, shift, np.ones_like(d), own2, 2 * TOLERANCE)
+    judging = replace(null.settings.judging, tolerance=2 * null.settings.judging.tolerance)
+    scale, _ = scale_of(d, shift, np.ones_like(d), own2, judging)
     if scale <= 0 and not candidate(entry.name).may_be_negative:
         return None
     strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
-    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
+    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (judging.tolerance * scale * shift) ** 2)
     there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
     start = bounded(entry.name, {**entry.parameters, strength: there})
     white = 1.0 / (1.0 + abs(scale) * (1.0 / entry.white - 1.0))
-    return Screened(entry.name, start, robust_squares(rho, null.weight), scale * shift * null.noise, white)
+    return Screened(entry.name, start, loss(null, rho), scale * shift * null.noise, white)
 
 
 def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
@@ -96,7 +111,7 @@ def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
     for factor in np.geomspace(1e-3, 1e3, 100):
         wider = 1.0 + factor * size2
         penalty = float(np.sum(null.weight * np.log(wider) * (d != 0)))
-        tried.append((robust_squares(d / np.sqrt(wider), null.weight) + penalty, factor))
+        tried.append((loss(null, d / np.sqrt(wider)) + penalty, factor))
     left, factor = min(tried)
     start = bounded(entry.name, {**entry.parameters, strength: entry.parameters[strength] * factor ** (1 / power)})
     return Screened(entry.name, start, left, np.sqrt(factor * size2) * null.noise)

@@ -27,37 +27,36 @@ Array = NDArray[np.float64]
 
 PAIR = ("dead_time", "photo_response_nonlinearity")
 
-START_US, MOST_TWINS_OF_BOTH = 1.0, 4
-"""Dead time [us] of the first twin, and how many there are at most."""
-
-LARGEST_FACTOR = 4.0
-"""Factor by which strengths are changed at once."""
-
-CLOSE_FACTOR = (0.8, 1.25)
-"""Factors between which what is left of the strengths is scaled, without another twin."""
+START_US = 1.0
+"""Dead time [us] of the first twin."""
 
 
 def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
-    """Both added to the model, at the strength that suits what is seen best, as a fit of the second; None where only a
-    wrong sign would do, or one of them is not among the candidates `names`."""
+    """Fit both effects at once, by one strength.
+
+    Returns:
+        A fit of the second whose model has both.  None if only a strength of the wrong sign would do, or if one of
+        them is not among the candidates `names`.
+    """
     if not set(PAIR) <= set(names):
         return None
-    frame_rate_hz = problem.case.frame_rate_hz
+    frame_rate_hz, settings = problem.case.frame_rate_hz, problem.settings
+    most, close = settings.twins.most_extrapolated, settings.searching.close_factor
     only = problem.affected(PAIR)
     tau_us = START_US
     bare = base = constrained_refit(
         with_both(problem.model, tau_us, frame_rate_hz), constrained_refit(problem.model, problem.case.base)
     )
-    for _ in range(MOST_TWINS_OF_BOTH):
+    for _ in range(settings.fitting.most_steps):
         there = with_both(problem.model, tau_us, frame_rate_hz)
         predicted = problem.predict(there, base, 1, only)
         base = problem.settled_unit(there, base, predicted)
         square, _ = scale_to(problem.null, problem.seen, predicted)
         if square <= 0:
             return None
-        factor = float(np.clip(np.sqrt(square), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
-        base, tau_us = extrapolated_unit(bare, base, factor**2), tau_us * factor
-        if CLOSE_FACTOR[0] < factor < CLOSE_FACTOR[1]:
+        factor = float(np.clip(np.sqrt(square), 1 / most, most))
+        base, tau_us = extrapolated_unit(bare, base, factor**2, most), tau_us * factor
+        if 1 / close < factor < close:
             break
     predicted = with_change_scaled(problem.null, predicted, factor**2)
     rho, left = problem.residual_and_misfit(predicted)

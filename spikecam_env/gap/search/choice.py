@@ -9,24 +9,38 @@ import numpy as np
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
 from spikecam_env.gap.compare.prediction import Draw
-from spikecam_env.gap.compare.thresholds import PER_PARAMETER, TO_CONFIRM, TO_DISMISS, TO_PREFER
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.search.rivals import is_rival, lead
+from spikecam_env.gap.settings import PER_PARAMETER
 
 
 def confirmed_in_order(
-    fits: Sequence[Fit], confirm: Callable[[Fit], Fit], known: Sequence[Fit] = (), enough: float = np.inf
+    fits: Sequence[Fit],
+    confirm: Callable[[Fit], Fit],
+    margin: float,
+    known: Sequence[Fit] = (),
+    enough: float = np.inf,
 ) -> tuple[list[Fit], list[Fit]]:
-    """(confirmed, best first; the others).  A fit rests on one twin: from the best on they are confirmed by more, two
-    at least, until one, as much better as that made the others, would be TO_CONFIRM above the best.
+    """Confirm fits, which rest on one twin each, by more twins, from the best on.
 
-    known: confirmed before.  enough: misfit that one has to come down to, for any to be confirmed.
+    At least two are confirmed.  Confirmation ends at a fit that would be `margin` above the best one, even if it got
+    as much better as any did.
+
+    Args:
+        fits: in any order.
+        confirm: simulates a fit with more twins.
+        margin: misfit above the best that chance cannot explain.
+        known: fits that were confirmed before.
+        enough: misfit that a fit has to come down to for any to be confirmed.
+
+    Returns:
+        (confirmed fits, the best first; the others).
     """
     waiting, done, better = sorted(fits, key=lambda f: f.misfit), list(known), 0.0
     while waiting:
         least, hope = min((f.misfit for f in done), default=np.inf), waiting[0].misfit - better
-        if min(least, hope) > enough or (len(done) > 1 and hope >= least + TO_CONFIRM):
+        if min(least, hope) > enough or (len(done) > 1 and hope >= least + margin):
             break
         done.append(confirm(waiting[0]))
         better = max(better, waiting.pop(0).misfit - done[-1].misfit)
@@ -34,27 +48,34 @@ def confirmed_in_order(
 
 
 def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) -> tuple[list[Fit], tuple[str, ...]]:
-    """(fits, the chosen one first; names of its rivals).  What may as well be true as the first, by the recordings to
-    fit, or leaves hardly more, is put in order by all recordings, and has to be a rival by them.  A parameter more has
-    to explain more: what has one is chosen where it leaves TO_PREFER less, and is a rival where it leaves as much less
-    as any parameter would (PER_PARAMETER).
+    """Choose among confirmed fits, and find the rivals of the chosen one.
 
-    here: what the candidates were added to.  draws: of the model as given.
+    All recordings decide between those that the recordings to fit do not separate from the first.  A fit with one more
+    parameter is chosen if its misfit is smaller by a tie.  It is a rival if its misfit is smaller by what a parameter
+    without a meaning removes (PER_PARAMETER).
+
+    Args:
+        here: what the candidates were added to.
+        draws: campaigns of the model as given.
+        confirmed: fits, the best first.
+
+    Returns:
+        (fits, the chosen one first; names of its rivals).
     """
     if not confirmed:
         return [], ()
-    null, seen, values = here.null, here.seen, here.values
+    null, seen, values, deviance = here.null, here.seen, here.values, here.settings.deviance
     first = confirmed[0].prediction
     close = [
         f
         for f in confirmed
         if f is confirmed[0]
-        or lead(null, seen, first, f.prediction) < TO_DISMISS
+        or lead(null, seen, first, f.prediction) < deviance.dismiss
         or is_rival(null, draws, seen, first, f.prediction)
     ]
     behind = {f.name: lead(null, values, first, f.prediction) for f in close}
     parameters = {f.name: sum(len(candidate(n).fitted) for n in f.added_to(here.model)) for f in close}
-    close.sort(key=lambda f: behind[f.name] + TO_PREFER * parameters[f.name])
+    close.sort(key=lambda f: behind[f.name] + deviance.tie * parameters[f.name])
     best = close[0]
     left = residual(null, values, best.prediction)
 

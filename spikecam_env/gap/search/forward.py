@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.alarm import is_discrepant, with_held_out_motion
-from spikecam_env.gap.compare.distance import in_noise, is_significant, residual, robust_squares
-from spikecam_env.gap.compare.thresholds import TO_ADD, TO_JOIN
+from spikecam_env.gap.compare.distance import in_noise, is_significant, loss, residual
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.fit.confirm import TWINS_IN_THE_END, confirmed, with_dark_levels_open, with_prediction
+from spikecam_env.gap.fit.confirm import confirmed, with_dark_levels_open, with_prediction
 from spikecam_env.gap.fit.gauss_newton import PROBES
 from spikecam_env.gap.fit.joint import Errors, is_noisy, no_smaller, refined_together, simulated_for
 from spikecam_env.gap.fit.problem import Problem
@@ -50,18 +49,11 @@ from spikecam_env.gap.unit.refit import constrained_refit
 
 Array = NDArray[np.float64]
 
-MOST_EFFECTS = 3
-"""Effects that one diagnosis names together."""
-
 SECOND = "a second effect"
 """Without having looked for it, nothing is named where something is left."""
 
 ANOTHER = {1: SECOND, 2: "a third effect"}
 """What is looked for beside so many."""
-
-CAMPAIGNS_PER_EFFECT = 16
-"""Times the campaign that another effect takes, by and large: its fits, twins that confirm it, and its place beside
-those before it."""
 
 
 def forward_selection(problem: Problem, names: Sequence[str], templates: Templates) -> list[Round]:
@@ -71,14 +63,14 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
     parameters that others leave open.
     """
     rounds: list[Round] = []
-    given, null, values = problem, problem.null, problem.values
+    given, null, values, settings = problem, problem.null, problem.values, problem.settings
     now, base, prediction = problem.model, constrained_refit(problem.model, problem.case.base), null.prediction
-    while len(rounds) < MOST_EFFECTS:
+    while len(rounds) < settings.searching.most_effects:
         rho = residual(null, problem.seen, prediction)
         by_fit = is_significant(null, rho, prediction) if rounds else is_discrepant(null, problem.seen)
         if rounds and not (by_fit or is_significant(null, residual(null, values, prediction), prediction)):
             break
-        cost = CAMPAIGNS_PER_EFFECT * len(problem.case.conditions)
+        cost = settings.searching.campaigns_per_effect * len(problem.case.conditions)
         if rounds and not problem.allows(ANOTHER[len(rounds)], cost, needed=len(rounds) == 1):
             break
         if not by_fit:
@@ -87,7 +79,7 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         chance = float(np.sum(null.weight * np.isfinite(problem.seen)))
         here = problem.standing_on(now, base, prediction)
         motion_alone = problem.case is not given.case
-        to_join = TO_JOIN if rounds else TO_ADD
+        to_join = settings.deviance.join if rounds else settings.deviance.accept
         turn = Round(now, base, prediction, rho, here.misfit(), motion_alone=motion_alone, to_join=to_join)
         turn = with_candidates(problem, here, names, templates, turn)
         rounds.append(turn)
@@ -96,7 +88,7 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         rounds[-1:] = one_by_one(turn)
         together = joined(problem, rounds, chance)
         best = together[-1].fits[0]
-        weak = turn.misfit - turn.fits[0].misfit < TO_ADD
+        weak = turn.misfit - turn.fits[0].misfit < settings.deviance.accept
         if not is_improvement(null, problem.misfit(prediction), best, len(rounds) > 1, weak):
             break
         if best.name in absent(problem.case, given.model, best.model):
@@ -118,14 +110,15 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
     left = [n for n in names if n not in {e.name for e in turn.model.effects}]
     screened = screened_beside(here, left, templates)
     distance = in_noise(null, seen)
-    starts = starts_to_fit(screened, robust_squares(distance, null.weight), groups_that_stand_out(null, distance))
+    searching, deviance = here.settings.searching, here.settings.deviance
+    starts = starts_to_fit(screened, loss(null, distance), searching, groups_that_stand_out(null, distance))
     confirm = partial(confirmed, here)
     fits, tries = fits_of(here, turn.misfit, starts)
-    places = MOST_EFFECTS - (len(here.model.effects) - len(problem.model.effects))
+    places = searching.most_effects - (len(here.model.effects) - len(problem.model.effects))
     if places > 1:
-        fits = with_pairs(fits, fit_pairs(here, left))
+        fits = with_pairs(fits, fit_pairs(here, left), deviance.tie)
     visible = [f for f in fits if is_visible(null, f)]
-    done, rest = confirmed_in_order(visible, confirm, enough=turn.misfit - turn.to_join)
+    done, rest = confirmed_in_order(visible, confirm, deviance.keep, enough=turn.misfit - turn.to_join)
     rest = [*rest, *(f for f in fits if not is_visible(null, f))]
     if done and done[0].name in {s.name for s in tries} and turn.misfit - done[0].misfit > turn.to_join:
         anew = [confirm(f) for f in try_other_starts(here, done[0], turn.misfit, screened, tries)]
@@ -135,10 +128,15 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
 
 
 def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Round]:
-    """The rounds with the last one's best together with what was found before, and all of it refined, while the budget
-    allows, unless it is a stand-in: the first, or one more bend, that has little to say and leaves something.
+    """The rounds with the last one's best effect beside all found before, and their parameters refined together.
 
-    The last one's best was judged by the model that it was added to; all together are by the one given (problem).
+    Effects that are no longer needed are left out.  Nothing is refined beyond the budget, or if the last effect is a
+    stand-in (`is_stand_in`).
+
+    Args:
+        problem: the model as given, by which all effects are judged together.
+        rounds: up to the last, whose best effect was judged by the model that it was added to.
+        chance: misfit of noise alone.
     """
     *before, last = rounds
     best = last.fits[0]
@@ -162,17 +160,17 @@ def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Rou
 
 
 def is_stand_in(problem: Problem, last: Round, best: Fit, chance: float, later: bool) -> bool:
-    """Whether the first effect, or one more bend, has little to say and leaves something."""
+    """Whether the first effect, or a second bend, removes little and leaves something: it may stand for another."""
     if later and not is_second_bend(last, best):
         return False
-    little = is_small_share(last, best.misfit, chance, later)
+    little = is_small_share(last, best.misfit, chance, later, problem.settings.searching)
     return little and is_significant(problem.null, best.rho, best.prediction)
 
 
 def may_be_refined(problem: Problem, found: Fit, names: Sequence[str]) -> bool:
     """Whether the budget allows the strengths of these effects to be refined: a derivative each, and the last twins."""
     only, count = simulated_for(problem, found, names)
-    cost = len(only) * (PROBES * count * (1 + len(names)) + TWINS_IN_THE_END)
+    cost = len(only) * (PROBES * count * (1 + len(names)) + problem.settings.twins.in_the_end)
     return problem.allows("finer strengths", cost, needed=True)
 
 

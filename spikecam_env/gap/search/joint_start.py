@@ -18,7 +18,6 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import LACKING, candidate
 from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.compare.thresholds import TO_PREFER, TO_STEP_SHAPE
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.gauss_newton import descend
 from spikecam_env.gap.fit.problem import Problem
@@ -26,12 +25,6 @@ from spikecam_env.gap.fit.shapes import where_ended
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
-
-LARGEST_FACTOR = 2.0
-"""Factor by which a strength of the grid is scaled, without another twin, to say how good a start is."""
-
-DESCENTS = 2
-"""Starts of a grid from which both effects are fitted, the best ones."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +59,9 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
     grid = [dict(zip(starts, values, strict=True)) for values in product(*starts.values())]
     only = here.affected(pair.names)
     free = [(name, key) for name in pair.names for key in candidate(name).fitted]
-    if not here.allows(
-        f"{pair.first} with {pair.second}", len(only) * (len(grid) + DESCENTS * (1 + len(free))), needed=True
-    ):
+    descents, most = here.settings.searching.descents, here.settings.searching.grid_factor
+    cost = len(only) * (len(grid) + descents * (1 + len(free)))
+    if not here.allows(f"{pair.first} with {pair.second}", cost, needed=True):
         return None
     fitted = candidate(pair.first).fitted
     strength = fitted[0]
@@ -79,7 +72,7 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
         tried = with_effect(model, pair.first, first)
         predicted = here.predict(tried, constrained_refit(tried, here.case.base), 1, only)
         scale, _ = scale_to(here.null, here.seen, predicted)
-        scale = float(np.sign(scale) * np.clip(abs(scale), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
+        scale = float(np.sign(scale) * np.clip(abs(scale), 1 / most, most))
         scaled = bounded(pair.first, {**first, strength: first[strength] * scale})
         predicted, there = with_change_scaled(here.null, predicted, scale), with_effect(model, pair.first, scaled)
         rho, left = here.residual_and_misfit(predicted)
@@ -90,20 +83,19 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
         return here.predict(there, constrained_refit(there, base), 1, only)
 
     def descended(found: Fit) -> Fit:
-        end = descend(here, probe, found.model, found.base, free, TO_STEP_SHAPE)
+        end = descend(here, probe, found.model, found.base, free, here.settings.deviance.compare)
         return where_ended(here, found, end, free)
 
     with ThreadPoolExecutor(here.case.jobs) as pool:
-        best = sorted(pool.map(start, grid), key=lambda f: f.misfit)[:DESCENTS]
+        best = sorted(pool.map(start, grid), key=lambda f: f.misfit)[:descents]
         fits = list(pool.map(descended, best))
     return min(fits, key=lambda f: f.misfit)
 
 
-def with_pairs(fits: Sequence[Fit], of_pairs: Sequence[Fit]) -> list[Fit]:
-    """Fits of single candidates, with those of pairs in place of the first effect's where they leave TO_PREFER
-    less."""
+def with_pairs(fits: Sequence[Fit], of_pairs: Sequence[Fit], tie: float) -> list[Fit]:
+    """Fits of single candidates; a pair's replaces its first effect's if it leaves less misfit by more than a tie."""
     alone = {f.name: f.misfit for f in fits}
-    better = {f.name: f for f in of_pairs if f.misfit < alone.get(f.name, np.inf) - TO_PREFER}
+    better = {f.name: f for f in of_pairs if f.misfit < alone.get(f.name, np.inf) - tie}
     return [*better.values(), *(f for f in fits if f.name not in better)]
 
 

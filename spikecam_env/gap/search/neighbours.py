@@ -22,11 +22,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
-from spikecam_env.gap.compare.thresholds import TO_ADD, TO_KEEP, TO_KEEP_UNTRIED, TO_PREFER
 from spikecam_env.gap.fit.candidate import Fit, fit
-from spikecam_env.gap.fit.confirm import TWINS_TO_CONFIRM, confirmed, no_more_certain, resettled, with_prediction
+from spikecam_env.gap.fit.confirm import confirmed, no_more_certain, resettled, with_prediction
 from spikecam_env.gap.fit.joint import Errors, refined_together
-from spikecam_env.gap.fit.predict import MANY_UNITS
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import with_fitted_shapes
 from spikecam_env.gap.screen.screen import Screened
@@ -37,14 +35,6 @@ from spikecam_env.gap.search.shortlist import fit_from, may_be_shaped, recording
 
 Array = NDArray[np.float64]
 
-SAME_SHARE = 0.8
-"""Share of what the best removes that a neighbour has to remove, another start of it before its shape is fitted, or the
-runner-up of its round, to be tried in its place."""
-
-EARLIER_SHARE, EARLIER_TRIED = 0.5, 4
-"""Share of what an earlier effect removed that a runner-up of its round has to have removed, to be tried in its place
-beside a later one; and how many are at most."""
-
 
 # ---- another start of the same effect
 
@@ -52,46 +42,61 @@ beside a later one; and how many are at most."""
 def try_other_starts(
     problem: Problem, found: Fit, before: float, screened: Sequence[Screened], tries: Mapping[Screened, Fit]
 ) -> list[Fit]:
-    """Fits, at most one, of a candidate from other starts than its fit, shaped, where one removes SAME_SHARE of what it
-    does before that.  before: misfit of none.  tries: fits from starts that were made before."""
+    """Fit a candidate from other starts than that of its best fit, and its shape from the best of them.
+
+    Args:
+        found: its best fit.
+        before: misfit without it.
+        screened: all starts, the best first.
+        tries: fits that were made from starts before.
+
+    Returns:
+        The shaped fit, if one of the starts removes nearly as much as `found` does; else nothing.
+    """
     began = min((s for s in tries if s.name == found.name), key=lambda s: tries[s].misfit)
-    starts = other_starts(began, screened, before)
+    searching = problem.settings.searching
+    starts = other_starts(began, screened, before, searching.worth)
     cost = recordings_of(problem, found) * sum(s not in tries for s in starts)
     if not starts or not problem.allows(f"{found.name} of another shape", cost):
         return []
     with ThreadPoolExecutor(problem.case.jobs) as pool:
         new = [s for s in starts if s not in tries]
         fits = {**tries, **dict(zip(new, pool.map(partial(fit_from, problem), new), strict=True))}
-    near = [fits[s] for s in starts if before - fits[s].misfit > SAME_SHARE * (before - found.misfit)]
+    near = [fits[s] for s in starts if before - fits[s].misfit > searching.same_share * (before - found.misfit)]
     best = [f for f in sorted(near, key=lambda f: f.misfit)[:1] if may_be_shaped(problem, f)]
     return [with_fitted_shapes(problem, f) for f in best]
 
 
-def other_starts(began: Screened, screened: Sequence[Screened], before: float) -> list[Screened]:
+def other_starts(began: Screened, screened: Sequence[Screened], before: float, worth: float) -> list[Screened]:
     """Where else to fit a candidate from, whose shape is fitted too: a valley may have two ends.
 
-    Those of its templates, but for where the best fit began, that explain half of what the best of them does; all where
-    templates are of other pictures.  before: misfit of none.
+    Those of its templates, but for where the best fit began, that explain enough of what the best of them does; all
+    where templates are of other pictures.  before: misfit of none.  worth: the share that is enough.
     """
     what = candidate(began.name)
     if not set(what.shapes) & set(what.fitted):
         return []
     there = [s for s in screened if s.name == began.name]
-    half = 0.5 * (before - there[0].misfit)
-    return [s for s in there if s is not began and (what.of_motion or before - s.misfit > half)]
+    enough = worth * (before - there[0].misfit)
+    return [s for s in there if s is not began and (what.of_motion or before - s.misfit > enough)]
 
 
 # ---- another effect in place of one that was found
 
 
 def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[Fit, Round]:
-    """(fit, round) with the effect of an earlier round put against its runners-up again, now that `best` has another
-    beside it: alone, a wrong one may have stood for both."""
-    first = turn.fits[0]
-    least = turn.misfit - EARLIER_SHARE * (turn.misfit - first.misfit)
+    """Compare the effect of an earlier round with its runners-up again, beside the effect that was found later.
+
+    Alone, a wrong effect may have stood for both.
+
+    Returns:
+        (the fit of all effects, the earlier round), with the effect that is better now.
+    """
+    first, searching = turn.fits[0], problem.settings.searching
+    least = turn.misfit - searching.worth * (turn.misfit - first.misfit)
     has = {e.name for e in best.model.effects}
     others = sorted((f for f in turn.fits if f.name not in has and f.misfit < least), key=lambda f: f.misfit)
-    others = others[:EARLIER_TRIED]
+    others = others[: searching.earlier_tried]
     if not others or not problem.allows(f"others in place of {first.name}"):
         return best, turn
     rest = best.model.without(first.name)
@@ -100,7 +105,9 @@ def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[F
     with ThreadPoolExecutor(problem.case.jobs) as pool:
         fits = list(pool.map(lambda f: fit(here, f.name, f.parameters), others))
     confirm = partial(confirmed, here)
-    done, _ = confirmed_in_order(fits, confirm, [confirm(replace(best, name=first.name))])
+    done, _ = confirmed_in_order(
+        fits, confirm, problem.settings.deviance.keep, [confirm(replace(best, name=first.name))]
+    )
     done, rivals = chosen_of(here, problem.null.draws, done)
     name = done[0].name
     order = sorted(turn.fits, key=lambda f: f.name != name)
@@ -110,25 +117,34 @@ def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[F
 
 
 def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: Sequence[str]) -> tuple[Round, Errors]:
-    """(round, errors) with the runner-up of the last round in place of its best, where all that was found together with
-    it leaves TO_PREFER less.  names: of all effects found, the round's last."""
-    for other in runner_up(last, names):
+    """Try the runner-up of the last round in place of its best, all parameters refined together.
+
+    Args:
+        last: the round.
+        errors: of all parameters, beside the best.
+        names: of all effects found, the round's last.
+
+    Returns:
+        (round, errors): with the runner-up if it leaves less misfit by more than a tie, else as given.
+    """
+    for other in runner_up(last, names, problem.settings.searching.same_share):
         if not problem.allows(f"others in place of {names[-1]}"):
             continue
         tried, known, used_held_out = refined_together(problem, other, [*names[:-1], other.name])
-        if tried.misfit < last.fits[0].misfit - TO_PREFER:
+        if tried.misfit < last.fits[0].misfit - problem.settings.deviance.tie:
             rest = [f for f in last.fits if f.name != other.name]
             last = replace(last, fits=(tried, *rest), rivals=(), used_held_out=used_held_out)
             errors = known
     return last, errors
 
 
-def runner_up(turn: Round, names: Sequence[str]) -> list[Fit]:
-    """The runner-up of a round beside the same effects, at most one, where it removed SAME_SHARE of what the best did:
-    those before it may have had its share when the two were compared.  names: of all effects found, the round's
-    last."""
+def runner_up(turn: Round, names: Sequence[str], same_share: float) -> list[Fit]:
+    """The runner-up of a round beside the same effects, at most one, where it removed a large share of what the best
+    did: those before it may have had its share when the two were compared.
+
+    names: of all effects found, the round's last.  same_share: the share that it has to have removed."""
     best, *others = turn.fits
-    least = turn.misfit - SAME_SHARE * (turn.misfit - best.misfit)
+    least = turn.misfit - same_share * (turn.misfit - best.misfit)
     there = [f for f in others if len(f.prediction.draws) > 1 and f.misfit < least and f.name not in names]
     beside = [f for f in there if {e.name for e in f.model.effects} - {f.name} >= set(names[:-1])]
     return sorted(beside, key=lambda f: f.misfit)[:1]
@@ -139,16 +155,20 @@ def runner_up(turn: Round, names: Sequence[str]) -> list[Fit]:
 
 def may_try_without_earlier(problem: Problem, count: int) -> bool:
     """Whether the budget allows so many effects to be simulated together, and without each that came before."""
-    cost = count * TWINS_TO_CONFIRM * len(problem.case.conditions)
+    cost = count * problem.settings.twins.to_confirm * len(problem.case.conditions)
     return problem.allows("whether all that was found is needed", cost, needed=True)
 
 
 def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Array]) -> Fit:
-    """All effects found so far together; one that is no longer needed is left out again.
+    """All effects found so far together, without those that are no longer needed.
 
-    problem: before any was added.  earlier: (S,) what each effect changed when it was added, by name; one whose change
-    is plainly missed is not simulated without.  Two twins may scatter little where the many that `found` stands on have
-    shown that campaigns do not.
+    Errors stay as large as the many twins of `found` have shown them: two twins may scatter little by chance.
+
+    Args:
+        problem: before any effect was added.
+        found: the fit of all effects.
+        earlier: (S,) what each effect changed when it was added, by name.  An effect whose change is plainly missed is
+            kept without a simulation.
     """
     both = confirmed(problem, resettled(problem, found, found.model))
     both = no_more_certain(problem, both, found.prediction)
@@ -156,24 +176,27 @@ def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Arra
         if name not in {e.name for e in both.model.effects} or is_missed(problem, both, change):
             continue
         fewer = confirmed(problem, resettled(problem, both, both.model.without(name)))
-        if fewer.misfit < both.misfit + TO_KEEP:
+        if fewer.misfit < both.misfit + problem.settings.deviance.keep:
             both = fewer
     return both
 
 
 def is_missed(problem: Problem, found: Fit, change: Array) -> bool:
-    """Whether a prediction less a change of its statistics leaves TO_KEEP_UNTRIED more: twins without it would say the
-    same."""
+    """Whether a prediction without a change (S,) leaves so much more misfit that no simulation is needed."""
     without = replace(found.prediction, mean=found.prediction.mean - change)
-    return problem.misfit(without) > found.misfit + TO_KEEP_UNTRIED
+    return problem.misfit(without) > found.misfit + problem.settings.deviance.keep_untried
 
 
 # ---- two effects at once
 
 
 def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Round]) -> list[Round]:
-    """Rounds that find two bends that cancel, where those of the search leave something and began with a bend; those of
-    the search where the two leave no less."""
+    """Try two bends that cancel, if the search began with a bend and leaves something.
+
+    Returns:
+        Rounds that find the two, if they leave less misfit than the search by what an effect has to remove; else the
+        rounds of the search.
+    """
     first, last = rounds[0], rounds[-1]
     null = problem.null
     if not first.fits or not candidate(first.fits[0].name).bends_response:
@@ -186,7 +209,7 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
     if found is None or found.misfit > last.misfit:
         return rounds
     found, errors, used_held_out = refined_together(problem, found, PAIR)
-    if found.misfit > last.misfit - TO_ADD:
+    if found.misfit > last.misfit - problem.settings.deviance.accept:
         return rounds
     one, other = (next(e for e in found.model.effects if e.name == name).parameters() for name in PAIR)
     alone = replace(found, name=PAIR[0], parameters={"tau_us": one["tau_us"]}, sd=errors[PAIR[0]])
@@ -211,17 +234,18 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
 
 
 def try_more_draws(problem: Problem, found: Fit) -> Fit:
-    """The fit, by as many draws as the null has where those it stands on are too few to say whether it leaves anything,
-    and by MANY_UNITS where what it leaves is of the pattern."""
-    null = problem.null
+    """The fit by more draws, if its few twins do not show whether it leaves anything.
+
+    It gets as many draws as the null model has, and ten times as many units if it leaves something of the pattern."""
+    null, many = problem.null, 10 * problem.settings.twins.drawn_units
     pattern = found.prediction.units is not None and is_significant(null, of_pattern(problem, found), found.prediction)
     if pattern:
-        found = with_prediction(problem, found, problem.with_pattern(found.model, found.prediction, MANY_UNITS))
+        found = with_prediction(problem, found, problem.with_pattern(found.model, found.prediction, many))
     left = [residual(null, measured, found.prediction) for measured in (problem.seen, problem.values)]
     if not any(is_significant(null, rho) and not is_significant(null, rho, found.prediction) for rho in left):
         return found
     more = confirmed(problem, found, len(null.draws)).prediction
-    more = problem.with_pattern(found.model, more, MANY_UNITS) if pattern else more
+    more = problem.with_pattern(found.model, more, many) if pattern else more
     return with_prediction(problem, found, replace(more, error=np.maximum(more.error, found.prediction.error)))
 
 

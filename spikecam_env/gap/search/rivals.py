@@ -16,22 +16,24 @@ from scipy import stats
 from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, own_variance, with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.compare.thresholds import TO_PREFER
 
 Array = NDArray[np.float64]
 
-LEAST_CHANCE = 0.01
-"""Chance of so large a lead below which a candidate is no rival."""
-
-APART = 3.0
-"""Noises by which twins of two candidates have to differ for it to be their laws."""
-
 
 def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Prediction, other: Prediction) -> bool:
-    """Whether `measured` may as well be of `other`; null: what both were added to.  draws: of the model as given, whose
-    noise is made as large as that of `null`."""
+    """Whether a measurement does not separate one candidate from another.
+
+    It does if the lead of the best is larger than chance makes it in campaigns in which the other is true.
+
+    Args:
+        null: what both were added to.
+        draws: campaigns of the model as given; their noise is made as large as that of `null`.
+        measured: (S,) statistics, NaN where they take no part.
+        best: what the best candidate predicts.
+        other: what the other predicts.
+    """
     observed = lead(null, measured, best, other)
-    if observed < TO_PREFER:
+    if observed < null.settings.deviance.tie:
         return True
     noise = np.array([d.values for d in draws])
     noise = noise - noise.mean(axis=0)
@@ -43,22 +45,29 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
     by_chance = [lead(null, np.where(known, middle + n, np.nan), best, other) for n in noise]
     above = observed - np.mean(by_chance)
     sd = np.std(by_chance, ddof=1) * np.sqrt(1 + 1 / len(noise))
-    return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > LEAST_CHANCE)
+    return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > null.settings.searching.least_chance)
 
 
 def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:
-    """((S,) what `other` most likely gives, (S,) the variance of that): where twins of the two do not clearly differ,
-    both
-    say what it gives.  Its own chance, taken for its law, would be held against it."""
+    """What a candidate most likely gives: where its twins do not clearly differ from the best's, the mean of both.
+
+    Otherwise the chance of its few twins would count as its law.
+
+    Returns:
+        ((S,) mean, (S,) its variance).
+    """
     apart, own2, others2 = best.mean - other.mean, own_variance(null, other), own_variance(null, best)
     both2 = np.maximum(own2 + others2, 1e-300)
-    share = np.where(np.abs(apart) > APART * np.sqrt(both2), 0.0, own2 / both2)
+    clearly = np.abs(apart) > null.settings.judging.apart * np.sqrt(both2)
+    share = np.where(clearly, 0.0, own2 / both2)
     return other.mean + share * apart, (1.0 - share) * own2
 
 
 def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
-    """Misfit by which `best` is better than `other`, each at the strength that suits `seen`, in the noise of both: two
-    twins of each do not show whose campaigns scatter more, and the log variance would decide."""
+    """Misfit by which `best` is better than `other`, each at the strength that suits `seen` (S,) best.
+
+    Both are judged in the mean of their noises.  Two twins of each do not show which one's campaigns scatter more, and
+    the logarithm of the variance would decide."""
     both = [rescaled(null, seen, p) for p in (other, best)]
     spread = np.sqrt(np.mean([p.spread**2 for p in both], axis=0))
     left = [residual_and_misfit(null, seen, replace(p, spread=spread))[1] for p in both]

@@ -10,23 +10,13 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates.table import candidate, expected_events
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Null, Prediction
-from spikecam_env.gap.compare.thresholds import TO_ADD
 from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.settings import Deviance, Searching
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-LEAST_SHARE = (0.2, 0.5)
-"""Share of what is beyond chance that the first effect, and each later one of what the others left, has to remove for
-another to be looked for beside them: less is a stand-in's."""
-
-LEAST_EVENTS = 0.5
-"""Pixels, spikes or frames that an effect of such has to be expected to change, to be there: fewer round to none."""
-
-LEAST_CHANGE = 2.0
-"""Noises by which an effect has to change a statistic to be added: twins of nothing may be luckier than others."""
 
 
 @dataclass(frozen=True)
@@ -48,53 +38,63 @@ class Round:
     rivals: tuple[str, ...] = ()
     used_held_out: bool = False
     motion_alone: bool = False
-    to_join: float = TO_ADD
+    to_join: float = Deviance().accept
 
 
 def has_candidate(turn: Round, here: Null) -> bool:
     """Whether a round's best is to be fitted together with what was found.  here: what the round stands on."""
     best = turn.fits[0]
-    least = TO_ADD if is_second_bend(turn, best) else turn.to_join
+    least = here.settings.deviance.accept if is_second_bend(turn, best) else turn.to_join
     return turn.misfit - best.misfit >= least and is_visible(here, best)
 
 
 def is_second_bend(turn: Round, found: Fit) -> bool:
-    """Whether a fit bends the rate curve beside an effect that does: others of them fit in its error, and what is less
-    than TO_ADD says nothing."""
+    """Whether a fit bends the rate curve beside an effect that bends it too.
+
+    A bend fits the error of another, so it has to remove as much misfit as a first effect."""
     return candidate(found.name).bends_response and any(candidate(e.name).bends_response for e in turn.model.effects)
 
 
 def is_visible(here: Null, found: Fit) -> bool:
-    """Whether an effect does anything that a statistic would show, in the mean or by how campaigns scatter (a few hot
-    pixels are in some units); of one whose course is random always."""
+    """Whether an effect changes the mean or the scatter of a statistic clearly.
+
+    Scatter counts since a few hot pixels are in some units only.  An effect of random course is always visible."""
     there = found.prediction
     change = np.hypot(there.mean - here.mean, np.sqrt(np.maximum(there.spread**2 - here.sd**2, 0.0))) / here.noise
-    return candidate(found.name).random_course or bool(change.max() > LEAST_CHANGE)
+    return candidate(found.name).random_course or bool(change.max() > here.settings.searching.least_change)
 
 
 def absent(case: Case, given: SensorModel, model: SensorModel) -> set[str]:
-    """Effects that a model has beside the one given, and that do nothing: of no strength, or of less than
-    LEAST_EVENTS."""
+    """Effects that a model has beside the one given, and that do nothing: of no strength, or of too few events."""
     has = {e.name for e in given.effects}
     there = {e.name: e.parameters() for e in model.effects if e.name not in has}
     return {
         name
         for name, parameters in there.items()
         if parameters[candidate(name).strength] == 0
-        or expected_events(name, parameters, case.conditions, case.observations) < LEAST_EVENTS
+        or expected_events(name, parameters, case.conditions, case.observations) < case.settings.searching.least_events
     }
 
 
 def is_improvement(null: Null, before: float, best: Fit, later: bool, weak: bool = False) -> bool:
-    """Whether a fit of all that was found together leaves TO_ADD less misfit than `before`; a later one (beside others)
-    that leaves nothing significant has but to leave no more, and one that removed less by itself (`weak`) has to leave
-    nothing.  How widely effects scatter is simulated by other twins each time, and the misfit is known to some ten."""
+    """Whether a fit of all that was found together is an improvement: it leaves less misfit by what an effect has to
+    remove.
+
+    Args:
+        before: misfit without the newest effect, which is known to some ten: other twins say each time how widely
+            effects scatter.
+        later: whether there were effects before.  Such a fit that leaves nothing significant has but to leave no more.
+        weak: whether the newest effect removed less by itself than is asked.  Such a fit has to leave nothing.
+    """
     explained = later and not is_significant(null, best.rho, best.prediction)
     if weak and not explained:
         return False
-    return before - best.misfit >= (0.0 if explained else TO_ADD)
+    return before - best.misfit >= (0.0 if explained else null.settings.deviance.accept)
 
 
-def is_small_share(turn: Round, left: float, chance: float, later: bool) -> bool:
-    """Whether a misfit `left` is little less than what a round started from; chance: misfit of noise alone."""
-    return turn.misfit - left < LEAST_SHARE[later] * (turn.misfit - chance)
+def is_small_share(turn: Round, left: float, chance: float, later: bool, searching: Searching) -> bool:
+    """Whether a misfit `left` is little less than what a round started from: a stand-in's.
+
+    chance: misfit of noise alone.  later: whether effects were found before."""
+    least = searching.worth if later else searching.least_share
+    return turn.misfit - left < least * (turn.misfit - chance)

@@ -18,35 +18,26 @@ from spikecam_env.gap.fit.shapes import with_fitted_shapes, with_shapes_to_fit
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.screen.screen import Screened, screen
 from spikecam_env.gap.screen.templates import Templates
+from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]
 
-STANDS_OUT = 6.0
-"""Noises by which a statistic of the pattern, or of motion, has to stand out for its effects to be tried; or it stands
-out most."""
-
-FEWEST_FITTED, MOST_FITTED = 3, 5
-"""Candidates fitted a round, the best by their templates: so many at least and at most."""
-
-LINE, LINE_SPIKES = 30.0, 1000
-"""Power of a line over what is usual in its spectrum, to start periodic candidates from its frequency; and spikes of a
-recording from which its spectrum says something."""
-
 
 def line_of(case: Case) -> float | None:
     """Frequency [Hz] of the strongest line in steady light; None where no line stands out."""
-    both = zip(case.conditions, case.observations, strict=True)
+    both, searching = zip(case.conditions, case.observations, strict=True), case.settings.searching
     steady = [o.frame for c, o in both if not c.moves and c.use == "fit"]
-    lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > LINE_SPIKES]
+    lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > searching.least_spikes]
     (ratio, at), frame = max(lines, key=lambda line: line[0][0], default=((0.0, 0), np.zeros(1)))
-    return frequency(frame, at) * case.frame_rate_hz if ratio > LINE else None
+    return frequency(frame, at) * case.frame_rate_hz if ratio > searching.line else None
 
 
 def screened_beside(here: Problem, names: Sequence[str], templates: Templates) -> list[Screened]:
-    """Candidates by what their templates leave, best first; of those that act through what the model has already, by
-    templates of their own."""
+    """Candidates by the misfit that their templates leave, the best first.
+
+    Candidates that act through an effect of the model get templates that are simulated on this campaign."""
     null, shown = here.null, here.case.conditions
     found = screen(templates, shown, null, here.seen, names, line_of(here.case))
     if through := acting_through(names, here.model, shown):
@@ -60,20 +51,29 @@ def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
     return [s for i, s in enumerate(screened) if s.name not in {before.name for before in screened[:i]}]
 
 
-def starts_to_fit(shapes: Sequence[Screened], before: float, groups: Collection[str] = ()) -> list[Screened]:
-    """The best by their templates, FEWEST_FITTED and those that explain half of what the best does; one that takes
-    several twins a try is tried for that alone.  before: misfit of none.
+def starts_to_fit(
+    shapes: Sequence[Screened], before: float, searching: Searching, groups: Collection[str] = ()
+) -> list[Screened]:
+    """Which candidates to fit, and from where: the best by their templates.
 
-    groups: of statistics that stand out.  Where the pattern does, with all that only change it, whose statistics are
-    not in proportion to their strength; where motion does, with all that show by it alone, in every shape: templates
-    are of other pictures.
+    Those are `fewest_fitted`, and up to `most_fitted` if they explain enough of what the best explains.  A candidate
+    that takes several twins a try has to explain enough in any case.
+
+    Args:
+        shapes: candidates by their templates of each shape, the best first.
+        before: misfit of none.
+        searching: how many are fitted.
+        groups: of statistics that stand out.  If the pattern does, all candidates that only change it are fitted too:
+            its statistics are not in proportion to their strength.  If motion does, all that show by it alone are, in
+            every shape: templates are of other pictures.
     """
     screened = best_of_each(shapes)
     if not screened:
         return []
-    half = before - 0.5 * (before - screened[0].misfit)
-    once = [s for s in screened if s.misfit < half or not takes_several_twins(s.name)]
-    tried = [s for i, s in enumerate(once[:MOST_FITTED]) if i < FEWEST_FITTED or s.misfit < half]
+    enough = before - searching.worth * (before - screened[0].misfit)
+    once = [s for s in screened if s.misfit < enough or not takes_several_twins(s.name)]
+    best = once[: searching.most_fitted]
+    tried = [s for i, s in enumerate(best) if i < searching.fewest_fitted or s.misfit < enough]
     also = [s for s in screened if candidate(s.name).is_pattern] if "pattern" in groups else []
     if {"moving", "step"} & set(groups):
         also += [s for s in shapes if candidate(s.name).of_motion]
@@ -87,7 +87,7 @@ def takes_several_twins(name: str) -> bool:
 
 def groups_that_stand_out(null: Null, distance: Array) -> set[str]:
     """Groups of which a statistic stands out by itself, or is what stands out most.  distance: (S,) in noise."""
-    least = min(STANDS_OUT, float(np.abs(distance).max()))
+    least = min(null.settings.judging.shows, float(np.abs(distance).max()))
     return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) >= least}
 
 
@@ -117,4 +117,4 @@ def may_be_shaped(problem: Problem, found: Fit) -> bool:
 def recordings_of(problem: Problem, found: Fit) -> int:
     """Recordings that one prediction of a candidate simulates."""
     only = problem.affected([found.name], found.prediction.mean - problem.null.mean)
-    return len(only) * twins_of(found.name)
+    return len(only) * twins_of(found.name, problem.settings.twins)

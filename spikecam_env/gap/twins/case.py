@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.statistics import Key, pattern_bank, statistics_bank
 from spikecam_env.gap.statistics.film import Film, films
 from spikecam_env.gap.statistics.reading import Reading
@@ -28,7 +29,7 @@ class Case:
     """conditions, observations: of the measurement.  base: its free refit.  bank: its statistics.
 
     budget: what was simulated for it, by all that was made of it.  nominal_per_label: nominal radiance of 1 of the
-    labels, by which the light of `conditions` was multiplied.
+    labels, by which the light of `conditions` was multiplied.  settings: by which it is diagnosed.
     """
 
     shape: tuple[int, int]
@@ -42,6 +43,7 @@ class Case:
     frame_rate_hz: float = 40_000.0
     budget: Budget = field(default_factory=Budget, compare=False)
     nominal_per_label: float = 1.0
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
     def scenes_only(self) -> bool:
@@ -64,7 +66,7 @@ class Case:
     def of(self, conditions: Sequence[Condition], observations: Sequence[Observation]) -> Case:
         """Other recordings of the same camera in the same unit of light, refitted anew."""
         other = case_of(self.shape, conditions, observations, self.seed, self.jobs, self.frame_rate_hz)
-        return replace(other, nominal_per_label=self.nominal_per_label)
+        return replace(other, nominal_per_label=self.nominal_per_label, settings=self.settings)
 
 
 @dataclass(frozen=True)

@@ -18,34 +18,40 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-DRAWN_UNITS = 24
-"""Units drawn for the pattern statistics of one model."""
-
 SPREAD_PARAMETERS = {
     "gain": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
     "dark": {"dark_current_spread": "sigma_pA"},
 }
 """Parameters that make pixels differ, by effect and by what of a unit differs."""
 
-SPREAD_LIMITS = (0.6, 1.67)
-"""Units' spreads lie within this of the model's; beyond, it is a gap."""
-
 
 def drawn_banks(
-    model: SensorModel, base: BaseFit, shown: Sequence[Condition], shape: tuple[int, int], count: int, seed: int
+    model: SensorModel,
+    base: BaseFit,
+    shown: Sequence[Condition],
+    shape: tuple[int, int],
+    count: int,
+    seed: int,
+    limits: tuple[float, float],
 ) -> list[dict[Key, float]]:
     """Pattern statistics of `count` units of the model, at the measured unit's mean response, dark level and noise.
 
-    The model's own spreads are scaled, within limits, so that the whole spread is the measured one.
+    The model's own spreads are scaled, within `limits` times what they are, so that the whole spread is the measured
+    one.
     """
     fitted = model
     for _ in range(2):
-        fitted = _rescaled(fitted, model, base, shape, seed)
+        fitted = _rescaled(fitted, model, base, shape, seed, limits)
     return [_pattern_statistics(fitted, base, shown, shape, seed + n) for n in range(count)]
 
 
 def _rescaled(
-    model: SensorModel, nominal: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int
+    model: SensorModel,
+    nominal: SensorModel,
+    base: BaseFit,
+    shape: tuple[int, int],
+    seed: int,
+    limits: tuple[float, float],
 ) -> SensorModel:
     out = model
     for what, spreads in SPREAD_PARAMETERS.items():
@@ -54,9 +60,7 @@ def _rescaled(
             if effect.name in spreads:
                 key = spreads[effect.name]
                 first = next(e for e in nominal.effects if e.name == effect.name).parameters()[key]
-                value = float(
-                    np.clip(effect.parameters()[key] * factor, SPREAD_LIMITS[0] * first, SPREAD_LIMITS[1] * first)
-                )
+                value = float(np.clip(effect.parameters()[key] * factor, limits[0] * first, limits[1] * first))
                 out = out.with_effect(replace(effect, **{key: value}))
     return out
 

@@ -18,22 +18,14 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-IDENTIFIABLE = 0.5
-"""Share of a refit's s^2 that is the unit's own, below which the unit's stays: beside so much noise of an effect the
-refits of twins do not identify it (`fit.joint` does, by all statistics)."""
 
-CONVERGED = 3e-4
-"""Relative change of a unit's median gain up to which it need not be simulated again.  Beyond, a unit so much brighter
-has other statistics where pixels saturate.  A thirtieth of what four kicks of 0.0025 of crosstalk add to a rate
-(`tests/gap/fit/test_candidate.py`)."""
-
-MOST_EXTRAPOLATED = 4.0
-"""Times as far as it was inferred that a unit is extrapolated at once for a stronger effect: statistics are
-in proportion so far (`python -m benchmarks.in_proportion`)."""
-
-
-def inferred_unit(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
+def inferred_unit(
+    model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit], identifiable: float
+) -> BaseFit:
     """A step of indirect inference: the unit `used`, shifted by `wanted` less its twins' refits, `simulated`.
+
+    identifiable: share of the refit's s^2 that is the unit's own, below which s^2 stays: beside so much noise of an
+    effect the refits of twins do not identify it (`fit.joint` does, by all statistics).
 
     The shift of a pixel is a smooth function of its own response and dark level: pixel by pixel it would be fitted to
     the noise of these very twins.  Where most pixels of the twins are silent under a strong effect, the unit stays.
@@ -45,13 +37,16 @@ def inferred_unit(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated:
     gain = used.gain * np.exp(_surface(used, live, ratio))
     dark = used.dark + _surface(used, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))
     white = used.white + wanted.white - float(np.mean([s.white for s in simulated]))
-    white = used.white if used.white < IDENTIFIABLE * wanted.white else max(white, 0.1 * used.white)
+    white = used.white if used.white < identifiable * wanted.white else max(white, 0.1 * used.white)
     return constrained_refit(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
 
 
-def has_converged(one: BaseFit, other: BaseFit) -> bool:
-    """Whether the change between two units is so small that twins of one serve for the other."""
-    return gain_change(one, other) <= CONVERGED
+def has_converged(one: BaseFit, other: BaseFit, converged: float) -> bool:
+    """Whether the change between two units is so small that twins of one serve for the other.
+
+    converged: largest such change of the median gain.  Beyond it, a unit so much brighter has other statistics where
+    pixels saturate."""
+    return gain_change(one, other) <= converged
 
 
 def gain_change(one: BaseFit, other: BaseFit) -> float:
@@ -69,10 +64,10 @@ def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Array) -> Array:
     return np.asarray(over @ np.linalg.lstsq(over[known], y)[0], np.float64)
 
 
-def extrapolated_unit(bare: BaseFit, inferred: BaseFit, factor: float) -> BaseFit:
-    """The unit for an effect `factor` times as strong as the one under which `bare` became `inferred`; at most
-    MOST_EXTRAPOLATED times as far, for it is inferred anew.  A pixel without gain in one of them keeps its own."""
-    factor = min(factor, MOST_EXTRAPOLATED)
+def extrapolated_unit(bare: BaseFit, inferred: BaseFit, factor: float, most: float) -> BaseFit:
+    """The unit for an effect `factor` times as strong as the one under which `bare` became `inferred`; `most` times as
+    far at most, for it is inferred anew.  A pixel without gain in one of them keeps its own."""
+    factor = min(factor, most)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where((bare.gain > 0) & (inferred.gain > 0), inferred.gain / bare.gain, 1.0)
     dark = np.maximum(bare.dark + factor * (inferred.dark - bare.dark), 0.0)

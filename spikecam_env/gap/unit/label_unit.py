@@ -15,17 +15,17 @@ from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.gap.unit.usual import unusual
 
 
-def nominal_per_label(base: BaseFit) -> float:
-    """Nominal radiance of 1 of the labels, by the refit: 1 where the median gain is within the spread of units, or no
-    pixel gets brighter in more light.
+def nominal_per_label(base: BaseFit, usual: float) -> float:
+    """Nominal radiance of 1 of the labels, by the refit: 1 where the median gain is within the spread of units, a
+    factor `usual`, or no pixel gets brighter in more light.
 
     A power of ten where that is enough: light in thousandths is then as if it had been labelled right, to the bit.
     """
     gain = float(np.median(base.gain[base.live])) if base.live.any() else 1.0
-    if not (gain > 0 and unusual(gain)):
+    if not (gain > 0 and unusual(gain, usual)):
         return 1.0
     decades = 10.0 ** round(np.log10(gain))
-    return gain if unusual(gain / decades) else decades
+    return gain if unusual(gain / decades, usual) else decades
 
 
 def in_nominal_units(condition: Condition, factor: float) -> Condition:

@@ -34,26 +34,8 @@ from spikecam_env.sensor import CATALOGUE, SensorModel
 
 Array = NDArray[np.float64]
 
-LEAST_EFFECT_SIZE, AIMED_EFFECT_SIZE, MOST_EFFECT_SIZE = 6.0, 12.0, 25.0
-"""Noises by which an effect has to show for its score, is made to show, and may show at most: what it changes there is
-clear of chance, and like what it changes at its bound."""
-
-MOST_SCALINGS, MOST_TESTS = 5, 5
-"""Strengths that are tried for an effect's score, and that are tested, at most."""
-
 LARGEST_SCALING = 40.0
 """Factor by which statistics are made larger or smaller at once, on the way to a score."""
-
-LIKELY_SDS = 1.8
-"""Standard deviations of the score by which a refuted strength is likely to lie above what is seen: 1.645 of a normal
-score for CONFIDENCE, and more where few campaigns estimate its scatter."""
-
-RESOLUTION, OVERSHOOT = 0.6, 1.2
-"""A bound is at most 1 / RESOLUTION times the least strength that would be refuted; the first that is tested is
-OVERSHOOT times what the score lets expect."""
-
-CAMPAIGNS_OF_BOUNDS = 150
-"""Campaigns that the bounds of all candidates take, by and large."""
 
 LONGER_RECORDINGS = "longer recordings, or more of them: in these it would hardly show"
 MORE_EFFORT = "a larger --effort: enough had been simulated"
@@ -63,16 +45,27 @@ MORE_EFFORT = "a larger --effort: enough had been simulated"
 def bounds(
     case: Case, model: SensorModel, null: Null, measured: Array, names: Sequence[str], templates: Templates
 ) -> tuple[list[Bound], list[tuple[str, str]]]:
-    """(upper bounds of effects that were not found, names of those that have none with what would give one).
+    """Upper bounds of effects that were not found.
 
-    model, null: what explains the campaign.  measured: (S,) its statistics.  templates: where to begin.  Of an
-    effect of several shapes the bound is of the one that shows least; of one of either sign, of its size.
+    The bound of an effect of several shapes is that of the shape that shows least; of an effect of either sign, that
+    of its size.
+
+    Args:
+        case: the campaign.
+        model: that explains it.
+        null: what that predicts.
+        measured: (S,) statistics.
+        names: of the effects.
+        templates: strengths to begin from.
+
+    Returns:
+        (bounds; names of effects without a bound, each with what would give one).
     """
     if case.scenes_only:
         case = replace(case, base=unit_under(case, model))
     starts = [(e.name, p) for e in templates.weakest if e.name in names for p in _both_signs(e.name, e.parameters)]
     by_name = dict.fromkeys(name for name, _ in starts)
-    if not case.budget.allows("upper bounds", CAMPAIGNS_OF_BOUNDS * len(case.conditions)):
+    if not case.budget.allows("upper bounds", case.settings.bounding.campaigns * len(case.conditions)):
         return [], [(name, MORE_EFFORT) for name in by_name]
 
     def scored(start: tuple[str, Parameters]) -> ScoredShape:
@@ -109,24 +102,26 @@ class ScoredShape:
     @property
     def expected(self) -> float:
         """Strength at which the bound is expected, infinite where the effect does not show."""
-        if self.score is None or self.score.effect_size < 0.5 * LEAST_EFFECT_SIZE:
+        settings = self.probe.settings
+        if self.score is None or self.score.effect_size < 0.5 * settings.judging.shows:
             return np.inf
-        factor = ((self.excess + LIKELY_SDS * self.score.sd) / self.score.rise) ** (1 / power_of(self.probe.name))
+        beyond = self.excess + settings.bounding.likely_sds * self.score.sd
+        factor = (beyond / self.score.rise) ** (1 / power_of(self.probe.name))
         return float(abs(self.score.parameters[strength_of(self.probe.name)]) * factor)
 
 
 def scored_shape(probe: TwinProbe | UnitProbe, measured: Array, start: Parameters) -> ScoredShape:
     """A candidate at a strength where it shows well, from a start."""
-    name, score = probe.name, None
+    name, score, settings = probe.name, None, probe.settings
+    least, most, power = settings.judging.shows, settings.bounding.most_effect_size, power_of(name)
     parameters = bounded(name, start)
-    for _ in range(MOST_SCALINGS):
+    for _ in range(settings.fitting.most_tries):
         score = probe.score(parameters) or score
         effect_size = score.effect_size if score else 0.0
-        factor = float(np.clip(AIMED_EFFECT_SIZE / max(effect_size, 0.3), 1 / LARGEST_SCALING, LARGEST_SCALING)) ** (
-            1 / power_of(name)
-        )
+        larger = np.clip(2 * least / max(effect_size, 1e-9), 1 / LARGEST_SCALING, LARGEST_SCALING)
+        factor = float(larger) ** (1 / power)
         stronger = bounded(name, {**parameters, strength_of(name): parameters[strength_of(name)] * factor})
-        if LEAST_EFFECT_SIZE <= effect_size <= MOST_EFFECT_SIZE or stronger == parameters:
+        if least <= effect_size <= most or stronger == parameters:
             break
         parameters = stronger
     return ScoredShape(probe, score, excess_of(score, measured))
@@ -138,27 +133,29 @@ def excess_of(score: Score | None, measured: Array) -> float:
 
 
 def bound_of(measured: Array, shape: ScoredShape) -> Bound | tuple[str, str]:
-    """The least strength that was refuted and has none above it that was not; or the name, with what is needed."""
+    """The least refuted strength above which no tested strength is open; without one the name, with what is needed."""
     probe, name, key = shape.probe, shape.probe.name, strength_of(shape.probe.name)
+    settings = probe.settings
+    resolution, overshoot = settings.bounding.resolution, settings.bounding.overshoot
     if shape.score is None or not np.isfinite(shape.expected) or probe.events(shape.score.parameters) <= 0:
         return name, LONGER_RECORDINGS
     score = probe.refined(shape.score)
     excess = excess_of(score, measured)
     at = first_strength(shape)
     least, most_open = np.inf, 0.0
-    for _ in range(MOST_TESTS):
+    for _ in range(settings.fitting.most_tries):
         size, test = abs(at[key]), probe.test(score, at)
         wanted = excess + test.quantile * test.sd
         ratio = float(np.clip(wanted / max(test.excess, 0.1 * wanted), 0.1, 10.0)) ** (1 / power_of(name))
         if test.refuted_by(excess):
             least = size
-            if ratio > RESOLUTION or most_open > RESOLUTION * size:
+            if ratio > resolution or most_open > resolution * size:
                 break
         else:
             most_open = size
-            ratio = max(ratio, OVERSHOOT)
+            ratio = max(ratio, overshoot)
         bracketed = most_open and np.isfinite(least)
-        following = float(np.sqrt(most_open * least)) if bracketed else OVERSHOOT * ratio * size
+        following = float(np.sqrt(most_open * least)) if bracketed else overshoot * ratio * size
         following_at = bounded(name, {**at, key: np.sign(at[key]) * following})
         if following_at == at:
             break
@@ -170,11 +167,12 @@ def bound_of(measured: Array, shape: ScoredShape) -> Bound | tuple[str, str]:
 
 
 def first_strength(shape: ScoredShape) -> Parameters:
-    """The parameters at a strength that is likely to be refuted: above where the bound is expected, and of what is
-    counted twice RULE_OF_THREE at least, where more of the strength makes them more."""
+    """The parameters at a strength that is likely to be refuted: above where the bound is expected.
+
+    Counted things are expected at least twice RULE_OF_THREE times there, if their number grows with the strength."""
     assert shape.score is not None
     name, key, at = shape.probe.name, strength_of(shape.probe.name), dict(shape.score.parameters)
-    at[key] *= OVERSHOOT * shape.expected / abs(at[key])
+    at[key] *= shape.probe.settings.bounding.overshoot * shape.expected / abs(at[key])
     share = candidate(name).share
     if share and share[0] == key:
         at[key] *= max(2 * RULE_OF_THREE / shape.probe.events(at), 1.0)

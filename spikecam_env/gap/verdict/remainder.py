@@ -13,33 +13,27 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.distance import GATE, adjusted, in_noise, normal_deviates, residual, robust_squares
+from spikecam_env.gap.compare.distance import adjusted, in_noise, loss, normal_deviates, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.result import Remainder
 from spikecam_env.gap.statistics import Key
 
 Array = NDArray[np.float64]
 
-MOST_LEFT = 0.05
-"""Share of the deviance beyond chance that a name may leave; set on the trial's part `tune`."""
-
-MOST_LEFT_THERE = 0.25
-"""Share of the sum of squares in a group of statistics of a recording that a name may leave there, of statistics that
-are beyond chance; set on the trial's part `tune`."""
-
 
 def explains(null: Null, values: Array, predicted: Prediction) -> bool:
-    """Whether a prediction leaves chance of measured statistics (S,), or little beside what the null model leaves.
+    """Whether a prediction leaves nothing of measured statistics (S,) but chance, or a remainder.
 
-    Both are in the noise of the null model.  The noise of a prediction holds a share of what it changes, beside which
-    what it leaves would look small.
+    A remainder is small in all (`most_left`) and wherever it is left (`most_left_there`), beside what the null model
+    leaves.  Both are measured in the noise of the null model: that of the prediction contains a share of the change
+    that it predicts, so that what it leaves would look small.
     """
-    off = is_left(null, values, predicted)
+    off, limits = is_left(null, values, predicted), null.settings.concluding
     before, after = (in_noise(null, values, mean) for mean in (null.mean, predicted.mean))
     there = sums_by_place(null.keys, before**2 - 1.0)
-    little = sums_by_place(null.keys, np.where(off, after**2, 0.0)) <= MOST_LEFT_THERE * np.maximum(there, 1.0)
+    little = sums_by_place(null.keys, np.where(off, after**2, 0.0)) <= limits.most_left_there * np.maximum(there, 1.0)
     deviance = [robust_beyond_chance(null, rho) for rho in (before, residual(null, values, predicted))]
-    return bool(not off.any() or (np.all(little) and deviance[1] < MOST_LEFT * deviance[0]))
+    return bool(not off.any() or (np.all(little) and deviance[1] < limits.most_left * deviance[0]))
 
 
 def remainder_of(null: Null, values: Array, predicted: Prediction, where: str = "", when: str = "") -> Remainder | None:
@@ -67,7 +61,8 @@ def remainder_of(null: Null, values: Array, predicted: Prediction, where: str = 
 
 def is_left(null: Null, values: Array, predicted: Prediction) -> NDArray[np.bool_]:
     """(S,) which of measured statistics a prediction leaves off, beyond chance and what laws are known to at all."""
-    return np.asarray(adjusted(normal_deviates(null, residual(null, values, predicted), predicted)) < GATE)
+    p = adjusted(normal_deviates(null, residual(null, values, predicted), predicted))
+    return np.asarray(p < null.settings.judging.gate)
 
 
 def sums_by_place(keys: Sequence[Key], squares: Array) -> Array:
@@ -80,7 +75,7 @@ def sums_by_place(keys: Sequence[Key], squares: Array) -> Array:
 
 def robust_beyond_chance(null: Null, rho: Array) -> float:
     """Deviance of residuals (S,) beyond what chance makes: one that is far off counts by its logarithm."""
-    return robust_squares(rho, null.weight) - float(np.sum(null.weight * np.ones(len(rho))))
+    return loss(null, rho) - float(np.sum(null.weight * np.ones(len(rho))))
 
 
 def beyond_chance(null: Null, distances: Array) -> float:

@@ -24,9 +24,8 @@ from spikecam_env.gap.compare.prediction import Null, Prediction, pair_noise_sha
 from spikecam_env.gap.compare.step import is_clear
 from spikecam_env.gap.fit.gauss_newton import at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
-from spikecam_env.gap.fit.recordings import TWINS_OF_RANDOM_COURSE, recordings_affected, twins_of
+from spikecam_env.gap.fit.recordings import recordings_affected, twins_of
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -39,12 +38,6 @@ CONFIDENCE = 0.95
 
 RULE_OF_THREE = -float(np.log(1.0 - CONFIDENCE))
 """Events expected, 3.0, of which there are none by chance of 1 - CONFIDENCE."""
-
-MOST_DEVIATE = 5.0
-"""Noises at which a statistic counts as no farther off: one false spike in a quiet pixel is a hundred noises."""
-
-TWINS_A_TEST = 4
-"""Campaigns by which a strength is tested."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +96,7 @@ class EffectProbe:
 
     def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
         self.case, self.model, self.null, self.name = case, model, null, name
+        self.settings = case.settings
 
     def events(self, parameters: Parameters) -> float:
         """Expected of what can be counted; infinite elsewhere."""
@@ -129,7 +123,8 @@ class TwinProbe(EffectProbe):
 
     def score(self, parameters: Parameters, count: int = 1) -> Score | None:
         """The score by the statistics that the effect clearly changes at some strength; None where it changes none."""
-        count = min(TWINS_OF_RANDOM_COURSE if self.random_course else count, len(self.null.draws) // 2)
+        count = self.settings.twins.of_random_course if self.random_course else count
+        count = min(count, len(self.null.draws) // 2)
         strong = with_effect(self.model, self.name, parameters)
         bare = constrained_refit(strong, constrained_refit(self.model, self.case.base))
 
@@ -144,7 +139,7 @@ class TwinProbe(EffectProbe):
         """The score of single events by more campaigns: of few, which statistics they change is chance."""
         if not candidate(self.name).share:
             return score
-        return self.score(score.parameters, twins_of(self.name)) or score
+        return self.score(score.parameters, twins_of(self.name, self.settings.twins)) or score
 
     def _change_score(self, made: Prediction, parameters: Parameters) -> Score | None:
         null, count = self.null, len(made.draws)
@@ -173,9 +168,10 @@ class TwinProbe(EffectProbe):
         assert score.bare is not None and score.unit is not None
         key, events = strength_of(self.name), self.events(parameters)
         times = abs(parameters[key] / score.parameters[key]) ** power_of(self.name)
-        count = min(TWINS_OF_RANDOM_COURSE if self.random_course else TWINS_A_TEST, len(score.without))
+        twins = self.settings.twins
+        count = min(twins.of_random_course if self.random_course else twins.in_the_end, len(score.without))
         null = replace(self.null, draws=self.null.draws[:count])
-        unit = extrapolated_unit(score.bare, score.unit, min(times, 1.0))
+        unit = extrapolated_unit(score.bare, score.unit, min(times, 1.0), twins.most_extrapolated)
         made = predict_by_twins(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
         scores, without = (np.array([score.of(d.values) for d in draws]) for draws in (made.draws, null.draws))
         if self.random_course:
@@ -211,9 +207,9 @@ class UnitProbe(EffectProbe):
         """What units with the effect at a strength score."""
         units, events = self._units(with_effect(self.model, self.name, parameters)), self.events(parameters)
         scores = np.array([score.of(v) for v in units])
-        excess = float(scores.mean()) - score.mean
-        sd = float(np.sqrt(self.score_variance(score, scores, excess, events) * (1 + 1 / DRAWN_UNITS) + score.error**2))
-        return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, DRAWN_UNITS - 1)), events)
+        excess, n = float(scores.mean()) - score.mean, len(units)
+        sd = float(np.sqrt(self.score_variance(score, scores, excess, events) * (1 + 1 / n) + score.error**2))
+        return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, n - 1)), events)
 
     def _units(self, model: SensorModel) -> Array:
         units = with_drawn_pattern(self.case, model, self.null, self.null.prediction).units
@@ -228,8 +224,9 @@ def linear(
 
     scatter: (S,) by which that differs from campaign to campaign: what few events change by much is known poorly.
     """
-    deviates = np.clip(change / null.noise, -MOST_DEVIATE, MOST_DEVIATE)
-    weight = null.weight * deviates / (1.0 + np.minimum(scatter / null.noise, MOST_DEVIATE) ** 2)
+    most = null.settings.judging.clear  # one false spike in a quiet pixel is a hundred noises
+    deviates = np.clip(change / null.noise, -most, most)
+    weight = null.weight * deviates / (1.0 + np.minimum(scatter / null.noise, most) ** 2)
     if not weight.any():
         return None
     of = partial(linear_score, null, weight)
@@ -239,7 +236,8 @@ def linear(
 
 def linear_score(null: Null, weight: Array, values: Array) -> float:
     """Score of statistics (S,) along a change; what is unknown counts for nothing."""
-    return float(weight @ np.clip(in_noise(null, values), -MOST_DEVIATE, MOST_DEVIATE))
+    most = null.settings.judging.clear
+    return float(weight @ np.clip(in_noise(null, values), -most, most))
 
 
 def log_mean_square(null: Null, weight: Array, values: Array) -> float:

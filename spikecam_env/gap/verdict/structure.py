@@ -7,18 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.distance import HEAVY
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.where_and_when import when, where
 
 Array = NDArray[np.float64]
-
-CLEARLY_OFF = 5.0
-"""Noises from which a statistic describes a discrepancy: chance takes one of 700 so far in one campaign of 2500."""
-
-COMMON_SHARE = 0.3
-"""Share of the deviance, in statistics of what many pixels have in common, from which they do have it in common."""
 
 LEAST_LEVELS = 3
 """Flats on which a statistic has to be clearly off for its power of the level."""
@@ -34,10 +27,11 @@ def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
     """
     kind = {c.name: c.kind for c in case.conditions}
     level = {c.name: c.level for c in case.conditions}
-    seen = np.abs(off) > CLEARLY_OFF
+    clear, large_share = null.settings.judging.clear, null.settings.concluding.large_share
+    seen = np.abs(off) > clear
     weight = {g: 0.0 for g in dict.fromkeys(k.group for k in null.keys)}
     for k, o in zip(null.keys, off, strict=True):
-        weight[k.group] += float(np.log1p(o**2 / HEAVY))
+        weight[k.group] += float(np.log1p(o**2 / null.settings.judging.heavy))
     order = sorted(weight, key=lambda g: -weight[g])
     keys = [k for k, s in zip(null.keys, seen, strict=True) if s]
     dark = any(kind[k.recording] == "dark" and k.group != "rates" for k in keys)
@@ -47,7 +41,7 @@ def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
     return {
         "light": "in the dark and in the light" if dark and lit else "in the dark" if dark else "in the light",
         "level_exponent": level_exponent(null, off, kind, level),
-        "extent": "common to many pixels" if common > COMMON_SHARE * total else "pixel by pixel",
+        "extent": "common to many pixels" if common > large_share * total else "pixel by pixel",
         "time_scale_s": None,
         "history": any(k.group in _MEMORY and k.name not in ("level", "square", "row", "column") for k in keys),
         "neighbours": any(k.group == "neighbours" for k in keys),
@@ -63,11 +57,12 @@ def level_exponent(null: Null, off: Array, kind: dict[str, str], level: dict[str
     """Slope of log |statistic| on log level over the flats, of the statistic that is seen on most of them, the
     first of several."""
     best: tuple[float, float] | None = None
+    clear = null.settings.judging.clear
     for group, name in dict.fromkeys((k.group, k.name) for k in null.keys):
         points = [
             (level[k.recording], abs(o) * n)
             for k, o, n in zip(null.keys, off, null.noise, strict=True)
-            if (k.group, k.name) == (group, name) and kind[k.recording] == "flat" and abs(o) > CLEARLY_OFF
+            if (k.group, k.name) == (group, name) and kind[k.recording] == "flat" and abs(o) > clear
         ]
         if len(points) < LEAST_LEVELS:
             continue

@@ -17,7 +17,7 @@ from spikecam_env.gap.compare.distance import adjusted, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.result import Conclusion, NamedEffect, Remainder, Statistic
-from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
+from spikecam_env.gap.search.forward import SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.comparison import Comparison
@@ -32,12 +32,15 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-CHANCE_P = 0.002
-"""Adjusted p-value from which what no candidate explains may be chance; set on the trial's part `tune`."""
-
 
 def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> Conclusion:
-    """From a search to a verdict.  rounds: with stand-ins where they explain nothing; floor: of the gap, by halves."""
+    """From a search to a verdict.
+
+    Args:
+        comparison: the measurement beside the null model.
+        rounds: of the search; empty without an alarm.
+        floor: of the gap, by two halves of the measurement.
+    """
     case, null = comparison.case, comparison.null
     last = rounds[-1].prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
@@ -57,7 +60,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
         notes=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in found])),
         gap=gap_of(case, null, comparison.values, comparison.given, last, usable_floor(floor)),
         statistics=statistics_rows(comparison, last.mean, left),
-        ranking=ranking(rounds, found),
+        ranking=ranking(rounds, found, null.settings.deviance.accept),
         not_testable=comparison.not_testable,
         patched=with_strengths(model, off),
         remainder=remainder if verdict == "named" else None,
@@ -71,8 +74,18 @@ def verdict_of(
     explained: bool,
     remainder: Remainder | None = None,
 ) -> str:
-    """The verdict on effects, empty where none is missing.  found: those that were kept; explained: whether the last
-    round leaves chance, or a remainder.  Of several that explain as much, none has a law that differs in details."""
+    """The verdict on effects; "" if none is missing.
+
+    If several effects explain as much and something is left, the verdict is `unknown`: none of them is shown to be the
+    right name of a slightly different law.
+
+    Args:
+        comparison: the measurement beside the null model.
+        rounds: of the search.
+        found: effects that were kept, with their rounds.
+        explained: whether the last round leaves chance, or a remainder.
+        remainder: what is left of it; None if nothing is.
+    """
     enough = found and explained and not second_left_out(comparison.case)
     if comparison.contradictions:
         return "data"
@@ -84,8 +97,14 @@ def verdict_of(
 
 
 def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str, dict[str, float]]:
-    """Effects of the tested model that are there in another amount, as `Off.parameters`: judged by the unit in which
-    the search ended, beside the patterns that it found; none that these effects scatter more than it is off."""
+    """Effects of the tested model that the unit has in another amount.
+
+    They are judged by the unit in which the search ended, beside the patterns that it found.  A parameter that the
+    effects found scatter by more than it is off is not among them.
+
+    Returns:
+        {effect: {measured, nominal, ratio}}, in the unit of the effect's strength.
+    """
     if not rounds or comparison.missing:
         return comparison.off.parameters
     last = rounds[-1]
@@ -97,10 +116,14 @@ def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str,
 
 
 def is_scattered(name: str, unit: Mapping[str, float], as_read: Mapping[str, Mapping[str, float]]) -> bool:
-    """Whether effects move what a refit reads of a parameter by more than the unit's own is off: rare false spikes add
-    a hundred times a unit's jitter, of which a small error is as much as the model has.
+    """Whether effects move the refit of a parameter by more than the unit's own value is off.
 
-    unit: the parameter's row.  as_read: rows of a refit of the unit's twin with the effects; none is nominal.
+    Rare false spikes add a hundred times a unit's jitter; a small error of that is as much as the model has.
+
+    Args:
+        name: of the parameter's effect.
+        unit: its row of the unit itself.
+        as_read: rows of the refit of the unit's twin with the effects; a row that is missing is nominal.
     """
     read = as_read[name]["ratio"] if name in as_read else 1.0
     return abs(math.log(read / unit["ratio"])) >= abs(math.log(unit["ratio"]))
@@ -113,7 +136,7 @@ def with_patterns_of(model: SensorModel, found: SensorModel) -> SensorModel:
 
 def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> bool:
     """Whether nothing was found, and the alarm was a weak one."""
-    return not found and comparison.smallest_p > CHANCE_P
+    return not found and comparison.smallest_p > comparison.null.settings.judging.chance_p
 
 
 def second_left_out(case: Case) -> bool:
@@ -122,9 +145,10 @@ def second_left_out(case: Case) -> bool:
 
 
 def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
-    """The rounds, up to the last that explains the data: what was added beyond it is no better.  Where none does, they
-    end where they came nearest to recordings held out: an empirical patch has to be of use in recordings that took no
-    part."""
+    """The rounds up to the last that explains the data; what was added after it is no better.
+
+    If none explains the data, they end where the held-out gap is smallest: an empirical patch has to be of use in
+    recordings that took no part."""
     *before, last = rounds
     explaining = [r for r in rounds[1:] if explains(null, values, r.prediction)]
     if explaining and explaining[-1] is last:
@@ -137,7 +161,7 @@ def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round
 def named(
     comparison: Comparison, rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], explained: bool
 ) -> tuple[NamedEffect, ...]:
-    """What the refit found missing, then what the search kept; the former not where the latter leaves something."""
+    """Effects that the refit found missing, if the search leaves nothing, and those that the search kept."""
     place, time = where(comparison.case), when(comparison.case)
     by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in found)
     if explained or may_be_chance(comparison, found) or not rounds:
@@ -157,7 +181,8 @@ def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> dic
 
 def enough_effort(case: Case) -> int:
     """Budget with which another effect would have been looked for beside those found, in tens."""
-    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + CAMPAIGNS_PER_EFFECT + 1) / 10)
+    another = case.settings.searching.campaigns_per_effect
+    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + another + 1) / 10)
 
 
 def tied(found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:

@@ -9,39 +9,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.observe.conditions import LABEL_ERROR
 from spikecam_env.gap.observe.observation import TIME_BLOCKS
+from spikecam_env.gap.settings import Concluding, DiagnosisSettings
 from spikecam_env.gap.statistics.spectrum import spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]
 
-LOCAL_NOISES = 8.0
-"""Noises by which a field or a half has to stand out: comparisons are many; in the clean campaigns of
-`tests/gap/verdict` none does."""
-
-LOCAL_NOISES_POOLED = 5.0
-"""Noises by which the halves of all recordings together have to differ: one comparison, not one for each."""
-
 FIELDS_PER_SIDE = 3
 """Fields along each side of the array."""
-
-TIMES_EXPECTED = 2.0
-"""Times the irregular intervals that are expected of a field which has to have more for an effect to act there."""
-
-LEAST_OFF = 1e-4
-"""Relative rate by which a field has to be off: five times what labels can be known to."""
-
-LEAST_FRAMES_OF_A_LINE = 1000
-"""Shortest recording whose halves are compared by their lines: pixels of one rate make a line of their own at first."""
-
-LINE_POWER, LINE_RATIO = 60.0, 6.0
-"""Power of a line over its surroundings in one half, and times that in the other, from which it is of one half."""
-
-HALVES_DIFFER = 0.3
-"""Share of all irregular intervals by which the halves have to differ, however many there are."""
-
-LEAST_STEP = 2e-5
-"""Relative rate by which the second half has to differ: what labels can be known to."""
 
 
 def where(case: Case) -> str:
@@ -53,8 +30,8 @@ def where(case: Case) -> str:
             irregular += o.short + o.long
     known = np.isfinite(case.base.residual)
     off = np.where(known, case.base.residual, 0.0)[brightest_flats(case)].mean(axis=0) if len(known) else off
-    fields = fields_of(case.shape)
-    out = outlying_counts(irregular, fields) | outlying_means(off, fields)
+    fields, limits = fields_of(case.shape), case.settings.concluding
+    out = outlying_counts(irregular, fields, limits) | outlying_means(off, fields, limits)
     if not 0 < out.sum() <= FIELDS_PER_SIDE:
         return ""
     names = [rows_and_columns(int(f), case.shape) for f in np.flatnonzero(out)]
@@ -76,27 +53,27 @@ def fields_of(shape: tuple[int, int]) -> NDArray[np.int64]:
     return both
 
 
-def outlying_counts(irregular: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
+def outlying_counts(irregular: Array, fields: NDArray[np.int64], limits: Concluding) -> NDArray[np.bool_]:
     """(9,) fields with more irregular intervals, (P,) of each pixel, than the median field lets expect."""
     count = np.bincount(fields, irregular, FIELDS_PER_SIDE**2)
     share = np.bincount(fields, minlength=FIELDS_PER_SIDE**2) / fields.size
     usual = float(np.median(count / share))
     expected = np.maximum(usual * share, 1.0)
-    return (count > TIMES_EXPECTED * expected) & (count - expected > LOCAL_NOISES * np.sqrt(expected))
+    more = count - expected > limits.local_noises * np.sqrt(expected)
+    return (count > limits.times_expected * expected) & more
 
 
-def outlying_means(values: Array, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(9,) fields whose median of (P,) values is off by LOCAL_NOISES of its error, sqrt(pi / 2) sd / sqrt(n), and of
-    the scatter of the others."""
+def outlying_means(values: Array, fields: NDArray[np.int64], limits: Concluding) -> NDArray[np.bool_]:
+    """(9,) fields whose median of (P,) values, relative rates, stands out from its error, sqrt(pi / 2) sd / sqrt(n),
+    from the scatter of the others, and by five times what labels can be known to."""
     mean = np.array([np.median(values[fields == f]) for f in range(FIELDS_PER_SIDE**2)])
     off = np.abs(mean - np.median(mean))
     inside = np.sort(off)[: FIELDS_PER_SIDE**2 - FIELDS_PER_SIDE]
     error = 1.2533 * np.array(
         [values[fields == f].std() / np.sqrt((fields == f).sum()) for f in range(FIELDS_PER_SIDE**2)]
     )
-    outlying: NDArray[np.bool_] = off > np.maximum(
-        LOCAL_NOISES * np.maximum(np.sqrt(np.mean(inside**2)), error), LEAST_OFF
-    )
+    chance = limits.local_noises * np.maximum(np.sqrt(np.mean(inside**2)), error)
+    outlying: NDArray[np.bool_] = off > np.maximum(chance, 5 * LABEL_ERROR)
     return outlying
 
 
@@ -111,44 +88,51 @@ def rows_and_columns(field: int, shape: tuple[int, int]) -> str:
 def when(case: Case) -> str:
     """From (or until) which part of steady recordings it acts; empty where always."""
     votes = []
-    irregular = np.zeros(2)
+    irregular, settings = np.zeros(2), case.settings
+    share, noises = settings.concluding.large_share, settings.concluding.local_noises
     for c, o in zip(case.conditions, case.observations, strict=True):
-        if c.moves or o.frame.sum() < 1000:
+        if c.moves or o.frame.sum() < settings.searching.least_spikes:
             continue
         half = o.frames // 2
         own = np.array([o.odd[:half].sum(), o.odd[half:].sum()], np.float64)
         irregular += own
-        votes += later_half(own)
+        votes += later_half(own, noises, share)
         halves = [strongest_line(spectrum(part)) for part in (o.frame[:half], o.frame[half:])]
         (_a, first_line), (_b, second_line) = halves
-        if o.frames >= LEAST_FRAMES_OF_A_LINE:
-            votes += line_in_one_half(first_line, second_line)
+        if o.frames >= settings.concluding.least_frames:
+            votes += line_in_one_half(first_line, second_line, settings)
         blocks = o.blocks[:-1] if o.frames % TIME_BLOCKS else o.blocks
-        votes += step_in_the_middle(blocks[:, case.base.live].sum(axis=1).astype(np.float64), float(o.frame.sum()))
+        votes += step_in_the_middle(blocks[:, case.base.live].sum(axis=1).astype(np.float64), noises)
     if len(votes) < 2:
-        votes = later_half(irregular, LOCAL_NOISES_POOLED)  # few events a recording, but of all together
+        # few events a recording, but of all together; it is one comparison, not one for each recording
+        votes = later_half(irregular, settings.judging.clear, share)
     if not votes:
         return ""
     return "from about half of each recording on" if np.mean(votes) > 0.5 else "until about half of each recording"
 
 
-def later_half(halves: Array, sigmas: float = LOCAL_NOISES) -> list[bool]:
-    """Whether there are more counts in the second half; nothing where that may be chance."""
+def later_half(halves: Array, noises: float, share: float) -> list[bool]:
+    """Whether there are more counts in the second half; nothing where that may be chance: halves that differ by less
+    than `noises`, or by less than a share of all."""
     first, second = halves
-    clear = abs(first - second) > max(sigmas * np.sqrt(first + second), HALVES_DIFFER * (first + second))
+    clear = abs(first - second) > max(noises * np.sqrt(first + second), share * (first + second))
     return [bool(second > first)] if clear else []
 
 
-def line_in_one_half(first: float, second: float) -> list[bool]:
-    """Whether the line of one half alone is in the second, by their powers; nothing where it is in both or in none."""
+def line_in_one_half(first: float, second: float, settings: DiagnosisSettings) -> list[bool]:
+    """Whether the line of one half alone is in the second, by their powers; nothing where it is in both or in none.
+
+    It has to be twice as strong as one of a whole recording."""
     stronger, weaker = max(first, second), min(first, second)
-    return [second > first] if stronger > LINE_POWER and stronger > LINE_RATIO * weaker else []
+    clear = stronger > 2 * settings.searching.line and stronger > settings.concluding.line_ratio * weaker
+    return [second > first] if clear else []
 
 
-def step_in_the_middle(blocks: Array, spikes: float) -> list[bool]:
-    """A step of the array's rate in the middle that explains nearly all of its change."""
+def step_in_the_middle(blocks: Array, noises: float) -> list[bool]:
+    """A step of the array's rate in the middle, beyond what labels can be known to, that explains nearly all of its
+    change: it is larger than `noises` times what it leaves."""
     whole = blocks[: TIME_BLOCKS // 2 * 2] / blocks.mean()
     first, second = whole[: len(whole) // 2], whole[len(whole) // 2 :]
     step = float(second.mean() - first.mean())
     left = float(np.sqrt(np.mean(np.concatenate([first - first.mean(), second - second.mean()]) ** 2)))
-    return [step > 0] if abs(step) > max(LOCAL_NOISES * left, LEAST_STEP) else []
+    return [step > 0] if abs(step) > max(noises * left, LABEL_ERROR) else []

@@ -8,7 +8,6 @@ from small import TWINS, null
 from spikecam_env.gap.baseline.null_model import with_more_twins
 from spikecam_env.gap.compare.prediction import Draw, Null
 from spikecam_env.gap.statistics import Key
-from spikecam_env.gap.twins.fresh_units import DRAWN_UNITS
 
 
 def test_recordings_in_motion_are_told_by_twice_as_many_twins_and_the_pattern_by_drawn_units():
@@ -17,7 +16,7 @@ def test_recordings_in_motion_are_told_by_twice_as_many_twins_and_the_pattern_by
     pattern = np.array([k.group == "pattern" for k in there.keys])
     assert moving.any() and pattern.any()
     assert set(there.twins[moving]) == {2 * TWINS} and set(there.freedom[moving]) == {2 * TWINS - 1}
-    assert set(there.twins[pattern]) == {DRAWN_UNITS} and set(there.freedom[pattern]) == {DRAWN_UNITS - 1}
+    assert set(there.twins[pattern]) == {24} and set(there.freedom[pattern]) == {23}
     assert set(there.twins[~moving & ~pattern]) == {TWINS} and there.freedom[~moving & ~pattern].min() >= TWINS - 1
     assert len(there.draws) == TWINS
 

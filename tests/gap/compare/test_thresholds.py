@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import chain, repeat
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scripted import COUNT, FREE, NAME, TWINS, found_at, null, scripted, some_fit, with_reset
 from small import MODEL, effect, unit
 
-from spikecam_env.gap.candidates.strength import with_effect
-from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.fit.candidate import Fit, fit
+from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.gauss_newton import descend
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import with_fitted_shapes
@@ -20,66 +19,7 @@ from spikecam_env.gap.search import choice, forward, neighbours, rivals
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
 from spikecam_env.gap.search.neighbours import is_missed, try_without_earlier
 from spikecam_env.gap.search.round import is_improvement
-from spikecam_env.gap.statistics import Key
-from spikecam_env.sensor import CATALOGUE
-
-COUNT, TWINS = 20, 6
-NAME = "incomplete_reset"
-FREE = [(NAME, "fraction"), (NAME, "tau_us")]
-
-
-def null() -> Null:
-    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
-    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
-    return Null(keys, values.mean(axis=0), np.ones(COUNT), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
-
-
-def with_reset(fraction: float):
-    return with_effect(MODEL, NAME, {"fraction": fraction, "tau_us": 300.0})
-
-
-def law(model) -> np.ndarray:
-    """Half of the statistics in proportion to the fraction, as many to its product with a root of the time constant."""
-    there = next((e.parameters() for e in model.effects if e.name == NAME), {"fraction": 0.0, "tau_us": 300.0})
-    power = np.where(np.arange(COUNT) < COUNT // 2, 0.0, 0.5)
-    return 20.0 * there["fraction"] / 0.02 * (there["tau_us"] / 300.0) ** power
-
-
-@dataclass(frozen=True, eq=False)
-class Scripted(Problem):
-    """Misfits as they are listed, one after another, and twins by a law.  predicted: fractions that were simulated."""
-
-    script: object = None
-    predicted: list[float] = field(default_factory=list)
-
-    def misfit(self, predicted=None) -> float:
-        return next(self.script)
-
-    def predict(self, model, base, count, only=None) -> Prediction:
-        self.predicted.append(next(e.parameters()["fraction"] for e in model.effects if e.name == NAME))
-        values = self.null.mean + law(model)
-        return Prediction(values, np.full(COUNT, 0.4), self.null.sd, (Draw(TWINS - 1, values, None),))
-
-    def affected(self, names, change=None) -> list[int]:
-        return [0]
-
-
-def scripted(*misfits) -> Scripted:
-    n = null()
-    measured = n.mean + law(with_reset(0.02))
-    return Scripted(SimpleNamespace(jobs=1, base=unit()), MODEL, n, measured, measured, script=chain(*misfits))
-
-
-def found_at(fraction: float, misfit: float) -> Fit:
-    n, there = null(), with_reset(fraction)
-    prediction = Prediction(n.mean + law(there), n.sd, n.sd)
-    return Fit(NAME, {"fraction": fraction, "tau_us": 300.0}, {}, prediction, unit(), np.zeros(COUNT), misfit, there)
-
-
-def some_fit(name: str, misfit: float) -> Fit:
-    model = MODEL.with_effect(effect(name)) if name in CATALOGUE else MODEL
-    return replace(found_at(0.02, misfit), name=name, model=model)
+from spikecam_env.gap.settings import Deviance, DiagnosisSettings, Searching
 
 
 @pytest.mark.parametrize("promised, steps", [(0.7, 0), (1.5, 1)])
@@ -122,7 +62,6 @@ def test_a_later_effect_has_to_remove_4_to_be_fitted_with_those_before_it(remove
     monkeypatch.setattr(forward, "is_significant", lambda *_: True)
     monkeypatch.setattr(forward, "is_small_share", lambda *_: False)
     monkeypatch.setattr(forward, "is_improvement", lambda *_: True)
-    monkeypatch.setattr(forward, "MOST_EFFECTS", 2)
     monkeypatch.setattr(forward, "is_discrepant", lambda *_: True)
     monkeypatch.setattr(forward, "try_cancelling_pair", lambda problem, names, rounds: rounds)
     monkeypatch.setattr(Problem, "standing_on", lambda problem, *_: problem)
@@ -140,9 +79,10 @@ def test_a_later_effect_has_to_remove_4_to_be_fitted_with_those_before_it(remove
         conditions=(),
         observations=(),
         scenes_only=False,
+        settings=DiagnosisSettings(),
         budget=SimpleNamespace(allows=lambda *_, **__: True),
     )
-    n = null()
+    n = replace(null(), settings=DiagnosisSettings(searching=Searching(most_effects=2)))
     forward.forward_selection(Problem(case, MODEL, n, n.mean, n.mean), [], None)
     assert asked == joined
 
@@ -207,17 +147,17 @@ def test_an_earlier_effect_has_to_be_missed_by_15_to_be_kept(missed: float, kept
         "confirmed",
         lambda problem, found: found if found.model is both.model else replace(found, misfit=100.0 + missed),
     )
-    after = try_without_earlier(SimpleNamespace(), both, {"dead_time": np.zeros(COUNT)})
+    after = try_without_earlier(SimpleNamespace(settings=DiagnosisSettings()), both, {"dead_time": np.zeros(COUNT)})
     assert ("dead_time" in {e.name for e in after.model.effects}) is kept
 
 
 @pytest.mark.parametrize("missed, plainly", [(100.0, False), (220.0, True)])
 def test_an_effect_missed_by_150_is_kept_without_a_simulation(missed: float, plainly: bool):
-    problem = SimpleNamespace(misfit=lambda predicted: 100.0 + missed)
+    problem = SimpleNamespace(misfit=lambda predicted: 100.0 + missed, settings=DiagnosisSettings())
     assert is_missed(problem, some_fit("dead_time", 100.0), np.zeros(COUNT)) is plainly
 
 
 @pytest.mark.parametrize("above, asked", [(10.0, 3), (22.0, 2)])
 def test_a_fit_15_above_the_best_confirmed_is_not_confirmed(above: float, asked: int):
     fits = [some_fit(name, misfit) for name, misfit in (("a", 100.0), ("b", 101.0), ("c", 100.0 + above))]
-    assert len(confirmed_in_order(fits, lambda f: f)[0]) == asked
+    assert len(confirmed_in_order(fits, lambda f: f, Deviance().keep)[0]) == asked

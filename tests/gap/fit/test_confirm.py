@@ -13,10 +13,9 @@ from spikecam_env.gap.compare.distance import effect_size, is_significant, resid
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import Fit, fit
 from spikecam_env.gap.fit.confirm import amplified_fit, attenuated, confirmed, no_more_certain, with_dark_levels_open
-from spikecam_env.gap.fit.predict import MANY_UNITS, predict_by_twins, with_drawn_pattern
+from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.search.neighbours import is_missed, try_more_draws
-from spikecam_env.gap.unit.indirect_inference import MOST_EXTRAPOLATED
 from spikecam_env.gap.unit.refit import constrained_refit
 
 
@@ -28,7 +27,7 @@ def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.02})
     size = effect_size(there, measured, found.prediction.mean - there.mean)
     loud, times = amplified_fit(Problem(case, MODEL, there, measured, measured), found, "dead_time")
-    assert 1 < times <= MOST_EXTRAPOLATED and loud.parameters == found.parameters
+    assert 1 < times <= there.settings.twins.most_extrapolated and loud.parameters == found.parameters
     which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
     many = predict_by_twins(case, found.model, found.base, there, TWINS, which)
     few = predict_by_twins(case, found.model, found.base, there, 2, which)
@@ -110,7 +109,7 @@ def test_a_column_that_few_units_have_is_no_surprise_to_many():
         "column_fixed_pattern", {}, {}, there.prediction, constrained_refit(model, case.base), there.mean, 0.0, model
     )
     found = confirmed(Problem.of(case, MODEL, there, values_of(case.bank, there.keys)), found)
-    few, many = found.prediction, with_drawn_pattern(case, model, there, there.prediction, MANY_UNITS)
+    few, many = found.prediction, with_drawn_pattern(case, model, there, there.prediction, 240)
     at = next(i for i, k in enumerate(there.keys) if k.name == "over 5" and k.recording == "flat-0.2")
     tops = [float(np.max(p.units[:, at])) for p in (few, many)]
     values = np.where(np.arange(len(there.keys)) == at, np.nextafter(tops[1], 0.0), few.mean)

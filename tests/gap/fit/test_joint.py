@@ -50,4 +50,4 @@ def test_parameters_agree_within_errors_of_their_logarithms(then, same):
         Fit("crosstalk", {}, {}, NOTHING, unit(), np.zeros(0), 0.0, MODEL.with_effect(effect("crosstalk", kick=k)))
         for k in (0.0019, then)
     )
-    assert agree(here, there, {"crosstalk": {"kick": 0.001}}) is same
+    assert agree(here, there, {"crosstalk": {"kick": 0.001}}, 3.0) is same

@@ -10,8 +10,9 @@ import pytest
 from spikecam_env.gap.maps import search as module
 from spikecam_env.gap.maps.conclude import has_clear_strength
 from spikecam_env.gap.maps.search import MapFit, PatternModel, search_maps
+from spikecam_env.gap.settings import DiagnosisSettings
 
-CASE = SimpleNamespace(jobs=1)
+CASE = SimpleNamespace(jobs=1, settings=DiagnosisSettings())
 
 
 def a_fit(name: str, misfit: float, added: tuple[str, ...] = (), sd: float = 0.1) -> MapFit:
@@ -45,4 +46,4 @@ def test_five_effects_are_named_together_at_most(monkeypatch) -> None:
 @pytest.mark.parametrize("sd, significant", [(0.4, True), (0.7, False)])
 def test_a_strength_of_two_standard_deviations_is_significant(sd: float, significant: bool) -> None:
     """Its standard deviation is relative."""
-    assert has_clear_strength(a_fit("vignetting", 0.0, ("vignetting",), sd), "vignetting") == significant
+    assert has_clear_strength(a_fit("vignetting", 0.0, ("vignetting",), sd), "vignetting", 0.5) == significant

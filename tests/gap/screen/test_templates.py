@@ -12,13 +12,14 @@ from small import MODEL, TWINS, effect, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET
-from spikecam_env.gap.compare.distance import robust_squares
+from spikecam_env.gap.compare.distance import loss
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.fit.standard_templates import is_lacking
 from spikecam_env.gap.screen.screen import Screened, screen
 from spikecam_env.gap.screen.templates import FILE, SEVERE, save_templates, shipped_templates
 from spikecam_env.gap.search.neighbours import other_starts
 from spikecam_env.gap.search.shortlist import groups_that_stand_out, starts_to_fit
+from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics import Key
 from spikecam_env.sensor import CATALOGUE
 
@@ -54,23 +55,23 @@ def test_what_is_saved_is_read_again(tmp_path):
 def test_the_best_are_tried_and_what_takes_many_twins_where_it_explains_half():
     """Of 1000, misfits by template: the three best, others of less than half of the best's 100 left, at most five."""
     left = {"clock_jitter": 100.0, "lamp_drift": 560.0, "crosstalk": 700.0, "ir_drop": 800.0, "dead_time": 900.0}
-    names = lambda found: [s.name for s in starts_to_fit(found, 1000.0)]  # noqa: E731
+    names = lambda found: [s.name for s in starts_to_fit(found, 1000.0, Searching())]  # noqa: E731
     screened = [Screened(name, {}, misfit, np.zeros(1)) for name, misfit in left.items()]
     assert names(screened) == ["clock_jitter", "crosstalk", "ir_drop"]
     nearer = [replace(s, misfit=540.0) if s.name in ("lamp_drift", "dead_time") else s for s in screened]
     nearer.sort(key=lambda s: s.misfit)
     assert names(nearer) == ["clock_jitter", "lamp_drift", "dead_time"]
-    assert names(screened[1:2]) == ["lamp_drift"] and starts_to_fit([], 1000.0) == []
+    assert names(screened[1:2]) == ["lamp_drift"] and starts_to_fit([], 1000.0, Searching()) == []
 
 
 def test_where_motion_stands_out_all_that_shows_by_it_is_tried_in_every_shape():
     """A template of other bars may take the level from which light spills for another."""
     shapes = [Screened("blooming", {"full": full}, 1000.0, np.zeros(1)) for full in (0.85, 1.0, 0.75)]
     screened = [Screened("clock_jitter", {}, 100.0, np.zeros(1)), *shapes]
-    tried = starts_to_fit(screened, 1000.0, {"moving"})
+    tried = starts_to_fit(screened, 1000.0, Searching(), {"moving"})
     assert [s.start for s in tried if s.name == "blooming"] == [s.start for s in shapes]
-    assert other_starts(shapes[1], screened, 1000.0) == [shapes[0], shapes[2]]
-    assert [s.start for s in starts_to_fit(screened, 1000.0) if s.name == "blooming"] == [{"full": 0.85}]
+    assert other_starts(shapes[1], screened, 1000.0, 0.5) == [shapes[0], shapes[2]]
+    assert [s.start for s in starts_to_fit(screened, 1000.0, Searching()) if s.name == "blooming"] == [{"full": 0.85}]
 
 
 def test_what_stands_out_most_is_loud_however_quiet_it_is():
@@ -101,7 +102,7 @@ def test_screening_starts_near_the_truth_weak_or_severe(hidden):
     values = values_of(case.bank, null.keys)
     found = screen(shipped_templates(), case.conditions, null, values, list(CATALOGUE))
     distance = np.nan_to_num((values - null.mean) / null.noise)
-    tried = starts_to_fit(found, robust_squares(distance, null.weight))
+    tried = starts_to_fit(found, loss(null, distance), Searching())
     [first] = [s for s in tried if s.name == hidden.name]
     key = type(hidden).strength
     assert first.start[key] == pytest.approx(hidden.parameters()[key], rel=0.6)

@@ -11,7 +11,6 @@ from small import MODEL, effect, recorded, unit
 
 from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.compare.thresholds import PER_PARAMETER, TO_ADD, TO_CONFIRM, TO_DISMISS, TO_JOIN, TO_PREFER
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.screen import Screened
@@ -22,10 +21,13 @@ from spikecam_env.gap.search.forward import joined
 from spikecam_env.gap.search.neighbours import runner_up, try_in_place_of_earlier
 from spikecam_env.gap.search.rivals import is_rival, lead
 from spikecam_env.gap.search.round import Round, has_candidate, is_improvement, is_visible
+from spikecam_env.gap.settings import PER_PARAMETER, Deviance, DiagnosisSettings, Searching
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.gap.verdict.verdict import with_stand_ins
+
+DEVIANCE = Deviance()
 
 COUNT, TWINS = 200, 12
 DEAD_TIME = effect("dead_time", tau_us=0.2)
@@ -42,6 +44,7 @@ class OfAll:
     base: BaseFit = field(default_factory=unit)
     observations: tuple[None, ...] = ()
     scenes_only: bool = False
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     def to_fit(self, keys):
         return np.ones(len(keys), bool)
@@ -85,7 +88,7 @@ def test_what_loses_little_and_wins_all_recordings_is_chosen():
     true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
     loss = lead(n, seen, twin.prediction, true.prediction)
     print(f"loses {loss:.1f}")
-    assert TO_PREFER < loss < TO_DISMISS and not is_rival(n, n.draws, seen, twin.prediction, true.prediction)
+    assert DEVIANCE.tie < loss < DEVIANCE.dismiss and not is_rival(n, n.draws, seen, twin.prediction, true.prediction)
     fits, rivals = chosen_of(Problem(recorded(), MODEL, n, seen, values), n.draws, [twin, true])
     assert [f.name for f in fits] == ["dead_time", "ir_drop"] and rivals == ()
 
@@ -96,11 +99,11 @@ def test_a_later_effect_that_leaves_nothing_to_hear_has_but_to_leave_no_more():
     seen = seen + 4.0 * effect
     all_of_it, some = a_fit(n, "dead_time", 5.0 * effect, seen), a_fit(n, "dead_time", effect, seen)
     for found, silent in ((all_of_it, True), (some, False)):
-        assert is_improvement(n, found.misfit + TO_ADD, found, later=False)
-        assert not is_improvement(n, found.misfit + TO_ADD - 1.0, found, later=False)
+        assert is_improvement(n, found.misfit + DEVIANCE.accept, found, later=False)
+        assert not is_improvement(n, found.misfit + DEVIANCE.accept - 1.0, found, later=False)
         assert is_improvement(n, found.misfit + 1.0, found, later=True) is silent
         assert not is_improvement(n, found.misfit - 1.0, found, later=True)
-        assert is_improvement(n, found.misfit + TO_ADD, found, later=True, weak=True) is silent
+        assert is_improvement(n, found.misfit + DEVIANCE.accept, found, later=True, weak=True) is silent
 
 
 def test_what_all_recordings_together_cannot_tell_apart_are_rivals():
@@ -129,7 +132,7 @@ def test_what_has_a_parameter_more_is_a_rival_where_it_leaves_more_than_that_les
         simple = a_fit(n, "dead_time", effect, seen + nudge)
         richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
         ahead = lead(n, values + nudge, richer.prediction, simple.prediction)
-        if 0 < ahead < TO_PREFER:
+        if 0 < ahead < DEVIANCE.tie:
             told.append(
                 (
                     ahead,
@@ -163,7 +166,7 @@ def test_recordings_held_out_have_no_say_where_the_others_tell():
 
 
 def test_fits_are_confirmed_until_one_stands_clear_above_the_best():
-    """Confirmation makes each 10 better; the third promises less than the best by more than that and TO_CONFIRM."""
+    """Confirmation makes each 10 better; the third promises less than the best by more than that and DEVIANCE.keep."""
     n, effect, _values, seen = campaign()
     base = a_fit(n, "", effect, seen)
     asked = []
@@ -172,24 +175,24 @@ def test_fits_are_confirmed_until_one_stands_clear_above_the_best():
         asked.append(f.name)
         return replace(f, misfit=f.misfit - 10.0)
 
-    near, far = 100.0 + TO_CONFIRM - 1.0, 100.0 + TO_CONFIRM + 11.0
+    near, far = 100.0 + DEVIANCE.keep - 1.0, 100.0 + DEVIANCE.keep + 11.0
     fits = [replace(base, name=name, misfit=m) for name, m in (("a", 100.0), ("b", near), ("c", near), ("d", far))]
-    sure, rest = confirmed_in_order(fits, confirm)
+    sure, rest = confirmed_in_order(fits, confirm, DEVIANCE.keep)
     assert asked == ["a", "b", "c"] and [f.name for f in sure] == ["a", "b", "c"] and [f.name for f in rest] == ["d"]
 
 
 def test_fits_that_promise_too_little_are_not_confirmed_unless_one_does_not():
-    """60 are enough.  Alone, 61 are not worth it; beside one confirmed at 55, those within TO_CONFIRM of it are."""
+    """60 are enough.  Alone, 61 are not worth it; beside one confirmed at 55, those within DEVIANCE.keep of it are."""
     n, effect, _values, seen = campaign()
     base = a_fit(n, "", effect, seen)
-    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 61.0), ("b", 66.0), ("c", 55.0 + TO_CONFIRM))]
+    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 61.0), ("b", 66.0), ("c", 55.0 + DEVIANCE.keep))]
     best = replace(base, name="best", misfit=55.0)
-    sure, rest = confirmed_in_order(fits, lambda f: f, enough=60.0)
+    sure, rest = confirmed_in_order(fits, lambda f: f, DEVIANCE.keep, enough=60.0)
     assert sure == [] and [f.name for f in rest] == ["a", "b", "c"]
-    sure, rest = confirmed_in_order([best, *fits], lambda f: f, enough=60.0)
+    sure, rest = confirmed_in_order([best, *fits], lambda f: f, DEVIANCE.keep, enough=60.0)
     assert [f.name for f in sure] == ["best", "a", "b"] and [f.name for f in rest] == ["c"]
     disappointing = replace(best, misfit=75.0)
-    sure, rest = confirmed_in_order([best, *fits], lambda f: disappointing, enough=60.0)
+    sure, rest = confirmed_in_order([best, *fits], lambda f: disappointing, DEVIANCE.keep, enough=60.0)
     assert [f.name for f in sure] == ["best"] and [f.name for f in rest] == ["a", "b", "c"], "as will the others"
 
 
@@ -211,7 +214,7 @@ def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
     """What came first may have taken the share of what comes later: how much both remove, only both together tell."""
     n, _effect, values, seen = campaign()
     rho, before = residual_and_misfit(n, seen, n.prediction)
-    hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (TO_ADD + TO_JOIN) / 2)
+    hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (DEVIANCE.accept + DEVIANCE.join) / 2)
     asked = []
     monkeypatch.setattr(search, "screened_beside", lambda *_: [])
     monkeypatch.setattr(search, "fits_of", lambda *_: ([hint], {Screened("crosstalk", {}, 0.0, rho): hint}))
@@ -220,7 +223,7 @@ def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
     problem = Problem(recorded(), MODEL, n, seen, values)
     search.with_candidates(problem, problem, [], {}, first)
     assert not asked
-    search.with_candidates(problem, problem, [], {}, replace(first, to_join=TO_JOIN))
+    search.with_candidates(problem, problem, [], {}, replace(first, to_join=DEVIANCE.join))
     assert asked == [hint]
 
 
@@ -255,7 +258,8 @@ def test_a_hint_of_another_bend_is_none():
     n, change, _, seen = campaign()
     hint = a_fit(n, "crosstalk", change, seen)
     beside = MODEL.with_effect(DEAD_TIME)
-    turn = Round(beside, unit(), n.prediction, seen, hint.misfit + (TO_ADD + TO_JOIN) / 2, (hint,), to_join=TO_JOIN)
+    before = hint.misfit + (DEVIANCE.accept + DEVIANCE.join) / 2
+    turn = Round(beside, unit(), n.prediction, seen, before, (hint,), to_join=DEVIANCE.join)
     bend = replace(turn, fits=(replace(hint, name="comparator_delay"),))
     assert has_candidate(turn, n) and not has_candidate(bend, n)
     assert has_candidate(replace(bend, model=MODEL), n), "it is the first"
@@ -265,8 +269,10 @@ def test_one_confirmed_before_is_among_those_that_others_are_measured_by():
     n, effect, _values, seen = campaign()
     base = a_fit(n, "", effect, seen)
     known = replace(base, name="known", misfit=10.0)
-    fits = [replace(base, name=name, misfit=m) for name, m in (("a", 10.0 + TO_CONFIRM), ("b", 11.0 + TO_CONFIRM))]
-    sure, rest = confirmed_in_order(fits, lambda f: f, known=[known])
+    fits = [
+        replace(base, name=name, misfit=m) for name, m in (("a", 10.0 + DEVIANCE.keep), ("b", 11.0 + DEVIANCE.keep))
+    ]
+    sure, rest = confirmed_in_order(fits, lambda f: f, DEVIANCE.keep, known=[known])
     assert [f.name for f in sure] == ["known", "a"] and [f.name for f in rest] == ["b"]
 
 
@@ -346,10 +352,10 @@ def test_a_runner_up_that_explained_little_or_was_not_confirmed_is_not_tried_aga
     best, near, far = (replace(f, misfit=m) for f, m in ((best, 300.0), (near, 390.0), (far, 410.0)))
     turn = Round(MODEL, unit(), n.prediction, seen, 800.0, (best, far, near))
     names = ["dead_time", "light_flicker"]
-    assert [f.name for f in runner_up(turn, names)] == ["supply_ripple"]
+    assert [f.name for f in runner_up(turn, names, 0.8)] == ["supply_ripple"]
     guess = replace(near, prediction=replace(near.prediction, draws=()))
-    assert runner_up(replace(turn, fits=(best, far, guess)), names) == []
-    assert runner_up(turn, ["lamp_drift", "light_flicker"]) == [], "what was found before is another one now"
+    assert runner_up(replace(turn, fits=(best, far, guess)), names, 0.8) == []
+    assert runner_up(turn, ["lamp_drift", "light_flicker"], 0.8) == [], "what was found before is another one now"
 
 
 def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
@@ -416,7 +422,7 @@ def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int,
     monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
     monkeypatch.setattr(search, "is_significant", lambda *_: True)
     monkeypatch.setattr(search, "is_small_share", lambda *_: False)
-    monkeypatch.setattr(search, "CAMPAIGNS_PER_EFFECT", 17)
+    n = replace(n, settings=DiagnosisSettings(searching=Searching(campaigns_per_effect=17)))
     search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
     assert len(asked) == 1 + begun and case.budget.left_out == ([] if begun else ["a second effect"])
 

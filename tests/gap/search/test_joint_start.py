@@ -40,9 +40,9 @@ def test_a_pair_that_leaves_less_stands_in_place_of_its_first_effect():
     alone, pair, other = a_fit("clock_feedthrough", 50.0), a_fit("clock_feedthrough", 40.0, "readout_skew"), a_fit(
         "supply_ripple", 45.0
     )  # fmt: skip
-    assert with_pairs([alone, other], [pair]) == [pair, other]
-    assert with_pairs([alone, other], [replace(pair, misfit=45.0)]) == [alone, other]
-    assert with_pairs([other], [pair]) == [pair, other]
+    assert with_pairs([alone, other], [pair], 6.0) == [pair, other]
+    assert with_pairs([alone, other], [replace(pair, misfit=45.0)], 6.0) == [alone, other]
+    assert with_pairs([other], [pair], 6.0) == [pair, other]
 
 
 def test_a_pair_is_two_rounds_each_with_a_model_of_its_own():

@@ -8,9 +8,11 @@ import numpy as np
 
 from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.compare.thresholds import TO_PREFER
 from spikecam_env.gap.search.rivals import is_rival, lead
+from spikecam_env.gap.settings import Deviance
 from spikecam_env.gap.statistics import Key
+
+TIE = Deviance().tie
 
 COUNT, TWINS = 200, 12
 
@@ -47,7 +49,7 @@ def test_the_true_effect_is_nearly_always_a_rival_of_a_wrong_one():
 
 
 def test_noise_of_what_was_found_before_makes_leads_chance():
-    """A lead a little above TO_PREFER, between two that are some noises apart: had the null's own draws not been made
+    """A lead a little above TIE, between two that are some noises apart: had the null's own draws not been made
     as noisy as the null says statistics are beside an earlier effect, no lead at all would be chance."""
     rivals = 0
     for seed in range(20):
@@ -57,7 +59,7 @@ def test_noise_of_what_was_found_before_makes_leads_chance():
         apart = np.where(np.arange(COUNT) >= 190, 8.0, 0.0)
         one, other = shown(n, common), shown(n, common + apart)
         between = [n.mean + common + x * apart for x in np.linspace(1.0, -1.0, 201)]
-        measured = next(m for m in between if lead(n, m, one, other) > TO_PREFER)
+        measured = next(m for m in between if lead(n, m, one, other) > TIE)
         rivals += is_rival(n, n.draws, measured, one, other)
     print(f"rivals in {rivals} of 20 campaigns")
     assert rivals > 5
@@ -77,7 +79,7 @@ def test_two_that_predict_the_same_are_rivals_whichever_leads():
     change = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
     measured = n.mean + change
     one, two = shown(n, change), shown(n, 1.001 * change)
-    assert abs(lead(n, measured, one, two)) < TO_PREFER
+    assert abs(lead(n, measured, one, two)) < TIE
     assert is_rival(n, n.draws, measured, one, two) and is_rival(n, n.draws, measured, two, one)
 
 
@@ -89,7 +91,7 @@ def test_two_twins_do_not_say_whose_campaigns_scatter_more():
     measured = one.mean + np.random.default_rng(1).standard_normal(COUNT)
     price = residual_and_misfit(n, measured, calm)[1] - residual_and_misfit(n, measured, one)[1]
     print(f"misfit {price:.0f} apart, lead {lead(n, measured, calm, one):.2f}")
-    assert abs(price) > TO_PREFER and abs(lead(n, measured, calm, one)) < 1.0
+    assert abs(price) > TIE and abs(lead(n, measured, calm, one)) < 1.0
 
 
 def simulated(n: Null, change: np.ndarray, seed: int, own: float = 0.7) -> Prediction:
@@ -99,7 +101,7 @@ def simulated(n: Null, change: np.ndarray, seed: int, own: float = 0.7) -> Predi
 
 
 def test_two_laws_that_do_the_same_are_rivals_though_twins_differ():
-    """What twins of the second happen to do is no part of its law: taken for it, every lead above TO_PREFER would tell.
+    """What twins of the second happen to do is no part of its law: taken for it, every lead above TIE would tell.
     At 1 % doubt four of 400 are missed, and some more because twins also scatter further than CLEAR."""
     missed = leads = 0
     for seed in range(400):
@@ -107,7 +109,7 @@ def test_two_laws_that_do_the_same_are_rivals_though_twins_differ():
         change = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
         one, other = (simulated(n, change, seed=1000 * i + seed) for i in (1, 2))
         measured = n.mean + change + np.random.default_rng([seed, 1]).standard_normal(COUNT)
-        if lead(n, measured, one, other) > TO_PREFER:
+        if lead(n, measured, one, other) > TIE:
             leads += 1
             missed += not is_rival(n, n.draws, measured, one, other)
     print(f"{missed} missed of {leads} that lead, of 400")

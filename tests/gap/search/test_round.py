@@ -12,6 +12,7 @@ from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.search.neighbours import runner_up
 from spikecam_env.gap.search.round import Round, absent, is_small_share, is_visible
+from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics import Key
 
 KEYS = tuple(Key("rates", "r", str(i)) for i in range(10))
@@ -40,7 +41,7 @@ def test_an_effect_of_random_course_changes_no_mean():
     "later, removed, small", [(False, 0.15, True), (False, 0.3, False), (True, 0.35, True), (True, 0.7, False)]
 )
 def test_less_than_a_fifth_of_what_is_beyond_chance_is_little_and_later_less_than_half(later, removed, small):
-    assert is_small_share(TURN, 1000.0 - removed * 800.0, 200.0, later) == small
+    assert is_small_share(TURN, 1000.0 - removed * 800.0, 200.0, later, Searching()) == small
 
 
 @pytest.mark.parametrize(
@@ -61,4 +62,4 @@ def test_an_effect_of_no_strength_or_of_less_than_half_a_pixel_is_absent(name, p
 @pytest.mark.parametrize("removed, tried", [(0.7, []), (0.9, ["supply_ripple"])])
 def test_a_runner_up_has_to_have_removed_four_fifths_of_what_the_best_did(removed: float, tried: list[str]):
     turn = replace(TURN, fits=(a_fit("light_flicker", 500.0), a_fit("supply_ripple", 1000.0 - 500.0 * removed)))
-    assert [f.name for f in runner_up(turn, ["light_flicker"])] == tried
+    assert [f.name for f in runner_up(turn, ["light_flicker"], 0.8)] == tried

@@ -8,6 +8,7 @@ import pytest
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search.shortlist import groups_that_stand_out, starts_to_fit
+from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics import Key
 
 NAMES = ("dead_time", "ir_drop", "crosstalk", "readout_skew", "optical_blur", "missed_spikes", "comparator_delay")
@@ -20,7 +21,7 @@ def screened(misfits) -> list[Screened]:
 @pytest.mark.parametrize("others, count", [(900.0, 3), (110.0, 5)])
 def test_three_are_fitted_at_least_and_five_at_most(others: float, count: int):
     """Of seven, beside the best: six that explain little, or as much."""
-    assert len(starts_to_fit(screened([100.0, *[others] * 6]), 1000.0)) == count
+    assert len(starts_to_fit(screened([100.0, *[others] * 6]), 1000.0, Searching())) == count
 
 
 @pytest.mark.parametrize("noises, groups", [(4.0, {"rates"}), (9.0, {"rates", "pattern"})])

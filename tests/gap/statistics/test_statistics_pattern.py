@@ -26,7 +26,7 @@ CASES = [
 
 def deviates_from_units(case) -> dict[Key, float]:
     """Every pattern statistic against units drawn from the model, Student's t of DRAWS made normal."""
-    banks = drawn_banks(MODEL, case.base, case.conditions, case.shape, DRAWS, 11)
+    banks = drawn_banks(MODEL, case.base, case.conditions, case.shape, DRAWS, 11, (0.6, 1.67))
     found = {}
     for key in banks[0]:
         values = np.array([b[key] for b in banks])
@@ -85,7 +85,7 @@ def test_pixels_that_fire_once_or_twice_in_the_dark_differ_though_they_are_all_a
     dark = [c for c in conditions() if c.kind == "dark"]
     one = np.ones(SHAPE[0] * SHAPE[1])
     base = BaseFit(one, 1.6 / FRAMES * one, 0 * one, 0 * one, 0.0, np.zeros((0, one.size)), one > 0)
-    banks = drawn_banks(model, base, dark, SHAPE, 4, 0)
+    banks = drawn_banks(model, base, dark, SHAPE, 4, 0, (0.6, 1.67))
     widths = [np.exp(b[Key("pattern", "dark", "width")]) for b in banks]
     assert widths == pytest.approx(4 * [0.3 / 1.6], rel=0.1)
 

@@ -21,19 +21,22 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.search import forward as searching
 from spikecam_env.gap.search import neighbours, shortlist
-from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND, joined
+from spikecam_env.gap.search.forward import SECOND, joined
 from spikecam_env.gap.search.neighbours import may_try_without_earlier, try_cancelling_pair, try_in_place_of_earlier
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.search.shortlist import may_be_shaped
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.verdict import conclude
 
+PER_EFFECT = DiagnosisSettings().searching.campaigns_per_effect
+
 
 def problem_of(case: SimpleNamespace) -> Problem:
     """Of a case that has a budget alone."""
-    return Problem(case, None, None, None, None)  # type: ignore[arg-type]
+    return Problem(case, None, SimpleNamespace(settings=DiagnosisSettings()), None, None)  # type: ignore[arg-type]
 
 
 def test_nothing_is_left_out_while_there_is_less_than_the_most():
@@ -198,10 +201,10 @@ def test_nothing_is_named_where_a_second_effect_was_not_looked_for(left_out: lis
     if verdict == "unknown":
         asked = said.unknown["effort"]
         assert said.unknown["not_looked_for"] == SECOND and said.unknown["best_candidate"] == "dead_time"
-        assert len(case.conditions) * asked > 300 + CAMPAIGNS_PER_EFFECT * len(case.conditions) and asked % 10 == 0
+        assert len(case.conditions) * asked > 300 + PER_EFFECT * len(case.conditions) and asked % 10 == 0
         assert f"--effort {asked}" in sentence(said, "scsim") and "dead time comes nearest" in sentence(said, "scsim")
 
 
 def test_the_most_by_default_is_enough_to_look_for_a_second_effect():
     """Of thirteen recordings: after the twins of the noise, a first effect and all its shapes."""
-    assert Budget(CAMPAIGNS * 13, [100 * 13]).allows(SECOND, CAMPAIGNS_PER_EFFECT * 13, needed=True)
+    assert Budget(CAMPAIGNS * 13, [100 * 13]).allows(SECOND, PER_EFFECT * 13, needed=True)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, effect, recorded, unit
 
+from spikecam_env.gap.settings import Twins
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.twins.fresh_units import drawn_banks
@@ -17,6 +18,7 @@ from spikecam_env.sensor import SpikeSensor
 SEVERE = effect("random_telegraph_noise", amplitude_pA=2.0, fraction=0.04, dwell_ms=5.0)
 TRAPPED = MODEL.with_effect(SEVERE)
 FRAMES = 4000
+LIMITS = Twins().spread_limits
 
 
 @pytest.mark.parametrize("dwell_ms", [1.0, 20.0, 1000.0])
@@ -71,7 +73,7 @@ def test_a_model_with_traps_predicts_their_bright_tail():
     case = recorded(SEVERE)
     key = Key("pattern", "dark", "high tail")
     plain, trapped = (
-        [b[key] for b in drawn_banks(m, case.base, case.conditions, SHAPE, 12, 0)] for m in (MODEL, TRAPPED)
+        [b[key] for b in drawn_banks(m, case.base, case.conditions, SHAPE, 12, 0, LIMITS)] for m in (MODEL, TRAPPED)
     )
     print(f"measured {case.bank[key]:.2f}; drawn {np.mean(plain):.2f}, with traps {np.mean(trapped):.2f}")
     assert abs(case.bank[key] - np.mean(trapped)) < 4 * np.std(trapped, ddof=1)

@@ -17,6 +17,7 @@ from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import shipped_templates
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.verdict.bounds import (
@@ -109,7 +110,9 @@ def test_without_effort_there_is_no_bound_and_that_is_said():
 def test_what_is_counted_is_first_tried_where_some_are_expected():
     case = recorded()
     probe = SimpleNamespace(
-        name="missed_spikes", events=lambda p: expected_events("missed_spikes", p, case.conditions, case.observations)
+        name="missed_spikes",
+        settings=DiagnosisSettings(),
+        events=lambda p: expected_events("missed_spikes", p, case.conditions, case.observations),
     )
     score = Score(lambda v: 0.0, np.array([-1.0, 0.0, 1.0]), 0.0, {"probability": 1e-4}, 30.0)
     look = SimpleNamespace(probe=probe, score=score, expected=1e-9)
@@ -122,6 +125,7 @@ class Linear:
     """A probe whose effect shows by `per` noises a unit of strength, whatever else; its tests are exact."""
 
     name = "dead_time"
+    settings = DiagnosisSettings()
 
     def __init__(self, per: float) -> None:
         self.per, self.scored, self.tests = per, [], []

@@ -28,7 +28,7 @@ def turn(*fits: Fit, misfit: float = 100.0) -> Round:
 def test_a_better_candidate_below_the_kept_one_says_why() -> None:
     kept = fit("light_flicker", 60.0, draws=4)
     first = turn(kept, fit("crosstalk", 70.0), fit("lamp_drift", 50.0), fit("dead_time", 55.0, draws=2))
-    rows = ranking([first], [(kept, first)])
+    rows = ranking([first], [(kept, first)], 12.0)
     assert [r.name for r in rows] == ["light_flicker", "lamp_drift", "dead_time", "crosstalk"]
     assert [r.accepted for r in rows] == [True, False, False, False]
     assert [r.reason for r in rows] == [
@@ -40,7 +40,7 @@ def test_a_better_candidate_below_the_kept_one_says_why() -> None:
 
 
 def test_where_nothing_was_kept_the_best_comes_first_and_the_chosen_says_why_not() -> None:
-    rows = ranking([turn(fit("crosstalk", 85.0, draws=4), fit("dead_time", 95.0), fit("lamp_drift", 100.0))], [])
+    rows = ranking([turn(fit("crosstalk", 85.0, draws=4), fit("dead_time", 95.0), fit("lamp_drift", 100.0))], [], 12.0)
     assert [r.name for r in rows] == ["crosstalk", "dead_time", "lamp_drift"] and not any(r.accepted for r in rows)
     assert rows[0].reason == "not kept: beside the others, or on recordings held out, it explains no more"
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.verdict.score import RULE_OF_THREE, Score, StrengthTest, TwinProbe, linear_score
 
 
@@ -30,6 +31,6 @@ def test_what_so_few_events_scatter_counts_however_alike_a_few_campaigns_are():
 
 
 def test_a_statistic_counts_as_five_noises_off_at_most() -> None:
-    null = SimpleNamespace(mean=np.zeros(2), noise=np.ones(2))
+    null = SimpleNamespace(mean=np.zeros(2), noise=np.ones(2), settings=DiagnosisSettings())
     score = [linear_score(null, np.array([1.0, 0.0]), np.array([x, 9.0])) for x in (4.0, 6.0, 100.0, np.nan)]
     assert score == [4.0, 5.0, 5.0, 0.0]

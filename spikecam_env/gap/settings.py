@@ -1,0 +1,430 @@
+"""The settings of a diagnosis: every tuned number, with its unit and its source, by the stage that uses it.
+
+    DiagnosisSettings().deviance.accept        12, misfit that an effect has to remove
+
+A number of this package is one of five kinds, and only the first is a setting:
+
+setting        a choice that decides something about a campaign: a threshold, a number of twins, a share.
+definition     part of what a statistic, an estimator, a template or a format is: lags, quantiles, the trimming of the
+               refit, windows, the standard case.  It applies to a measurement and its twins in the same way.
+measured table a property of each group of statistics: its floor (`statistics.FLOORS`), the noise of a pair of twins
+               (`compare.prediction.PAIR_NOISE`).
+numerics       a step of a derivative, a regularisation, a limit against overflow or endless loops.
+layout         rows, decimals and sizes of a page.
+
+The others stay where they are used.  `tools/site/settings.py` makes docs/reference/diagnosis_settings.md from the
+declarations below.  `tests/gap/test_settings.py` changes each of them by a factor of two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
+
+from spikecam_env.errors import unknown_name
+
+CHOICE = "a choice; the blind trial measures it with the others"
+TUNED = "set on the blind trial's part `tune`"
+
+PER_PARAMETER = 2.0
+"""Mean reduction of the deviance by a parameter without a meaning (Akaike)."""
+
+
+def setting(default: Any, unit: str, what: str, source: str) -> Any:
+    """A field of settings.
+
+    Args:
+        default: its value.
+        unit: of the value; "" where it is a plain number.
+        what: what it decides, in one sentence.
+        source: where the value comes from: a command that measures it, literature, or a choice.
+    """
+    return field(default=default, metadata={"unit": unit, "what": what, "source": source})
+
+
+@dataclass(frozen=True)
+class Deviance:
+    """Thresholds on the difference in misfit between two hypotheses, twice the logarithm of a likelihood ratio."""
+
+    accept: float = setting(12.0, "deviance", "Reduction in misfit to accept an effect.", "two ties")
+    tie: float = setting(
+        6.0, "deviance", "Two hypotheses nearer to each other than this are tied.", "2 log 20, a likelihood ratio of 20"
+    )
+    stop: float = setting(
+        1.0,
+        "deviance",
+        "Least promised reduction for another step of the parameters.  Small, since two parameters that compensate "
+        "each other may both be far off while a step gains little.",
+        CHOICE,
+    )
+
+    @property
+    def by_chance(self) -> float:
+        """Increase in misfit that the chance of the draws can explain: half a tie."""
+        return self.tie / 2
+
+    @property
+    def join(self) -> float:
+        """Reduction for a later effect to earn a joint refit: two parameters without a meaning.  Less than `accept`,
+        since earlier effects may have absorbed part of its signature."""
+        return 2 * PER_PARAMETER
+
+    @property
+    def compare(self) -> float:
+        """As `stop`, while candidates are compared, and for the fit of one to go on after a twin: less would not
+        change their order."""
+        return 5 * self.stop
+
+    @property
+    def dismiss(self) -> float:
+        """Lead on the recordings to fit up to which all recordings decide: two ties, as the noise beside another
+        effect is known from few twins."""
+        return 2 * self.tie
+
+    @property
+    def keep(self) -> float:
+        """Distance between two fits by few twins each that chance cannot explain: `accept`, and chance.  An earlier
+        effect stays if the misfit without it is larger by this; an unconfirmed fit this far from the best confirmed
+        one is not confirmed."""
+        return self.accept + self.by_chance
+
+    @property
+    def keep_untried(self) -> float:
+        """As `keep` of an earlier effect, where the model without it is not simulated: no refit could make up so
+        much."""
+        return 10 * self.keep
+
+
+@dataclass(frozen=True)
+class Judging:
+    """How far off a statistic is, and what is chance."""
+
+    heavy: float = setting(
+        8.0,
+        "degrees of freedom",
+        "Of Student's loss: statistics that are far off count by their logarithm.",
+        "a second effect beside the first must not pull its fit",
+    )
+    alarm: float = setting(
+        0.02,
+        "p, adjusted",
+        "Below it, recordings and model disagree.",
+        "one false alarm in fifty campaigns; 2.0 % of 200 by `python -m benchmarks.moderated_variances`",
+    )
+    gate: float = setting(
+        0.005,
+        "p, adjusted",
+        "Below it, a named effect leaves something.",
+        "stricter than the alarm, as a named effect is itself only good to its tolerance",
+    )
+    chance_p: float = setting(0.002, "p, adjusted", "Above it, what no candidate explains may be chance.", TUNED)
+    tolerance: float = setting(
+        0.05,
+        "of an effect",
+        "Error of an effect's simulated change.",
+        "laws of first order in sub-frame time, beside a camera's; more twins do not make it smaller",
+    )
+    clear: float = setting(
+        5.0,
+        "noises",
+        "A statistic so far off is not chance: its recording is simulated, it describes a discrepancy; it counts no "
+        "further in the score of a bound.",
+        "of 600 statistics one is so far off by chance in one campaign of 3000",
+    )
+    apart: float = setting(
+        3.0,
+        "noises",
+        "Two simulations, or two values of a parameter, that differ by more are not the same.",
+        CHOICE,
+    )
+    shows: float = setting(
+        6.0,
+        "noises",
+        "A change so large is clear of the twins' own noise: of a pattern or of motion that stands out by itself, of a "
+        "step for a derivative, of an effect for its bound.",
+        CHOICE,
+    )
+
+
+@dataclass(frozen=True)
+class UnitSettings:
+    """Limits of what a unit may be."""
+
+    usual: float = setting(
+        1.8,
+        "times nominal",
+        "Dark level and spreads of units; beyond it, a parameter is off.",
+        "units differ by 5-20 %",
+    )
+    usual_noise: float = setting(
+        1.5,
+        "times nominal",
+        "The same of s^2, the relative variance of an interval.",
+        "the electrons, or the square of the millivolts, of a unit 20 % off",
+    )
+    identifiable: float = setting(
+        0.5,
+        "of the refit's s^2",
+        "If the unit's own share is smaller, refits of twins do not identify it, and it stays as it was.",
+        CHOICE,
+    )
+    own_share: float = setting(
+        0.9, "of the refit's s^2", "If the unit's own share is smaller, it is fitted with the effects.", CHOICE
+    )
+
+
+@dataclass(frozen=True)
+class Twins:
+    """What is simulated, and how often."""
+
+    drawn_units: int = setting(
+        24,
+        "units",
+        "Drawn for the fixed pattern of a model; ten times as many where these do not show the measured value.",
+        CHOICE,
+    )
+    spread_limits: tuple[float, float] = setting(
+        (0.6, 1.67), "times nominal", "Spreads of drawn units; beyond them it is a gap.", "units differ by 5-20 %"
+    )
+    to_confirm: int = setting(
+        2, "twins", "Confirm a candidate; show a model whose gap is large beside what two leave open.", CHOICE
+    )
+    in_the_end: int = setting(
+        4, "twins", "Confirm the chosen effects, give the covariance of their parameters, test a bound.", CHOICE
+    )
+    of_events: int = setting(
+        3,
+        "twins",
+        "Of a sparse or mixed effect, which cannot be simulated stronger to exceed one twin's noise.",
+        CHOICE,
+    )
+    of_random_course: int = setting(6, "twins", "Of an effect that shows by the scatter of its twins.", CHOICE)
+    target_size: float = setting(
+        60.0,
+        "noises",
+        "A weak linear effect is simulated as strong as this, within `most_extrapolated`, and scaled down.",
+        "in proportion so far: `python -m benchmarks.in_proportion`",
+    )
+    most_extrapolated: float = setting(
+        4.0,
+        "times",
+        "A strength, and the unit under it, are extrapolated at once.",
+        "in proportion so far: `python -m benchmarks.in_proportion`",
+    )
+    converged: float = setting(
+        3e-4,
+        "of the gain",
+        "Change of the unit up to which it need not be simulated again.",
+        "a thirtieth of what four kicks of 0.0025 add to a rate, the crosstalk of `tests/gap/fit/test_candidate.py`",
+    )
+    overrun: float = setting(1.3, "budgets", "Limit of steps that an undecided verdict needs.", CHOICE)
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """The fit of a strength by twins, and of other parameters by Gauss-Newton."""
+
+    visible: float = setting(
+        4.0, "noises", "Least size of a simulated effect from which its strength is scaled.", CHOICE
+    )
+    most_tries: int = setting(
+        5, "strengths", "Tried for one strength, for the score of a bound, and for a bound.", CHOICE
+    )
+    most_steps: int = setting(4, "steps", "Of a descent, and of two effects that cancel.", CHOICE)
+    small_step: float = setting(
+        0.05, "of a logarithm", "A step so small needs no other; two strengths so close show no slope.", CHOICE
+    )
+    long_step: float = setting(0.5, "of a logarithm", "Beyond it, derivatives are taken anew.", CHOICE)
+    longest_step: float = setting(
+        0.7, "of a logarithm", "Largest step at once, within what was open of the parameter before.", "a factor of two"
+    )
+    round_off: tuple[float, float] = setting(
+        (0.7, 1.4), "times", "Factors within which a strength is scaled without another twin.", CHOICE
+    )
+
+
+@dataclass(frozen=True)
+class Searching:
+    """Which candidates are fitted, which are added, and when a search goes on."""
+
+    most_effects: int = setting(3, "effects", "Named together.", CHOICE)
+    campaigns_per_effect: int = setting(
+        16,
+        "campaigns",
+        "Cost of another effect, by which the budget allows it.",
+        "measured: 13 to 25 in four diagnoses",
+    )
+    fewest_fitted: int = setting(3, "candidates", "Fitted in a round at least, the best by their templates.", CHOICE)
+    most_fitted: int = setting(5, "candidates", "Fitted in a round at most, the best by their templates.", CHOICE)
+    worth: float = setting(
+        0.5,
+        "of what the best removes",
+        "What removes less is not worth another fit: a start, a shape, a runner-up of an earlier effect; nor is a "
+        "second bend that removes less of what is beyond chance refined before more is found.",
+        CHOICE,
+    )
+    same_share: float = setting(
+        0.8,
+        "of what the best removes",
+        "A runner-up, or another start, that removes more is tried in its place.",
+        CHOICE,
+    )
+    least_share: float = setting(
+        0.2,
+        "of what is beyond chance",
+        "A first effect that removes less and leaves something is not refined before another is found.",
+        CHOICE,
+    )
+    earlier_tried: int = setting(4, "candidates", "Runners-up that are tried in place of an earlier effect.", CHOICE)
+    least_chance: float = setting(0.01, "p", "Of a lead; below it, a candidate is no rival.", CHOICE)
+    least_events: float = setting(
+        0.5, "pixels, spikes or frames", "An effect that changes fewer is not there.", "they round to none"
+    )
+    least_change: float = setting(
+        2.0, "noises", "An effect that changes no statistic by more is not added.", "twins of nothing differ by luck"
+    )
+    line: float = setting(
+        30.0, "times the usual power", "A line from whose frequency periodic candidates start.", CHOICE
+    )
+    least_spikes: int = setting(1000, "spikes", "Of a recording whose spectrum says something.", CHOICE)
+    close_factor: float = setting(
+        1.25, "times", "Two effects that cancel are scaled by less without another twin.", CHOICE
+    )
+    grid_factor: float = setting(
+        2.0, "times", "Two effects that start jointly are scaled by so much at most, to compare their starts.", CHOICE
+    )
+    descents: int = setting(2, "starts", "Of two effects that start jointly, from which both are fitted.", CHOICE)
+
+
+@dataclass(frozen=True)
+class Concluding:
+    """From a search to a verdict."""
+
+    most_left: float = setting(0.05, "of the deviance beyond chance", "A name may leave so much in all.", TUNED)
+    most_left_there: float = setting(
+        0.25,
+        "of the sum of squares",
+        "A name may leave so much in a group of statistics of a recording.",
+        TUNED,
+    )
+    large_share: float = setting(
+        0.3,
+        "of all",
+        "What many pixels have in common is common to them; irregular intervals that the halves differ by are of one "
+        "half.",
+        CHOICE,
+    )
+    local_noises: float = setting(
+        8.0,
+        "noises",
+        "A field, or a half, that stands out so far is where, or when, an effect acts.",
+        "comparisons are many; in the clean campaigns of `tests/gap/verdict` none does",
+    )
+    times_expected: float = setting(
+        2.0, "times expected", "Irregular intervals of a field in which an effect acts.", CHOICE
+    )
+    least_frames: int = setting(
+        1000,
+        "frames",
+        "Shortest recording whose halves are compared by their lines.",
+        "pixels of one rate make a line of their own at first",
+    )
+    line_ratio: float = setting(6.0, "times", "Power of a line in one half over that in the other.", CHOICE)
+
+
+@dataclass(frozen=True)
+class Bounding:
+    """Upper bounds of effects that were not found."""
+
+    most_effect_size: float = setting(
+        25.0,
+        "noises",
+        "Size of an effect at most for its score.",
+        "what it changes there is like what it changes at its bound",
+    )
+    likely_sds: float = setting(
+        1.8,
+        "standard deviations",
+        "Of the score by which a refuted strength is likely to lie above what is seen.",
+        "1.645 of a normal score at 95 %, and more where few campaigns estimate its scatter",
+    )
+    resolution: float = setting(
+        0.6, "of a bound", "The least strength that would be refuted is not below it.", "a choice, stated on the page"
+    )
+    overshoot: float = setting(1.2, "times", "The first strength that is tested, over what is expected.", CHOICE)
+    campaigns: int = setting(150, "campaigns", "Cost of all bounds, by which the budget allows them.", "measured")
+
+
+@dataclass(frozen=True)
+class MapSettings:
+    """Recordings that are rates only."""
+
+    units: int = setting(8, "units", "Over which a prediction is averaged.", CHOICE)
+    steps: int = setting(6, "steps", "Of a fit.", CHOICE)
+    least_improvement: float = setting(
+        25.0,
+        "deviance",
+        "Reduction to accept an effect.",
+        "larger than of spikes, as statistics of one map depend on each other",
+    )
+    most_effects: int = setting(5, "effects", "Named together.", CHOICE)
+    most_left: float = setting(
+        0.08,
+        "of the mean square beyond chance",
+        "A name may leave so much.",
+        "of a mean square: statistics of maps are hundreds of noises off",
+    )
+    largest_sd: float = setting(0.5, "of a strength", "Its standard deviation, if it is significant.", "two of them")
+
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """Every setting of a diagnosis, by stage.
+
+    >>> DiagnosisSettings().deviance.keep
+    15.0
+    >>> DiagnosisSettings(deviance=Deviance(tie=8.0)).changed()
+    {'deviance.tie': 8.0}
+    """
+
+    deviance: Deviance = field(default_factory=Deviance)
+    judging: Judging = field(default_factory=Judging)
+    unit: UnitSettings = field(default_factory=UnitSettings)
+    twins: Twins = field(default_factory=Twins)
+    fitting: Fitting = field(default_factory=Fitting)
+    searching: Searching = field(default_factory=Searching)
+    concluding: Concluding = field(default_factory=Concluding)
+    bounding: Bounding = field(default_factory=Bounding)
+    maps: MapSettings = field(default_factory=MapSettings)
+
+    @classmethod
+    def of(cls, changes: Mapping[str, Any]) -> DiagnosisSettings:
+        """The defaults with some settings changed, as `changed` lists them.  Raises InputError for an unknown name.
+
+        >>> DiagnosisSettings.of({"deviance.tie": 8.0}).deviance.dismiss
+        16.0
+        """
+        known, out = [f"{stage}.{name}" for stage, name, _ in every_setting()], cls()
+        for name, value in changes.items():
+            if name not in known:
+                raise unknown_name("setting", name, known)
+            stage, key = name.split(".")
+            out = replace(out, **{stage: replace(getattr(out, stage), **{key: value})})
+        return out
+
+    def changed(self) -> dict[str, Any]:
+        """Settings that differ from their defaults: {"stage.name": value}."""
+        default, own = asdict(DiagnosisSettings()), asdict(self)
+        return {
+            f"{stage}.{name}": value
+            for stage, values in own.items()
+            for name, value in values.items()
+            if value != default[stage][name]
+        }
+
+
+def every_setting() -> list[tuple[str, str, Any]]:
+    """(stage, name, field) of each setting, in the order of declaration."""
+    stages = DiagnosisSettings()
+    return [(stage.name, f.name, f) for stage in fields(stages) for f in fields(getattr(stages, stage.name))]
