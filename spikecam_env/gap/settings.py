@@ -384,7 +384,7 @@ class DiagnosisSettings:
 
     >>> DiagnosisSettings().deviance.keep
     15.0
-    >>> DiagnosisSettings(deviance=Deviance(tie=8.0)).changed()
+    >>> DiagnosisSettings.of({"deviance.tie": 8.0}).changed()
     {'deviance.tie': 8.0}
     """
 
