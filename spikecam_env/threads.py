@@ -1,7 +1,8 @@
 """Threads for compiled code that lets others run: our own, not numba's.
 
-numba's OpenMP layer aborts in a process forked after its first use, which is how vector environments start.  How many
-there are is NUMBA_NUM_THREADS, by default the processors.
+numba's OpenMP layer aborts in a process forked after its first use, which is how vector environments start.  It also
+sets the threads of all that uses OpenMP, torch too, as soon as numba is asked how many it has.  How many there are here
+is NUMBA_NUM_THREADS, by default the processors, or what `limit_threads` says.
 """
 
 from __future__ import annotations
@@ -20,12 +21,21 @@ from numba import config
 PIXEL_STEPS_A_THREAD = 400_000
 """Of the sensor's kernels, below which handing work to another thread costs more than it saves (0.1 ms)."""
 
+_limit: int | None = None
+
 _LIBC = ctypes.PyDLL(None) if sys.platform == "linux" else None
 
 
+def limit_threads(count: int | None) -> None:
+    """Threads of this process where none are asked for, from now on; None for NUMBA_NUM_THREADS."""
+    global _limit
+    _limit = count
+
+
 def as_many(threads: int | None, most: int) -> int:
-    """How many threads to share work among: as many as asked for (default NUMBA_NUM_THREADS), at most `most`."""
-    asked = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
+    """How many threads to share work among: as many as asked for (default: see above), at most `most`."""
+    default = config.NUMBA_NUM_THREADS if _limit is None else _limit  # type: ignore[attr-defined]
+    asked = default if threads is None else threads
     return max(1, min(asked, most))
 
 

@@ -8,7 +8,6 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +19,7 @@ from scenes.world.plan import BLOCK, BlockPlan
 from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets
 from scenes.world.sprites import TRUTH_RAYS, body_sprite, lay_over
-from spikecam_env.threads import pool
+from spikecam_env.threads import as_many, pool
 
 PIECE = 64
 """Frames that are painted together; while threads paint some, the next bodies are rendered."""
@@ -54,7 +53,7 @@ def paint(
         if not (still and spec.bodies[body].backdrop)
     ]
     base = _still_base(spec, cache, float(frames[0]))[None] if still else _skies(spec, cache, frames, gaze)
-    count = min(numba.get_num_threads(), len(frames))
+    count = as_many(None, len(frames))
     cuts = np.linspace(0, len(frames), count + 1).astype(int)
     return [pool().submit(_compose, pictures, base, layers, int(a), int(b)) for a, b in pairwise(cuts)]
 

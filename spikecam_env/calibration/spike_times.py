@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numba import config
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.compiled import njit
 from spikecam_env.streams.bits import as_words, by_pixel, times_of
+from spikecam_env.threads import as_many
 
 STEPS = (1, 2, 4, 8, 16, 32, 64, 128)
 """k of A_k by default: short ones see dim light's jitter, long ones bright light's and slow noise."""
@@ -56,8 +56,7 @@ def spike_times(
     ends = np.full((whole, 3), -1, dtype=np.int64)
     square = np.zeros((whole, ks.size))
     terms = np.zeros((whole, ks.size), dtype=np.int64)
-    workers = config.NUMBA_NUM_THREADS if threads is None else threads  # type: ignore[attr-defined]
-    cuts = np.linspace(0, words.shape[1], max(1, min(workers, words.shape[1])) + 1).astype(int)
+    cuts = np.linspace(0, words.shape[1], as_many(threads, words.shape[1]) + 1).astype(int)
     with ThreadPoolExecutor(len(cuts) - 1) as pool:
         jobs = [pool.submit(_scan, words, a, b, ks, ends, square, terms) for a, b in pairwise(cuts)]
         for job in jobs:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 
 import cv2
-import numba
+
+from spikecam_env.threads import limit_threads
 
 
 def use_one_thread() -> None:
     """One thread a process, for compiled kernels, pictures and software rendering: the processes share the cores."""
-    numba.set_num_threads(1)
+    limit_threads(1)
     cv2.setNumThreads(1)
     os.environ["LP_NUM_THREADS"] = "1"  # of Mesa's software renderer, read when it starts
