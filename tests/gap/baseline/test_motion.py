@@ -20,6 +20,7 @@ from spikecam_env.gap.diagnose import case_of_observed, diagnose, observed, read
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.report.page import report
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.unknown_scene import correction
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
@@ -148,7 +149,7 @@ def test_static_pixels_alone_agree_with_their_model(tmp_path: Path) -> None:
     seen, motion = without_motion(observed(campaign := read_campaign(scene(tmp_path / "ball", ball(FRAMES)))),
                                   static_only=True)  # fmt: skip
     assert motion
-    case = case_of_observed(campaign, seen, 0, 1)
+    case = case_of_observed(campaign, seen, 0, 1, DiagnosisSettings())
     assert not case.base.live.reshape(SHAPE)[32].any()
     null = model_null(case, SCSIM, 8)
     p = adjusted(deviates(null, values_of(case.bank, null.keys)))
