@@ -171,24 +171,23 @@ class OnlineDnSS:
 
     def push(self, spikes: ArrayLike | torch.Tensor) -> Denoised:
         """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames they complete (perhaps none)."""
-        if self._ended:
-            raise NotReadyError("the stream has ended (flush was called); call reset() to begin another")
-        chunk = self._checked(spikes)
-        self._as_tensors = self._device is not None and isinstance(spikes, torch.Tensor)
-        if not self._chains:
-            self._begin((chunk.shape[1], chunk.shape[2]))
-        return self._denoise([chain.push(chunk) for chain in self._chains])
+        return self._pushed(spikes, as_tensors=isinstance(spikes, torch.Tensor))
 
     def push_packed(self, packed: NDArray[np.uint8] | torch.Tensor, shape: tuple[int, int]) -> Denoised:
         """`push` of (K, ceil(H W / 8)) packed frames of `shape`, as `pack_frames` packs; to a device they go as they
         are, and are unpacked there.  What comes out is an array where `packed` is one."""
         if self._device is None:
             return self.push(unpack_frames(np.asarray(packed), shape))
-        done = self.push(unpacked_on(packed, shape, self._device))
-        if isinstance(packed, torch.Tensor):
-            return done
-        self._as_tensors = False
-        return tuple(map(infer.on_host, done)) if isinstance(done, tuple) else infer.on_host(done)  # type: ignore
+        return self._pushed(unpacked_on(packed, shape, self._device), as_tensors=isinstance(packed, torch.Tensor))
+
+    def _pushed(self, spikes: ArrayLike | torch.Tensor, *, as_tensors: bool) -> Denoised:
+        if self._ended:
+            raise NotReadyError("the stream has ended (flush was called); call reset() to begin another")
+        chunk = self._checked(spikes)
+        self._as_tensors = self._device is not None and as_tensors
+        if not self._chains:
+            self._begin((chunk.shape[1], chunk.shape[2]))
+        return self._denoise([chain.push(chunk) for chain in self._chains])
 
     def flush(self) -> Denoised:
         """The stream is over -> its last frames, so that as many came out as went in."""
