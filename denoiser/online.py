@@ -335,11 +335,10 @@ class OnlineDnSS:
 
 
 def _moved(network: nn.Module | infer.StreamPasses, engine: str, device: torch.device) -> nn.Module:
-    if not isinstance(network, nn.Module) or not isinstance(network, infer.StreamPasses):
-        raise InputError(
-            f"device is given; it takes engine 'torch' or 'captured' (not {engine!r}) and a network of many planes a "
-            "pass, as mode 'best' is; leave device out"
-        )
+    if not isinstance(network, nn.Module):
+        raise InputError(f"engine {engine!r} has no device; take 'torch' or 'captured', or leave device out")
+    if not isinstance(network, infer.StreamPasses):
+        raise InputError("a device takes networks of many planes a pass, as mode 'best' is; leave device out")
     return network.to(device)
 
 
