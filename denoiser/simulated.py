@@ -110,12 +110,16 @@ class Bank:
         textures: int = 384,
         units: int = 96,
         pictures: NDArray[np.float32] | None = None,
+        streams: int | None = None,
         progress: bool = False,
     ) -> Bank:
-        """Everything follows from the seed.
+        """Everything follows from the seed, and from how many are drawn.
 
-        textures, units: how many.  pictures: (n, size, size) in [0, 1], textures besides.  progress: shows a bar.
+        textures, units: how many.  pictures: (n, size, size) in [0, 1], textures besides.  streams: that are drawn in
+        all; a bank for so few holds no more units, nor more textures than a layer each.  progress: shows a bar.
         """
+        if streams is not None:
+            textures, units = min(textures, streams * (SHAPES + 1)), min(units, streams)
         rng = np.random.default_rng([seed, 0xBA2C])
         bar = tqdm(total=textures + units, desc="textures, units", disable=not progress, leave=False)
         painted = []

@@ -38,7 +38,6 @@ from spikecam_env.torch_settings import torch_settings
 
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 8
-VALIDATION_PASSES = 24
 PASSES = {"best": 3, "paper": 1}
 """Passes of each stream that a step takes."""
 
@@ -49,6 +48,7 @@ _COUNTS = {
     "threads": (1, 1024),
     "patch": (16, 128),
     "validate_every": (1, 10**9),
+    "validate_passes": (1, 10**6),
 }
 """Options that are whole numbers, with the least and the most."""
 
@@ -61,8 +61,9 @@ class TrainConfig:
     """mode: "best" | "paper".  out: folder.  The run ends after `steps`, or `minutes` where that is given.
 
     batch: streams a step.  patch: their side [pixels], a multiple of 16.  lr: highest rate of learning.
-    validate_every: steps between validations.  threads: of the processor.  device: where streams and network are; a
-    GPU wants larger batches.  refine: `paper` with its refine module or, for the ablation, without.
+    validate_every: steps between validations.  validate_passes: passes of each validation along its streams.
+    threads: of the processor.  device: where streams and network are; a GPU wants larger batches.
+    refine: `paper` with its refine module or, for the ablation, without.
     start: weights of the same mode to begin from, a file of this training or a mode's name for those that ship.
     resume: go on from out/last.pt.
     """
@@ -80,6 +81,7 @@ class TrainConfig:
     refine: bool = True
     save_every_s: float = 60.0
     validate_every: int = 1000
+    validate_passes: int = 24
     device: str = "cpu"
     start: str | None = None
 
@@ -133,10 +135,10 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
         taken=config.batch,
         patch=config.patch,
         device=device,
-        bank=Bank.drawn(config.seed, device, progress=progress),
+        bank=Bank.drawn(config.seed, device, streams=config.steps * config.batch, progress=progress),
         compiled=device.type == "cuda",
     )
-    judge = Judge(recipe, config.seed + VALIDATION_SEED, device)
+    judge = Judge(recipe, config.seed + VALIDATION_SEED, device, config.validate_passes)
     return learn(
         config,
         run,
@@ -183,8 +185,8 @@ def stepper(run: Run, streams: Source, passes: int) -> Callable[[], Tensor]:
 class Judge:
     """Held-out streams, the same at every validation."""
 
-    def __init__(self, recipe: Recipe, seed: int, device: torch.device) -> None:
-        self._recipe, self._seed, self._device = recipe, seed, device
+    def __init__(self, recipe: Recipe, seed: int, device: torch.device, passes: int) -> None:
+        self._recipe, self._seed, self._device, self._passes = recipe, seed, device, passes
         self._bank = Bank.drawn(seed, device, textures=32, units=16)
 
     def scores(self, network: nn.Module) -> dict[str, float]:
@@ -199,7 +201,7 @@ class Judge:
             device=self._device,
             bank=self._bank,
         )
-        errors = streams.errors(network, VALIDATION_PASSES)
+        errors = streams.errors(network, self._passes)
         network.train()
         return {f"{name}_db": round(-10 * math.log10(max(error, 1e-12)), 3) for name, error in errors.items()}
 

@@ -11,7 +11,14 @@ from spikecam_env.cli.options import Checked, Count, Positive, Seed, Workers
 from spikecam_env.errors import InputError
 
 RECONSTRUCTORS = ("spk2img-clean", "spk2img-noisy", "ssml")
-ONLY_OF = {"refine": ("paper",), "start": ("best", "paper"), "width": RECONSTRUCTORS, "frames_a_step": RECONSTRUCTORS}
+DENOISERS = ("best", "paper")
+ONLY_OF = {
+    "refine": ("paper",),
+    "start": DENOISERS,
+    "validate_passes": DENOISERS,
+    "width": RECONSTRUCTORS,
+    "frames_a_step": RECONSTRUCTORS,
+}
 """Options that not every mode has, with the modes that have them."""
 
 
@@ -54,6 +61,8 @@ class Train:
     """Frames that a reconstructor's streams advance in a step, at most 41.  Default: 12."""
     validate_every: Count | None = None
     """Steps between validations.  Default: 1000, of reconstructors 500."""
+    validate_passes: Count | None = None
+    """Passes of each validation along its eight streams.  Default: 24."""
     resume: bool = True
     """Continue from the folder's checkpoint, if there is one."""
 

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from denoiser.recipe import RECIPES
-from denoiser.simulated import AGES, SPEEDS, SimulatedStreams
+from denoiser.simulated import AGES, SHAPES, SPEEDS, Bank, SimulatedStreams
 from scenes.catalogue import make_scene
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels import fast
@@ -223,6 +223,13 @@ def test_rows_advance_alone(bank):
         for name in ("noisy", "clean", "light", "begins"):
             assert torch.equal(getattr(a, name)[1], getattr(b, name)[0])
             assert torch.equal(getattr(a, name)[others], getattr(c, name))
+
+
+def test_a_bank_for_few_streams_holds_no_more_than_they_can_show():
+    few = Bank.drawn(3, torch.device("cpu"), textures=40, units=4, streams=1)
+    many = Bank.drawn(3, torch.device("cpu"), textures=7, units=2, streams=1000)
+    assert (len(few.textures), len(few.gain)) == (SHAPES + 1, 1)
+    assert (len(many.textures), len(many.gain)) == (7, 2)
 
 
 def test_a_patch_larger_than_the_units_is_refused(bank):

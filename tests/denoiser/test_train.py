@@ -22,14 +22,14 @@ from spikecam_env.errors import InputError
 
 @pytest.fixture
 def small(monkeypatch, bank):
-    """Few textures and units; four streams to validate on, for as few passes as count."""
+    """Few textures and units; four streams to validate on."""
     monkeypatch.setattr(Bank, "drawn", lambda *_, **__: bank)
     monkeypatch.setattr(training, "VALIDATION_STREAMS", 4)
-    monkeypatch.setattr(training, "VALIDATION_PASSES", 3)
 
 
-def weights_after(out, steps, mode="best", **options):
-    config = TrainConfig(mode=mode, out=out, steps=steps, batch=2, patch=16, **options)
+def weights_after(out, steps, mode="best", validate_passes=3, **options):
+    """After a training with validations of as few passes as count."""
+    config = TrainConfig(mode=mode, out=out, steps=steps, batch=2, patch=16, validate_passes=validate_passes, **options)
     return load_weights(train(config, progress=False))[1].state_dict()
 
 
@@ -61,9 +61,8 @@ def test_a_resumed_run_goes_on(small, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("mode, passes", [("paper", 13), ("best", 3)])
-def test_a_run_leaves_weights_and_a_curve(small, tmp_path, monkeypatch, mode, passes):
-    monkeypatch.setattr(training, "VALIDATION_PASSES", passes)
-    weights_after(tmp_path, 3, mode, validate_every=2)
+def test_a_run_leaves_weights_and_a_curve(small, tmp_path, mode, passes):
+    weights_after(tmp_path, 3, mode, validate_every=2, validate_passes=passes)
     curve = json.loads((tmp_path / "curve.json").read_text())
     assert [point["step"] for point in curve] == [2]
     assert 0 < curve[0]["network_db"] < 60 and 5 < curve[0]["interval_db"] < 60 and np.isfinite(curve[0]["loss"])
@@ -80,7 +79,7 @@ def test_a_validation_changes_nothing_in_the_weights(small, tmp_path):
 
 def test_the_judge_is_the_same_at_every_validation(small):
     torch.manual_seed(0)
-    network, judge = RECIPES["best"].network().train(), Judge(RECIPES["best"], 7, torch.device("cpu"))
+    network, judge = RECIPES["best"].network().train(), Judge(RECIPES["best"], 7, torch.device("cpu"), 3)
     first, again = judge.scores(network), judge.scores(network)
     print(first)
     assert first == again and network.training and set(first) == {"network_db", "mapped_db", "interval_db", "mean_db"}
@@ -177,7 +176,7 @@ def test_a_network_learns_on_a_gpu(small, tmp_path):
     assert all(w.device.type == "cpu" and bool(torch.isfinite(w).all()) for w in weights.values())
 
 
-@pytest.mark.parametrize("name", ["steps", "batch", "seed", "threads", "patch", "validate_every"])
+@pytest.mark.parametrize("name", ["steps", "batch", "seed", "threads", "patch", "validate_every", "validate_passes"])
 @pytest.mark.parametrize("value", [-1, 10**30, 1.5, float("nan"), None, True, "8"])
 def test_a_count_out_of_range_is_named(name, value):
     with pytest.raises(InputError, match=name):

@@ -273,6 +273,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--lr": (*FLOATS, "1e308"),
             "--threads": WORKERS,
             "--validate-every": COUNTS,
+            "--validate-passes": COUNTS,
             "--patch": (*COUNTS, 40, 144),
             "--device": ("", "gpu", "cuda:99", "\x00"),
             "--width": (12,),
