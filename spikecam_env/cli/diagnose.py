@@ -97,7 +97,7 @@ def summary(diagnosis: Diagnosis) -> str:
     if diagnosis.not_bounded and diagnosis.verdict == "none":
         parts += [f"not bounded by these data: {', '.join(name for name, _ in diagnosis.not_bounded)}"]
     if diagnosis.class_ and diagnosis.class_.get("experiment"):
-        parts += ["", f"to tell them apart: {diagnosis.class_['experiment']}"]
+        parts += ["", f"to separate them: {diagnosis.class_['experiment']}"]
     parts += [f"note: {line}" for line in diagnosis.data]
     if diagnosis.gap:
         parts += ["", gap_line(diagnosis.gap)]

@@ -1,14 +1,18 @@
 """Docstrings of this repository as reStructuredText, which Sphinx's autodoc reads.
 
-A docstring here is plain text: a summary, prose with `code`, indented equations, and arguments as `name: meaning` or in
-two columns.  Prose is escaped, indented blocks stay as they stand, arguments and errors become fields.
+A docstring here is plain text: a summary, prose with `code`, indented equations, and the sections Args, Returns, Raises
+and Example.  Arguments may also stand in the prose, as `name: meaning`, or in two columns.  Prose is escaped, indented
+blocks stay as they stand, arguments and errors become fields.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
+from textwrap import dedent
 
+SECTION = re.compile(r"(Args|Returns|Raises|Example):$")
+ENTRY = re.compile(r"^(?=\S)", re.MULTILINE)
 ARGUMENT = re.compile(r"(?:^|\n|  )(?P<names>\w+(?:, \w+)*): ")
 COLUMNS = re.compile(r"^(?P<name>\w+) {2,}(?P<text>\S.*)$")
 RAISES = re.compile(r"(?:^|\n|(?<=[.;])\s+)(?:Raises |Errors: ?|NotReadyError (?=for ))")
@@ -26,7 +30,13 @@ def rendered(text: str, arguments: Collection[str] = ()) -> list[str]:
     examples: list[str] = []
     for paragraph in re.split(r"\n[ \t]*\n", text.strip("\n")):
         lines = paragraph.splitlines() or [""]
-        if lines[0].lstrip().startswith(">>>"):
+        section = SECTION.match(lines[0])
+        inside = dedent("\n".join(lines[1:]))
+        if section and section[1] == "Example":
+            examples += [*inside.splitlines(), ""]
+        elif section:
+            fields += _section(section[1], inside)
+        elif lines[0].lstrip().startswith(">>>"):
             examples += [*lines, ""]
         elif all(line.startswith("  ") for line in lines):
             prose += ["::", "", *(f"   {line}" for line in lines), ""]
@@ -35,6 +45,15 @@ def rendered(text: str, arguments: Collection[str] = ()) -> list[str]:
             fields += found
             prose += [*plain, ""] if plain else []
     return [*prose, *fields, "", *examples]
+
+
+def _section(title: str, text: str) -> list[str]:
+    """The fields of a section; in Args and Raises an entry is `name: meaning`, its further lines indented."""
+    if title == "Returns":
+        return [f":returns: {escaped(_one_line(text))}"]
+    kind = "param" if title == "Args" else "raises"
+    entries = (entry.partition(": ") for entry in ENTRY.split(text) if entry)
+    return [f":{kind} {names}: {escaped(_one_line(meaning))}" for names, _, meaning in entries]
 
 
 def _sorted_out(lines: list[str], arguments: Collection[str]) -> tuple[list[str], list[str]]:
