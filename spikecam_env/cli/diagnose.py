@@ -33,7 +33,8 @@ class Diagnose:
     exclude: tuple[str, ...] = ()
     """Effects not to try."""
     effect_file: EffectFiles = ()
-    """Effects of your own to try too, a Python file each; it is run, so give what you would run.  May be repeated."""
+    """A Python file of your own effects, to try them too.  The file is run: give only files that you trust.  May be
+    repeated."""
     seed: Seed = 0
     """Seed of every simulation; the same seed gives the same result."""
     jobs: Workers = 1
