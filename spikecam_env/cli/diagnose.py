@@ -96,7 +96,7 @@ def summary(diagnosis: Diagnosis) -> str:
     if found:
         parts += ["", table(found)]
     if diagnosis.not_bounded and diagnosis.verdict == "none":
-        parts += [f"not bounded by these data: {', '.join(name for name, _ in diagnosis.not_bounded)}"]
+        parts += [f"no bound from these recordings: {', '.join(name for name, _ in diagnosis.not_bounded)}"]
     if diagnosis.class_ and diagnosis.class_.get("experiment"):
         parts += ["", f"to separate them: {diagnosis.class_['experiment']}"]
     parts += [f"note: {line}" for line in diagnosis.data]

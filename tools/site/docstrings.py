@@ -53,7 +53,7 @@ def _section(title: str, text: str) -> list[str]:
         return [f":returns: {escaped(_one_line(text))}"]
     kind = "param" if title == "Args" else "raises"
     entries = (entry.partition(": ") for entry in ENTRY.split(text) if entry)
-    return [f":{kind} {names}: {escaped(_one_line(meaning))}" for names, _, meaning in entries]
+    return [line for names, _, meaning in entries for line in _fields(kind, names, meaning)]
 
 
 def _sorted_out(lines: list[str], arguments: Collection[str]) -> tuple[list[str], list[str]]:
@@ -61,7 +61,7 @@ def _sorted_out(lines: list[str], arguments: Collection[str]) -> tuple[list[str]
     prose, fields = [], []
     for piece in _in_columns(lines, arguments):
         if isinstance(piece, tuple):
-            fields.append(_field(*piece))
+            fields += _fields("param", *piece)
             continue
         before, *parts = RAISES.split(piece)
         kept, found = _by_argument(before, arguments)
@@ -98,12 +98,15 @@ def _by_argument(text: str, arguments: Collection[str]) -> tuple[list[str], list
     found = [m for m in ARGUMENT.finditer(text) if set(m["names"].split(", ")) <= set(arguments)]
     ends = [*(m.start() for m in found[1:]), len(text)][: len(found)]
     before = text[: found[0].start()] if found else text
-    fields = [_field(m["names"], text[m.end() : end]) for m, end in zip(found, ends, strict=True)]
+    fields = [
+        field for m, end in zip(found, ends, strict=True) for field in _fields("param", m["names"], text[m.end() : end])
+    ]
     return ([escaped(_one_line(before))] if before.strip() else []), fields
 
 
-def _field(names: str, meaning: str) -> str:
-    return f":param {names}: {escaped(_one_line(meaning))}"
+def _fields(kind: str, names: str, meaning: str) -> list[str]:
+    """A field for each of the names, since Sphinx takes `a, b` for a type and a name."""
+    return [f":{kind} {name}: {escaped(_one_line(meaning))}" for name in names.split(", ")]
 
 
 def _errors(text: str) -> list[str]:

@@ -42,7 +42,7 @@ def test_a_better_candidate_below_the_kept_one_says_why() -> None:
 def test_where_nothing_was_kept_the_best_comes_first_and_the_chosen_says_why_not() -> None:
     rows = ranking([turn(fit("crosstalk", 85.0, draws=4), fit("dead_time", 95.0), fit("lamp_drift", 100.0))], [], 12.0)
     assert [r.name for r in rows] == ["crosstalk", "dead_time", "lamp_drift"] and not any(r.accepted for r in rows)
-    assert rows[0].reason == "not kept: beside the others, or on recordings held out, it explains no more"
+    assert rows[0].reason == "not kept: it explains nothing more beside the others, or on held-out recordings"
 
 
 @pytest.mark.parametrize(
