@@ -84,7 +84,7 @@ def _elsewhere(taken: int, work: Callable[[], None]) -> None:
 
 
 def _processor() -> int:
-    """Which processor this thread is on; -1 where that cannot be told."""
+    """Which processor this thread is on; -1 where the system does not say."""
     return _LIBC.sched_getcpu() if _LIBC is not None else -1
 
 

@@ -93,26 +93,26 @@ _PARAMETERS = ("| parameter | default | unit | bounds | meaning |", "|---|---|--
 
 _CAMERA = f"""## Circuit and frame rate
 
-Every value is checked against its bounds when a circuit, an effect or a model is made, and so is what they do together.
+Every value is checked against its bounds when a circuit, an effect or a model is made; so are their combinations.
 The swing reset_V - reference_V + bias_V is {SWING_V[0]:g} to {SWING_V[1]:g} V. The spread of swings over pixels is at
 most {MOST_SPREAD:g} of the swing, that of capacitances {MOST_SPREAD:g} of the capacitance, the noise of a reset
 {MOST_KAPPA:g} of the swing. A single pixel of a spread keeps {LEAST_SHARE:g} of the nominal swing and capacitance.
-Why: [decisions.md](decisions.md).
+[Decisions](decisions.md) has the reasons.
 """
 
 _HEAD = """# Effects
 
-Made by `python -m tools.effects_page docs/effects.md` from the effects' own files, one a file in
-`spikecam_env/sensor/effects`; a test keeps it up to date. Do not edit it.
-
-Effects act in physical order, whatever order a model lists them in. x is the charge of a frame over the threshold phi,
+Effects act in physical order, in whatever order a model lists them. x is the charge of a frame over the threshold phi,
 T the mean interval in frames, N the electrons to a threshold, kappa the relative noise of a spike's threshold; A_k is
-E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of spike times t. At the strength said to change nothing, no bit changes.
+E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of spike times t. Each entry states the strength at which no bit changes.
+
+This page is made by `python -m tools.effects_page docs/effects.md` from the effects' files in
+`spikecam_env/sensor/effects`, and a test compares it with them: edit those files, not the page.
 """
 
 _TAIL = '''## Adding an effect
 
-Of your own, outside of this package: [own_effect.md](own_effect.md). In it: one new file.
+[Your own effect](own_effect.md) adds one outside the package. Inside it an effect is one new file, for example
 `spikecam_env/sensor/effects/slow_shutter.py`:
 
 ```python
@@ -149,29 +149,33 @@ class SlowShutter(Effect):
         return light.scaled(1.0 - mean_decay(now.start, tau) if tau else 1.0), dark, memory
 ```
 
-That is all: the catalogue finds it, `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))` and `[[effect]]`
-in a model file take it, `engine="auto"` picks an engine that carries it, and this page has its entry when it is made
-anew. `acts` says how it acts within a frame, and its docstring how far that is exact: charge is integrated over the
-frame, not sampled at its middle. `now.start` is when each frame begins, `spikecam_env/sensor/frame_moments.py` has
-closed forms, and with `wants_rise = True` a `Charge` says how light rises within the frame; a frame that holds keys
-then comes piece by piece. `off_the_line` gives an effect's error in such a frame: beyond 1 % it is refused.
+Nothing else is needed. The catalogue finds the file; `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))`
+and `[[effect]]` in a model file accept it; `engine="auto"` picks an engine that supports it; and this page gets its
+entry when it is made again. `acts` declares how the effect acts within a frame, and its docstring states the accuracy:
+charge is integrated over the frame, not sampled at its middle. `now.start` is the start of each frame, and
+`spikecam_env/sensor/frame_moments.py` has closed forms. With `wants_rise = True` a `Charge` holds the rise of light
+within the frame, and a frame with keys inside is given piece by piece. `off_the_line` returns an effect's error in such
+a frame; beyond 1 % the frame is refused.
 
-The tests in `tests/sensor/effects/test_every_effect.py` then check, from its declaration alone: that strength zero
-changes no bit, alone and among all others; that its hooks change nothing in place; the same bits however a stream is
-cut, saved and restored; docs, bounds, twins that exist, a declaration in order; and a test of your own,
-`test_slow_shutter_...`, of its law.
+The tests in `tests/sensor/effects/test_every_effect.py` check from the declaration alone: strength zero changes no bit,
+alone and among all others; hooks change nothing in place; the bits are the same however a stream is cut, saved and
+restored; docs, bounds and declaration are in order, and the named twins exist; and there is a test
+`test_slow_shutter_...` of the law, which you write.
 
-Which hook: `imprint` for a fixed pattern, `image` for static optics (neither costs anything a frame; every engine
-carries them); `collect`, `compare`, `read_out` for what happens whatever fires: they are given a block of frames,
-arrays of (frames, rows, columns), which the fast engine runs as they stand. A `Charge` keeps a picture and a number a
-frame apart: `light.scaled(numbers)` costs nothing a pixel, `dark.plus(Few(pixels, charge))` only in these few, and
-`Charge(f(light.values))` an array. Reactions to spikes are written frame by frame, `react`, `after_reset`,
-`spiked`, for the reference, and declared in `feedback` for the fast engine; without a declaration that engine refuses
-the effect by name and `engine="auto"` takes the reference.
+| hook | for | cost and engines |
+|---|---|---|
+| `imprint`, `image` | a fixed pattern; static optics | none a frame; every engine |
+| `collect`, `compare`, `read_out` | charge, threshold, bits, whatever fires | blocks of frames; reference and fast |
+| `react`, `after_reset`, `spiked` | reactions to spikes | frame by frame; reference, and fast with `feedback` |
 
-An effect's memory is made by `begin`, handed to each hook and returned by it; by default it is a random generator
-of the effect's own, so that no other effect's draws change. Properties of the unit (which pixels have a trap) `begin`
-draws from `pattern`, the same in all recordings by one unit. Time is `now.number`, absolute, never a count of calls.
+Blocks are arrays of (frames, rows, columns). Reactions are declared in `feedback` for the fast engine. Without that
+declaration it refuses the effect by name, and `engine="auto"` takes the reference.
+A `Charge` holds a picture and a number a frame separately: `light.scaled(numbers)` costs nothing a pixel,
+`dark.plus(Few(pixels, charge))` only these few pixels, and `Charge(f(light.values))` an array.
+
+`begin` makes an effect's memory; each hook gets it and returns it. By default it is a random generator of the effect's
+own, so that no other effect's draws change. `begin` draws properties of the unit, such as the pixels with a trap, from
+`pattern`, the same in all recordings of one unit. Time is `now.number`, absolute, never a count of calls.
 '''
 
 

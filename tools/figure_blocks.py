@@ -97,7 +97,7 @@ def ladder_block(made: Mapping[str, Any]) -> str:
     """The rungs of a ladder (docs/ladder.json) beside the model that was simulated."""
     truth = SensorModel.preset(made["truth"])
     rows = [_rung(r, truth, made["first"], made["statistics"]) for r in made["rungs"]]
-    table = Table(("rung", "gap", "statistics off", f"`{made['truth']}`", "cannot be told from"), tuple(rows))
+    table = Table(("rung", "gap", "statistics off", f"`{made['truth']}`", "tied with"), tuple(rows))
     return _joined([f"*By {made['version']}. Written by `{MADE_BY}`.*", markdown(table)])
 
 

@@ -2,7 +2,7 @@
 
 spikecam bench loop
 
-Beside it, block by block on the same spikes, the denoiser as it was first: the float32 network, called as in training.
+Beside it, block by block on the same spikes, a plain denoiser: the float32 network, called as in training.
 Other programs slow a machine, so both are compared by the processor's time.
 """
 
@@ -62,10 +62,10 @@ def bench_loop(
 ) -> dict[str, Rows]:
     """Tables by title, one a scene.
 
-    seconds: for each scene, the way before included; three blocks of 64 frames at least.  threads: of torch, default
+    seconds: for each scene, plain denoiser included; three blocks of 64 frames at least.  threads: of torch, default
     its own; light and camera take NUMBA_NUM_THREADS.  engine: of the denoiser.
     Columns: stage, frames/s (wall clock) and x real time (40 000 frames a second), processor ms/frame, of the whole, %
-    (processor's time), x the first way (of the denoiser and of the whole, processor's time: medians over blocks).
+    (processor's time), x plain float32 (of the denoiser and of the whole, processor's time: medians over blocks).
     """
     with torch_settings(threads):
         scenes: dict[str, Callable[[], Scene]] = {
@@ -80,7 +80,7 @@ def bench_loop(
 
 
 def loop_table(scene: Scene, seconds: float, engine: str = "torch") -> Rows:
-    """Rows of one scene: its stages, the whole, and the denoiser as it was first."""
+    """Rows of one scene: its stages, the whole, and the plain denoiser."""
     blocks = _timed(scene, seconds, engine)
     rows = []
     spent = {stage: np.median([block[stage] for block in blocks], axis=0) for stage in (*STAGES, FIRST_WAY)}
@@ -94,7 +94,7 @@ def loop_table(scene: Scene, seconds: float, engine: str = "torch") -> Rows:
                 "x real time": 1 / wall / FRAME_RATE_HZ,
                 "processor ms/frame": 1e3 * processor,
                 "of the whole, %": 100 * processor * BLOCK / spent[WHOLE][1] if stage in (*STAGES, WHOLE) else None,
-                "x the first way": _gain(blocks, stage),
+                "x plain float32": _gain(blocks, stage),
             }
         )
     return rows

@@ -21,14 +21,14 @@ class Bench:
     what: tyro.conf.Positional[
         Literal["sensor", "effects", "online", "live", "loop", "env", "scenes", "renderers", "dataset"]
     ]
-    """sensor: pixel-steps a second of numpy, reference and fast.  effects: what each costs, over the base model.
-    online: denoised frames a second.  live: pictures a second of a stream as it comes, frames lost, latency, and the
-    error of leaving passes out (some minutes).  loop: scene to denoised rates, each stage and the whole.  env: steps a
-    second of 1, 16 and 64 environments, one way and another.  scenes: frames of light a second, how far they are from
-    the truth, renderers, scene to spikes, and whether the flow is right (some minutes).  renderers: how fast and how
-    exact each back-end of this machine is.  dataset: frames a second into files."""
+    """sensor: pixel-steps a second of numpy, reference and fast.  effects: cost of each effect over the base model.
+    online: denoised frames a second.  live: pictures a second of a live stream, frames lost, latency, and the error of
+    skipping passes (some minutes).  loop: scene to denoised rates, each stage and the whole.  env: steps a second of
+    1, 16 and 64 environments, by each way to step them.  scenes: frames of light a second and their error, renderers,
+    scene to spikes, and the error of the flow (some minutes).  renderers: speed and error of each back-end of this
+    machine.  dataset: frames a second into files."""
     out: Path | None = None
-    """Where to write the figures as JSON."""
+    """File for the figures, as JSON."""
     json: bool = False
     """Print the figures as JSON, and no table."""
 

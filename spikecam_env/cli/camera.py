@@ -25,10 +25,10 @@ class Camera:
     without: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME")] = ()
     """Remove an effect from the model; may be repeated."""
     effect_file: EffectFiles = ()
-    """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
+    """A Python file of your own effects.  The file is run: give only files that you trust.  May be repeated."""
 
     frame_rate: float | None = None
-    """Frames a second; default: the model's, 40 000 in the presets.  Light is a frame's, dark current a second's."""
+    """Frames a second; default: the model's, 40 000 in the presets.  Light is per frame, dark current per second."""
 
     def load(self) -> SensorModel:
         """The model as asked; raises InputError for an unknown model, effect or parameter."""

@@ -33,7 +33,8 @@ class Diagnose:
     exclude: tuple[str, ...] = ()
     """Effects not to try."""
     effect_file: EffectFiles = ()
-    """Effects of your own to try too, a Python file each; it is run, so give what you would run.  May be repeated."""
+    """A Python file of your own effects, to try them too.  The file is run: give only files that you trust.  May be
+    repeated."""
     seed: Seed = 0
     """Seed of every simulation; the same seed gives the same result."""
     jobs: Workers = 1
@@ -95,9 +96,9 @@ def summary(diagnosis: Diagnosis) -> str:
     if found:
         parts += ["", table(found)]
     if diagnosis.not_bounded and diagnosis.verdict == "none":
-        parts += [f"not bounded by these data: {', '.join(name for name, _ in diagnosis.not_bounded)}"]
+        parts += [f"no bound from these recordings: {', '.join(name for name, _ in diagnosis.not_bounded)}"]
     if diagnosis.class_ and diagnosis.class_.get("experiment"):
-        parts += ["", f"to tell them apart: {diagnosis.class_['experiment']}"]
+        parts += ["", f"to separate them: {diagnosis.class_['experiment']}"]
     parts += [f"note: {line}" for line in diagnosis.data]
     if diagnosis.gap:
         parts += ["", gap_line(diagnosis.gap)]

@@ -22,7 +22,7 @@ class List:
     """
 
     effect_file: EffectFiles = ()
-    """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
+    """A Python file of your own effects.  The file is run: give only files that you trust.  May be repeated."""
 
     def run(self) -> None:
         from spikecam_env.cli.table import table
@@ -41,7 +41,7 @@ class Show:
     name: tyro.conf.Positional[str]
     """Effect to explain."""
     effect_file: EffectFiles = ()
-    """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
+    """A Python file of your own effects.  The file is run: give only files that you trust.  May be repeated."""
 
     def run(self) -> None:
         from spikecam_env.cli.table import table

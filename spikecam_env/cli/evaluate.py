@@ -52,8 +52,8 @@ class Quick:
 
 @dataclass
 class Evaluate:
-    """How much a denoiser helps (docs/tables.md, docs/evaluation.md), agents' tasks (docs/environments.md), agents
-    (docs/agents.md).
+    """Measure how much a denoiser helps (docs/tables.md, docs/evaluation.md), and how well policies and agents do their
+    tasks (docs/environments.md, docs/agents.md).
 
     example:  spikecam evaluate quick --out evaluation
     """

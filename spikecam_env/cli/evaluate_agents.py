@@ -25,7 +25,7 @@ MOST_EPISODES = 1000
 class Agents:
     """Train agents on tasks and print the scores that they reach on test episodes (docs/agents.md).
 
-    A score of 0 is that of doing nothing, of 1 the oracle's.  What is in OUT already is not done again.
+    A score of 0 is that of doing nothing, of 1 the oracle's.  Runs that are in OUT already are not repeated.
 
     example:  spikecam evaluate agents --tasks Catch-v1 --observations tfp frame30 --seeds 2 --out study
     """

@@ -18,7 +18,7 @@ MOST_EPISODES = 1000
 
 @dataclass
 class Tasks:
-    """Print how well an oracle, doing nothing and random actions do at every task (docs/environments.md).
+    """Score the oracle, doing nothing and random actions on every task (docs/environments.md).
 
     The oracle knows where the target is, and turns the same motor.  Performance is 0 to 1: the share of the time on the
     target, or of the episodes that succeed.  A score is 0 for doing nothing, 1 for the oracle.  Tasks of version 1 are

@@ -14,7 +14,7 @@ from spikecam_env.cli.options import Checked, Seed
 
 @dataclass
 class Truth:
-    """Compare with light that was seen: a recording's other half, fixed pattern where all moves, measured cameras.
+    """Compare with measured truth: a recording's other half, the fixed pattern of a moving one, measured cameras.
 
     Without recordings the simulated tests alone are run.  Options of reading a recording go into a side file beside
     it (docs/recordings.md).

@@ -32,7 +32,7 @@ class FilmToSpikes:
     """A video; a folder of pictures in the order of their numbers; a .csv file whose first line is name,time_s; or a
     .npy array (T, h, w) or (T, h, w, 3)."""
     out: Path
-    """Where to; .h5 (bits with attributes), .dat (raw Vidar bits, geometry in .dat.json) or .npz (key `spikes`)."""
+    """Output file: .h5 (bits with attributes), .dat (raw Vidar bits, geometry in .dat.json) or .npz (key `spikes`)."""
     film_rate: Positive | None = None
     """Pictures a second when the film was taken; default: its time stamps.  A folder and an array need it."""
     slow: Positive = 1.0

@@ -25,7 +25,7 @@ class Ladder:
     model: str = "ideal"
     """The first rung: a preset's name, or a model file (.toml)."""
     effect_file: EffectFiles = ()
-    """Effects of your own, a Python file each; it is run, so give what you would run.  May be repeated."""
+    """A Python file of your own effects.  The file is run: give only files that you trust.  May be repeated."""
     seed: Seed = 0
     """Seed of every simulation; the same seed gives the same result."""
     jobs: Workers = 1

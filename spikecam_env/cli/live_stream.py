@@ -45,7 +45,7 @@ class Live:
     seconds: Positive | None = None
     """End after so long."""
     speed: Positive | None = None
-    """Of a file or a scene: 1, real time, is the camera's frame rate, 40 000 frames a second."""
+    """Speed of a file or a scene.  Default: 1, real time, the camera's frame rate of 40 000 frames a second."""
     loop: bool = False
     """Begin a file again when it is over."""
     pictures: Annotated[float, Checked(checked_number, least=0.01, most=MOST_PICTURES_S)] = 30.0
@@ -55,7 +55,7 @@ class Live:
     weights: Path | None = None
     """A checkpoint of `spikecam train` instead of the mode's shipped weights."""
     passes: Count = 1
-    """Passes of the network for a picture: more know more of what was before it, and take longer."""
+    """Passes of the network for a picture; more passes use more of the frames before it, and take longer."""
     calibration: Path | None = None
     """`best` only: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     size: Size = (250, 400)

@@ -44,7 +44,7 @@ class Play:
     id: tyro.conf.Positional[str]
     """Environment, with or without `spikecam_env/`, e.g. Track-v1, Catch-v1, Fan-v0 (docs/environments.md)."""
     policy: str | None = None
-    """Who steers: keyboard, oracle, nothing, random, an agent's name or its file (.pt); default: keyboard in a window,
+    """Policy: keyboard, oracle, nothing, random, an agent's name or its file (.pt); default: keyboard in a window,
     oracle in a film."""
     film: Path | None = None
     """Write a film (.mp4) of it instead of opening a window; default where there is no display: ID.mp4."""
@@ -59,7 +59,7 @@ class Play:
     slow: Annotated[float, Checked(checked_number, least=1.0, most=MOST_SLOW)] = 40.0
     """Times slower than life: 40 shows a millisecond of the scene, 40 frames, in 40 ms."""
     split: Literal["train", "test"] = "test"
-    """Which episodes of a task of version 1."""
+    """Training or test episodes of a task of version 1."""
     seed: Seed = 0
     """Seed of the first episode; each further episode has the next number."""
     size: Size | None = None

@@ -26,13 +26,13 @@ class Reading:
     layout: Literal["bits", "packets"] | None = None
     """Whether a .dat file holds nothing but bits, or the 64-byte packets of a megapixel camera."""
     key: str | None = None
-    """Array of an .npz, .mat or foreign .h5 file to read (a path in .h5); found by itself where only one can be it."""
+    """Array of an .npz, .mat or foreign .h5 file to read (a path in .h5); needed only if several can be the stream."""
     item: Whole | None = None
     """Which stream of a batch, an array of four axes."""
     batch_axis: Literal[0, 1, 2, 3] | None = None
     """Axis along which the streams of a batch lie; 0 if not given."""
     time_axis: Literal[0, 1, 2] | None = None
-    """Which axis of an array is time; found by itself where that is clear."""
+    """Axis of time in an array; needed only if the spikes and the shape do not show it."""
 
     def options(self) -> dict[str, Any]:
         """Those that were given, for `read_recording`."""

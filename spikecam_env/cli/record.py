@@ -18,7 +18,7 @@ class Record:
     """
 
     out: Path
-    """Where to; .h5 (bits with attributes), .dat (raw Vidar bits, geometry in .dat.json) or .npz (key `spikes`)."""
+    """Output file: .h5 (bits with attributes), .dat (raw Vidar bits, geometry in .dat.json) or .npz (key `spikes`)."""
     scene: str = "disk"
     """What the camera looks at: the rotating disk, or another scene of `spikecam scenes`."""
     frames: Count = 4000

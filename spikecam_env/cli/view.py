@@ -48,9 +48,9 @@ class View:
     denoise: bool = True
     """Show the online denoiser's picture (`best`) too."""
     policy: str = "oracle"
-    """Who steers in an episode: oracle, nothing, random, an agent's name or its file (.pt)."""
+    """Policy of an episode: oracle, nothing, random, an agent's name or its file (.pt)."""
     split: Literal["train", "test"] = "test"
-    """Which episodes of a task of version 1."""
+    """Training or test episodes of a task of version 1."""
     seed: Seed = 0
     """Seed of the scene and the camera's unit, or of the episode."""
     size: Size | None = None

@@ -75,14 +75,34 @@ def diagnose(
 ) -> Diagnosis:
     """Find where a measured campaign and a model disagree, which effect is missing, and how large it is.
 
-    campaign: a folder in the format spikecam-campaign/1.  model: a SensorModel, a preset's name or a TOML path.
-    candidates: names to try, default the whole catalogue; exclude: names to leave out.  Same seed, same answer.
-    jobs: threads, which change no bit.  effort: times the campaign may be simulated before nothing more is begun that
-    an answer can do without, such as a third effect; infinite for whatever it takes.  static_only: of unknown scenes
-    that move, look at the pixels that do not.  search: `forward`, or `race`, which is experimental.  settings: tuned
-    numbers, by default `DiagnosisSettings()`.  Raises InputError
-    for an unreadable campaign, an unknown name, no effort, or too few static recordings of known light to refit the
-    unit by.
+    Args:
+        campaign: read already, or its folder (format spikecam-campaign/1).
+        model: a SensorModel, a preset's name or a TOML path.
+        candidates: names of effects to try; default the whole catalogue.
+        exclude: names of effects not to try.
+        seed: of all simulations; the same seed gives the same answer.
+        jobs: threads; they change no bit.
+        effort: budget: how often the campaign may be simulated before optional steps are skipped; inf for no limit.
+        twin_count: simulations of the campaign under the model.
+        templates: of the candidates; default those that ship, others are simulated.
+        static_only: whether to use only the static pixels of unknown scenes that move.
+        search: `forward`, or `race`, which is experimental.
+        settings: the tuned numbers; default `DiagnosisSettings()`.
+        progress: whether to name each stage as it begins.
+
+    Returns:
+        The answer; `write` and `write_report` save it.
+
+    Raises:
+        InputError: for an unreadable campaign, an unknown name, no effort, or too few static recordings of known light
+            to refit the unit by.
+
+    Example:
+        >>> flats = [Dark(), *(Flat(radiance=level) for level in (0.1, 0.3))]
+        >>> campaign = write_campaign("camera", "scsim", shape=(8, 8), frames=400, recordings=flats)
+        >>> diagnosis = diagnose(campaign, "scsim", candidates=["dead_time"], twin_count=6, progress=False)
+        >>> diagnosis.sentence
+        'No gap: these recordings and the model scsim agree to within the noise.'
     """
     if search not in SEARCHES:
         raise unknown_name("search", search, SEARCHES)

@@ -109,7 +109,29 @@ def ladder(
     twin_count: int = 12,
     progress: bool = False,
 ) -> Ladder:
-    """Climb from `model` to one that explains a campaign.  Same seed, same answer; errors as `diagnose`."""
+    """Climb from a simple model to one that explains a campaign, an effect a rung.
+
+    Args:
+        campaign: read already, or its folder (format spikecam-campaign/1).
+        model: the first rung: a SensorModel, a preset's name or a TOML path.
+        seed: of all simulations; the same seed gives the same answer.
+        jobs: threads; they change no bit.
+        twin_count: simulations of the campaign under the last model.
+        progress: whether to show a bar.
+
+    Returns:
+        The rungs, first to last; `write` saves them.
+
+    Raises:
+        InputError: as `diagnose` does.
+
+    Example:
+        >>> flats = [Dark(), *(Flat(radiance=level) for level in (0.1, 0.3))]
+        >>> campaign = write_campaign("camera", "scsim", shape=(8, 8), frames=400, recordings=flats)
+        >>> rungs = ladder(campaign, "ideal", twin_count=4).rungs
+        >>> sorted(rung.added.name for rung in rungs if rung.added)
+        ['conversion_gain_spread', 'dark_current', 'dark_current_spread', 'shot_noise']
+    """
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     first = model if isinstance(model, SensorModel) else SensorModel.load(model)
     case = read_case(measured, seed, jobs)

@@ -135,7 +135,7 @@ def why_rejected(misfit: float, before: float, best: str, asked: float) -> str:
     if removed < LEAST_STATED:
         return "explains nothing"
     if removed < asked:
-        return f"removes {removed:.1f} of the misfit, and {asked:g} are asked of an effect"
+        return f"removes {removed:.1f} of the misfit; an effect must remove {asked:g}"
     return f"larger misfit than {best.replace('_', ' ')}"
 
 
@@ -233,16 +233,46 @@ class Conclusion:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The answer.  patched: the model with what was found, or with an empirical patch; loads back as a model.
+    """The answer of a diagnosis.
 
-    not_bounded: (name, what is needed) of effects that were not found and that no bound can be stated of.
-    class_: for verdict "class": {"members": [...], "experiment": "..."}.  unknown: description of the structure.
-    remainder: for verdict "named": what is left beyond chance, None where nothing is.
-    candidates, exclude: as asked for; None: all of the catalogue.  effort: campaigns that might be
-    simulated.  simulated: recordings that were, but for the page's own.  effect_files: of a user's own effects, among
-    the model's and those that were tried.  motion: of recordings said to be static; static_only: whether the pixels
-    that move were left out.  search: by what search it was found.  settings: those that were not the defaults, by
-    "stage.name".
+    Args:
+        verdict: one of `VERDICTS`.
+        sentence: the answer in words.
+        effects: named effects.
+        unknown: for verdict `unknown`, the structure of the difference.
+        class_: for verdict `class`, {"members": [...], "experiment": "..."}.
+        parameters: of the model's effects whose strength is off: {effect: {measured, nominal, ratio}}.
+        data: notes on the recordings; for verdict `data`, the contradictions.
+        gap: on the held-out recordings; None where nothing is held out.
+        statistics: every statistic, measured and simulated.
+        ranking: candidates that were tried.
+        not_testable: (name, what is needed) of effects that these recordings cannot show.
+        bounds: upper bounds of effects that were not found.
+        patched: the model with the effects found, or with an empirical patch; loads back as a model.
+        model_name: of the model that was tested.
+        campaign: its folder.
+        seed: of all simulations.
+        stages: seconds by stage.
+        candidates, exclude: as given to `diagnose`; None: all of the catalogue.
+        evidence: recordings and twins that the report draws.
+        simulated: number of recordings simulated, without those that the report draws.
+        effort: the budget [campaigns].
+        not_bounded: (name, what is needed) of effects that were not found and have no bound.
+        effect_files: of a user's own effects, among the model's and those tried.
+        motion: of recordings that are labelled static.
+        static_only: whether moving pixels were left out.
+        remainder: for verdict `named`, the difference beyond chance that remains; None where nothing does.
+        search: `forward` or `race`.
+        settings: those that differ from the defaults, by "stage.name".
+
+    Example:
+        >>> flats = [Dark(), *(Flat(radiance=level) for level in (0.1, 0.3))]
+        >>> campaign = write_campaign("camera", "scsim", shape=(8, 8), frames=400, recordings=flats)
+        >>> diagnosis = diagnose(campaign, "scsim", candidates=["dead_time"], twin_count=6, progress=False)
+        >>> diagnosis.verdict, diagnosis.effects
+        ('none', ())
+        >>> diagnosis.to_json()["format"]
+        'spikecam-diagnosis/1'
     """
 
     verdict: str

@@ -58,8 +58,8 @@ def check_bent(
             if off.flat[worst] > ALLOWED:
                 row, column = divmod(worst, now.shape[1])
                 raise InputError(
-                    f"{effect.name} knows light within a frame as a straight line, and that of frame {frame} bends: of "
-                    f"pixel ({row}, {column})'s charge up to {off.flat[worst]:.1%} would be off, {ALLOWED:.0%} is "
+                    f"{effect.name} takes light to be linear within a frame, but it bends in frame {frame}: up to "
+                    f"{off.flat[worst]:.1%} of the charge of pixel ({row}, {column}) would be wrong, {ALLOWED:.0%} is "
                     "allowed; give keys at whole frames, make the effect weaker, or allow it with "
                     "SpikeSensor(..., bent_light='allow')"
                 )

@@ -171,7 +171,7 @@ def time_axis(stored: NDArray[np.uint8], given: int | None, stated: int | None, 
     if len(known) == 1:
         return known[0], "sensor shape"
     raise InputError(
-        f"{path}: cannot tell which axis of {stored.shape} is time, from the spikes or from the shape; "
+        f"{path}: neither the spikes nor the shape {stored.shape} show which axis is time; "
         "give time_axis=0 (time first) or time_axis=2 (time last)"
     )
 

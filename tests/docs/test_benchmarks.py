@@ -24,6 +24,10 @@ def test_a_version_is_a_column_and_a_point(tmp_path: Path) -> None:
     assert page.count("<circle") == 4
 
 
+def test_figures_have_three_digits_and_no_exponent() -> None:
+    assert [benchmarks.three_digits(v) for v in (12_260.0, 0.003891, 155.4)] == ["12 300", "0.00389", "155"]
+
+
 def test_points_lie_as_their_values_do() -> None:
     drawn = benchmarks.drawing([1.0, None, 2.0])
     assert 'cx="5.0" cy="14.0"' in drawn and 'cx="115.0" cy="5.0"' in drawn

@@ -182,7 +182,7 @@ def class_() -> Diagnosis:
     members = ["photo_response_nonlinearity", "ir_drop"]
     return replace(
         base, verdict="class", effects=(),
-        sentence="Your camera has a nonlinear response or an IR drop: these recordings cannot tell which; either "
+        sentence="Your camera has a nonlinear response or an IR drop: these recordings do not show which; either "
         "removes 96 % of the gap.",
         class_={"members": members, "experiment": "Cover every second row and repeat the flat at level 0.6: IR drop "
                 "halves, a nonlinearity stays."},

@@ -130,7 +130,7 @@ def test_what_shows_in_nothing_but_motion_held_out_is_found_and_not_called_a_che
     found = asked(written(tmp_path / "held", MODEL.with_effect(LAG), design), candidates=ONLY)
     assert found.verdict == "named" and [e.name for e in found.effects] == ["photodiode_lag"]
     assert found.effects[0].parameters["fraction"].value == pytest.approx(0.08, rel=0.15)
-    assert Note.ONLY_HELD_OUT_DISAGREE in found.data and "which told parameters too" in found.sentence
+    assert Note.ONLY_HELD_OUT_DISAGREE in found.data and "which were fitted too" in found.sentence
 
 
 def test_so_it_is_beside_an_effect_that_the_others_have_shown(tmp_path):
@@ -183,7 +183,7 @@ def test_the_same_seed_gives_the_same_answer(lagging, only):
 
 def test_what_was_simulated_is_counted(only, nothing):
     assert min(only.simulated, nothing.simulated) >= FEW * len(DESIGN)
-    assert not any("not looked for" in note for note in only.data), "the default is enough for one effect"
+    assert not any("Skipped" in note for note in only.data), "the default is enough for one effect"
     assert "--effort" not in command_of(only)
     assert command_of(replace(only, effort=5.0)).endswith("--effort 5")
     assert command_of(replace(only, search="race")).endswith("--search race")

@@ -59,7 +59,7 @@ def test_a_terminal_is_told_the_verdict_and_what_was_found(verdict: str) -> None
         assert (
             "modulation (frequency 2000 Hz)" in printed
             and "0.07 %" in printed
-            and "not bounded by these data: blooming" in printed
+            and "no bound from these recordings: blooming" in printed
         )
 
 

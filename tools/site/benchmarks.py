@@ -37,9 +37,14 @@ def _section(folder: Path, bench: str, versions: list[str]) -> Iterator[str]:
     yield from (f"## {bench}", "", f"`spikecam bench {bench}`", "")
     yield from (f"| measured | figure | {' | '.join(found)} | |", f"|---|---|{'---|' * len(found)}---|")
     for (what, figure), values in figures(found).items():
-        cells = (f"{values[v]:.3g}" if v in values else "" for v in found)
+        cells = (three_digits(values[v]) if v in values else "" for v in found)
         yield f"| {what} | {figure} | {' | '.join(cells)} | {drawing([values.get(v) for v in found])} |"
     yield from ("", *(f"- {version}: {data['machine']}" for version, data in found.items()), "")
+
+
+def three_digits(value: float) -> str:
+    """A figure to three digits, with a space between thousands."""
+    return f"{float(f'{value:.3g}'):,.10g}".replace(",", " ")
 
 
 def figures(found: dict[str, dict[str, Any]]) -> Figures:

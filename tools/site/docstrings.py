@@ -1,14 +1,18 @@
 """Docstrings of this repository as reStructuredText, which Sphinx's autodoc reads.
 
-A docstring here is plain text: a summary, prose with `code`, indented equations, and arguments as `name: meaning` or in
-two columns.  Prose is escaped, indented blocks stay as they stand, arguments and errors become fields.
+A docstring here is plain text: a summary, prose with `code`, indented equations, and the sections Args, Returns, Raises
+and Example.  Arguments may also stand in the prose, as `name: meaning`, or in two columns.  Prose is escaped, indented
+blocks stay as they stand, arguments and errors become fields.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
+from textwrap import dedent
 
+SECTION = re.compile(r"(Args|Returns|Raises|Example):$")
+ENTRY = re.compile(r"^(?=\S)", re.MULTILINE)
 ARGUMENT = re.compile(r"(?:^|\n|  )(?P<names>\w+(?:, \w+)*): ")
 COLUMNS = re.compile(r"^(?P<name>\w+) {2,}(?P<text>\S.*)$")
 RAISES = re.compile(r"(?:^|\n|(?<=[.;])\s+)(?:Raises |Errors: ?|NotReadyError (?=for ))")
@@ -26,7 +30,13 @@ def rendered(text: str, arguments: Collection[str] = ()) -> list[str]:
     examples: list[str] = []
     for paragraph in re.split(r"\n[ \t]*\n", text.strip("\n")):
         lines = paragraph.splitlines() or [""]
-        if lines[0].lstrip().startswith(">>>"):
+        section = SECTION.match(lines[0])
+        inside = dedent("\n".join(lines[1:]))
+        if section and section[1] == "Example":
+            examples += [*inside.splitlines(), ""]
+        elif section:
+            fields += _section(section[1], inside)
+        elif lines[0].lstrip().startswith(">>>"):
             examples += [*lines, ""]
         elif all(line.startswith("  ") for line in lines):
             prose += ["::", "", *(f"   {line}" for line in lines), ""]
@@ -37,12 +47,21 @@ def rendered(text: str, arguments: Collection[str] = ()) -> list[str]:
     return [*prose, *fields, "", *examples]
 
 
+def _section(title: str, text: str) -> list[str]:
+    """The fields of a section; in Args and Raises an entry is `name: meaning`, its further lines indented."""
+    if title == "Returns":
+        return [f":returns: {escaped(_one_line(text))}"]
+    kind = "param" if title == "Args" else "raises"
+    entries = (entry.partition(": ") for entry in ENTRY.split(text) if entry)
+    return [line for names, _, meaning in entries for line in _fields(kind, names, meaning)]
+
+
 def _sorted_out(lines: list[str], arguments: Collection[str]) -> tuple[list[str], list[str]]:
     """Prose and fields of one paragraph."""
     prose, fields = [], []
     for piece in _in_columns(lines, arguments):
         if isinstance(piece, tuple):
-            fields.append(_field(*piece))
+            fields += _fields("param", *piece)
             continue
         before, *parts = RAISES.split(piece)
         kept, found = _by_argument(before, arguments)
@@ -79,12 +98,15 @@ def _by_argument(text: str, arguments: Collection[str]) -> tuple[list[str], list
     found = [m for m in ARGUMENT.finditer(text) if set(m["names"].split(", ")) <= set(arguments)]
     ends = [*(m.start() for m in found[1:]), len(text)][: len(found)]
     before = text[: found[0].start()] if found else text
-    fields = [_field(m["names"], text[m.end() : end]) for m, end in zip(found, ends, strict=True)]
+    fields = [
+        field for m, end in zip(found, ends, strict=True) for field in _fields("param", m["names"], text[m.end() : end])
+    ]
     return ([escaped(_one_line(before))] if before.strip() else []), fields
 
 
-def _field(names: str, meaning: str) -> str:
-    return f":param {names}: {escaped(_one_line(meaning))}"
+def _fields(kind: str, names: str, meaning: str) -> list[str]:
+    """A field for each of the names, since Sphinx takes `a, b` for a type and a name."""
+    return [f":{kind} {name}: {escaped(_one_line(meaning))}" for name in names.split(", ")]
 
 
 def _errors(text: str) -> list[str]:

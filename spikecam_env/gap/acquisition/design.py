@@ -33,12 +33,31 @@ def write_campaign(
     engine: str = "auto",
     progress: bool = False,
 ) -> Campaign:
-    """Record unit `seed` of a model into a campaign (format spikecam-campaign/1) and read it back.
+    """Record one simulated unit into a campaign (format spikecam-campaign/1), and read it back.
 
-    model: a SensorModel, with any effects; a preset's name or a TOML path.  frames: length of recordings that do not
-    say their own.  recordings: default `standard_design()`.
     Same arguments, same bytes; a run that was stopped goes on where it was.
-    Errors: InputError as `record_takes`, and for light that a recording cannot have.
+
+    Args:
+        folder: of the campaign.
+        model: a SensorModel, with any effects; a preset's name or a TOML path.
+        shape: (rows, columns) [pixels].
+        frames: length of recordings that do not state their own [frames].
+        recordings: in order; default `standard_design()`.
+        seed: of the unit, its fixed pattern and its noise.
+        engine: of `SpikeSensor`.
+        progress: whether to show a bar.
+
+    Returns:
+        The campaign, as `read_campaign` reads it.
+
+    Raises:
+        InputError: as `record_takes` does, and for light that a recording cannot have.
+
+    Example:
+        >>> planned = [Dark(), Flat(radiance=0.2)]
+        >>> campaign = write_campaign("camera", "scsim", shape=(8, 8), frames=200, recordings=planned)
+        >>> [recording.name for recording in campaign.recordings]
+        ['dark', 'flat-0.2']
     """
     camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
     planned = standard_design() if recordings is None else recordings
@@ -50,7 +69,12 @@ def write_campaign(
 
 
 def standard_design() -> tuple[Planned, ...]:
-    """Dark, six flats, a step and bars to fit; three flats between them and a disk to judge."""
+    """Dark, six flats, a step and bars to fit; three flats between them and a disk to judge.
+
+    Example:
+        >>> [p.file_name for p in standard_design() if p.use == "holdout"]
+        ['flat-0.05', 'flat-0.15', 'flat-0.5', 'disk']
+    """
     return (
         Dark(),
         *(Flat(radiance=level) for level in FIT_LEVELS),
@@ -62,7 +86,12 @@ def standard_design() -> tuple[Planned, ...]:
 
 
 def second_voltage(recordings: Sequence[Planned], v_d: float) -> tuple[Planned, ...]:
-    """The recordings, and the dark and flats to fit among them once more at another V_D - V_ref [V]."""
+    """The recordings, and once more, at another V_D - V_ref [V], those of dark and flats to fit.
+
+    Example:
+        >>> [p.file_name for p in second_voltage([Flat(radiance=0.2), Step()], v_d=0.7)]
+        ['flat-0.2', 'step', 'flat-0.2-at-0.7V']
+    """
     again = (p for p in recordings if isinstance(p, Dark | Flat) and p.use == "fit")
     return (*recordings, *(replace(p, v_d=v_d, name=p.name and f"{p.name}-at-{v_d:g}V") for p in again))
 

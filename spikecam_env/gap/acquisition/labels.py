@@ -32,10 +32,22 @@ _COLUMNS = ("file", "radiance", "name", "use", "v_d", "temperature_k", "note", *
 
 @dataclass(frozen=True)
 class Label:
-    """One file of a real camera and what is known of it.
+    """One file of a real camera, its light and its conditions.
 
-    file: in the folder.  radiance: a number, or text as above.  name: default the file's.  use: fit or holdout.
-    v_d: V_D - V_ref [V].  temperature_k: [K].  reading: options of `read_recording` for this file.
+    Args:
+        file: its path in the folder of the recordings.
+        radiance: of even, steady light, 1.0 makes the nominal pixel fire once a frame; or `unknown`, `relative`, or
+            an npz of light over time.
+        name: of the recording; default the file's.
+        use: `fit` or `holdout`.
+        v_d: V_D - V_ref [V].
+        temperature_k: [K].
+        note: free text.
+        reading: options of `read_recording` for this file.
+
+    Example:
+        >>> Label("screen.dat", 0.2, name="screen", reading={"flip": True}).use
+        'fit'
     """
 
     file: str
@@ -49,9 +61,24 @@ class Label:
 
 
 def labels_from_table(path: str | Path) -> tuple[Label, ...]:
-    """Labels from a CSV table: columns `file`, `radiance`; name, use, v_d, temperature_k, note and READING if wanted.
+    """Labels from a CSV table.
 
-    Errors: InputError for an unknown or missing column, an empty label, and a cell that is not a number, with its line.
+    Args:
+        path: of a table with the columns file and radiance, and any of name, use, v_d, temperature_k, note and the
+            options of reading a file.
+
+    Returns:
+        A label a line.
+
+    Raises:
+        InputError: for an unknown or missing column, an empty label, and a cell that is not a number, with its line.
+
+    Example:
+        >>> from pathlib import Path
+        >>> lines = ["file,       radiance, use", "cap-on.dat, 0,        fit", "street.dat, unknown,  holdout"]
+        >>> _ = Path("labels.csv").write_text("\\n".join(lines))
+        >>> [(label.file, label.radiance, label.use) for label in labels_from_table("labels.csv")]
+        [('cap-on.dat', 0.0, 'fit'), ('street.dat', 'unknown', 'holdout')]
     """
     rows = read_table(path, _COLUMNS, ("file", "radiance"))
     labels = tuple(_label(row, f"{path}, line {line}") for line, row in rows)
@@ -63,8 +90,12 @@ def labels_from_table(path: str | Path) -> tuple[Label, ...]:
 def label_from_text(text: str) -> Label:
     """A label written as FILE=RADIANCE, e.g. `wall.npz=unknown`.
 
-    >>> label_from_text("flat.dat=0.2").radiance
-    0.2
+    Raises:
+        InputError: for text of another form.
+
+    Example:
+        >>> label_from_text("flat.dat=0.2").radiance
+        0.2
     """
     file, equals, radiance = text.rpartition("=")
     if not equals or not file:

@@ -55,14 +55,35 @@ def import_campaign(
     progress: bool = False,
     **reading: Any,
 ) -> Campaign:
-    """Make a campaign (format spikecam-campaign/1) of labelled files in `folder`; `out` appears whole.
+    """Make a campaign (format spikecam-campaign/1) of labelled recordings of a real camera; it appears whole.
 
-    frame_rate_hz: of the camera; None where every file says it.  rows, columns: first and stop of the part to keep.
-    holdout_share: this share of each stream of use fit, its end, becomes a recording of use holdout.
-    outside: read files that lie outside of `folder` too, by `..`, from the root, or over symbolic links.
-    reading: options of `read_recording` for all files they apply to; a label's own come first.
-    Errors: InputError for no labels, missing files, files of another size or frame rate than the first, an unknown
-    frame rate, a part that is not in the picture, light of another size, and all that the readers refuse.
+    Args:
+        folder: of the recordings.
+        out: folder for the campaign, new or empty.
+        labels: the files to take, with their light.
+        frame_rate_hz: of the camera [Hz]; None where every file states it.
+        rows, columns: (first, stop) of the part to keep [pixels].
+        holdout_share: share of each recording to fit, at its end, that becomes one held out; 0 up to, not including, 1.
+        radiance_per_unit: radiance of a label of 1.
+        outside: whether to read files outside the folder too, by `..`, from the root, or over symbolic links.
+        progress: whether to show a bar.
+        reading: options of `read_recording` for all files that they apply to; a label's own have precedence.
+
+    Returns:
+        The campaign, as `read_campaign` reads it.
+
+    Raises:
+        InputError: for no labels, missing files, files of another size or frame rate than the first, an unknown frame
+            rate, a part that is not in the picture, light of another size, and everything that the readers refuse.
+
+    Example:
+        >>> from pathlib import Path
+        >>> Path("files").mkdir()
+        >>> np.savez("files/screen.npz", spikes=np.random.default_rng(0).integers(0, 2, (100, 6, 8), np.uint8))
+        >>> campaign = import_campaign("files", "camera", [Label("screen.npz", 0.5)], frame_rate_hz=40_000, time_axis=0,
+        ...                            holdout_share=0.25)
+        >>> [(recording.name, recording.use, recording.frames) for recording in campaign.recordings]
+        [('screen', 'fit', 75), ('screen-holdout', 'holdout', 25)]
     """
     source = Path(folder)
     if not source.is_dir():

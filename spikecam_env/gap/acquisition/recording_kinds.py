@@ -34,10 +34,18 @@ SLOWEST = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Planned:
-    """What all recordings have.
+    """A recording to be made; its subclasses are the kinds of light.
 
-    name: of its files; empty: made from the kind and its level.  use: fit, or holdout for judging.
-    v_d: V_D - V_ref [V], None is the model's own.  frames: length, None is the campaign's.
+    Args:
+        name: of its files; empty: made from the kind and its level.
+        use: `fit`, or `holdout` for judging.
+        v_d: V_D - V_ref [V]; None: the model's own.
+        frames: length [frames]; None: the campaign's.
+
+    Example:
+        >>> planned = [Dark(), Flat(radiance=0.2, use="holdout"), Step(frames=4000)]
+        >>> [(p.file_name, p.use, p.frames) for p in planned if isinstance(p, Planned)]
+        [('dark', 'fit', None), ('flat-0.2', 'holdout', None), ('step', 'fit', 4000)]
     """
 
     kind: ClassVar[str]
@@ -71,7 +79,12 @@ class Planned:
 
 @dataclass(frozen=True, kw_only=True)
 class Dark(Planned):
-    """No light."""
+    """No light.
+
+    Example:
+        >>> Dark().light((4, 6), frames=100).radiance.tolist()
+        [[[0.0]]]
+    """
 
     kind = "dark"
 
@@ -81,7 +94,15 @@ class Dark(Planned):
 
 @dataclass(frozen=True, kw_only=True)
 class Flat(Planned):
-    """An evenly lit screen of one radiance."""
+    """An evenly lit screen.
+
+    Args:
+        radiance: of the screen; 1.0 makes the nominal pixel fire once a frame.
+
+    Example:
+        >>> Flat(radiance=0.5).light((4, 6), frames=100).radiance.tolist()
+        [[[0.5]]]
+    """
 
     kind = "flat"
 
@@ -99,6 +120,15 @@ class Step(Planned):
     """A lamp switched between two radiances every `half_period` frames, low first.
 
     An edge takes one frame: light goes from one level to the other between frames n - 1 and n, n = half_period, ...
+
+    Args:
+        low, high: radiance of the two levels.
+        half_period: between two edges [frames].
+
+    Example:
+        >>> light = Step(low=0.25, high=0.5, half_period=20).light((4, 6), frames=50)
+        >>> list(zip(light.frame.tolist(), light.radiance[:, 0, 0].tolist()))
+        [(0.0, 0.25), (19.0, 0.25), (20.0, 0.5), (39.0, 0.5), (40.0, 0.25)]
     """
 
     kind = "step"
@@ -119,10 +149,21 @@ class Step(Planned):
 
 @dataclass(frozen=True, kw_only=True)
 class Bars(Planned):
-    """Bars, half of each `period` bright, that move to the right at `speed` (downward with `down`).
+    """Bars, half of each period bright, that move to the right or downward.
 
-    period [pixels], speed [pixels/frame], negative is the other way.  A pixel sees the mean light over its area; while
-    an edge crosses it this is linear in time: keys a pixel of motion apart are exact if 1/speed and period/2 are whole.
+    A pixel sees the mean light over its area.  While an edge crosses it, this is linear in time: keys at each pixel of
+    motion are exact if 1/speed and period/2 are whole.
+
+    Args:
+        low, high: radiance of the dark and the bright half.
+        period: of the bars [pixels].
+        speed: of the motion [pixels/frame]; negative: to the left, or upward.
+        down: whether they move downward.
+
+    Example:
+        >>> light = Bars(low=0.0, high=1.0, period=4, speed=0.5).light((2, 4), frames=4)
+        >>> light.frame.tolist(), light.radiance[:, 0].tolist()
+        ([0.0, 2.0, 4.0], [[1.0, 1.0, 0.0, 0.0], [0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
     """
 
     kind = "bars"
@@ -154,9 +195,16 @@ class Bars(Planned):
 
 @dataclass(frozen=True, kw_only=True)
 class Disk(Planned):
-    """A textured disk that turns before a still pattern.
+    """A textured disk that turns in front of a static pattern.
 
-    rim_speed: of the texture at the rim [pixels/frame].  seed: of both textures.
+    Args:
+        low, high: least and largest radiance.
+        rim_speed: of the texture at the rim [pixels/frame].
+        seed: of both textures.
+
+    Example:
+        >>> Disk(name="slow", rim_speed=0.01, use="holdout").file_name
+        'slow'
     """
 
     kind = "disk"
@@ -196,6 +244,15 @@ class MaskedRows(Planned):
         bright dark          rows band .. 2 band - 1, ...
 
     On the left the light is the same in all rows, while half of the rows carry half of the activity.
+
+    Args:
+        dark: radiance behind the mask.
+        bright: radiance elsewhere.
+        band: height of a band [rows].
+
+    Example:
+        >>> MaskedRows(dark=0.0, bright=0.5, band=1).light((2, 4), frames=100).radiance.tolist()
+        [[[0.5, 0.5, 0.5, 0.5], [0.5, 0.5, 0.0, 0.0]]]
     """
 
     kind = "masked_rows"

@@ -109,8 +109,8 @@ def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
     if left > MENDED * before:
         return []
     a, b = names[i], names[j]
-    return [Contradiction("swapped", (a, b), f"{a} and {b} seem to be swapped: exchanged, rates follow the light to "
-                          f"{100 * left:.2g} %, as labelled to {100 * before:.2g} %")]  # fmt: skip
+    return [Contradiction("swapped", (a, b), f"{a} and {b} seem to be swapped: exchanged, their rates follow the light "
+                          f"to {100 * left:.2g} %, as labelled only to {100 * before:.2g} %")]  # fmt: skip
 
 
 def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
@@ -141,7 +141,7 @@ def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: f
     if differs or irregular_share(case, name) > IRREGULAR * abs(off):
         return []
     text = (
-        f"{name}: its rate is that of {100 * off:+.2g} % more light than its label says; all others agree to "
+        f"{name}: its rate fits {100 * off:+.2g} % more light than its label says; all others agree to "
         f"{100 * left:.1g} %"
     )
     return [Contradiction("label", (name,), text, 1.0 + off)]
@@ -155,7 +155,7 @@ def _wrong_dark(name: str, rate: float, dark: float, left: float, lowest: float)
     off = float(rate / max(dark, 1e-9) - 1)
     if off < LEAST_DARK or rate - dark < OUTSTANDING * left * lowest:
         return []
-    text = f"{name}: labelled dark, but {100 * off:+.2g} % off what the flats extrapolate to"
+    text = f"{name}: labelled dark, but its rate is {100 * off:+.2g} % off the extrapolation of the flats"
     return [Contradiction("label", (name,), text)]
 
 

@@ -34,7 +34,7 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
         turn = _better_turn(*pictures) if pictures else None
         if turn:
             name, turned, right = turn
-            text = f"{c.name}: {name}; so it agrees with the rest (correlation {turned:.2f}, as it is {right:.2f})"
+            text = f"{c.name}: {name} (correlation with its light {right:.2f}, once corrected {turned:.2f})"
             found.append(Contradiction("flipped", (c.name,), text))
     return found
 

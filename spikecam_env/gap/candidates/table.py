@@ -106,9 +106,7 @@ def _steady(shown: Sequence[Condition]) -> str | None:
 
 
 def _even(shown: Sequence[Condition]) -> str | None:
-    return (
-        None if any(s.kind in STEADY_KNOWN for s in shown) else "flats: a pattern cannot be told from an unknown scene"
-    )
+    return None if any(s.kind in STEADY_KNOWN for s in shown) else "flats: a scene of unknown light hides patterns"
 
 
 LACKING: dict[Needs, Callable[[Sequence[Condition]], str | None]] = {

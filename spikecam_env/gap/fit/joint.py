@@ -39,7 +39,7 @@ def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tupl
     open_ = replace(refined, prediction=replace(refined.prediction, error=error))
     if everywhere.is_explained(refined.prediction) or not problem.is_explained(refined.prediction):
         return open_, errors, False
-    if not problem.allows("parameters that the recordings held out tell"):
+    if not problem.allows("parameters from held-out recordings"):
         return open_, errors, False
     whole, known, _ = _refined(everywhere, refined, names)
     suit = everywhere.is_explained(open_.prediction) or everywhere.is_explained(whole.prediction)
@@ -96,7 +96,7 @@ def to_refine(problem: Problem, found: Fit, names: Sequence[str]) -> list[tuple[
         return free
     only, count = simulated_for(problem, found, names)
     cost = len(only) * count * (1 + len(free))
-    return free if problem.allows("finer shapes of what was found", cost) else strengths
+    return free if problem.allows("finer shapes of the effects found", cost) else strengths
 
 
 def simulated_for(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[list[int], int]:

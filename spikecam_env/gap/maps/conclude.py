@@ -197,19 +197,19 @@ def worst_left(null: Null, rho: Array) -> list[str]:
 def note_on_what_is_left(null: Null, rho: Array, left: float) -> str:
     """A note on a name that does not explain everything."""
     return (
-        f"what is named leaves {100 * left:.1f} % of the mean square distance, and that is no chance; "
-        f"largest, in noises: {', '.join(worst_left(null, rho))}"
+        f"the named effects leave {100 * left:.1f} % of the mean square distance, more than chance; "
+        f"largest deviations, in noise: {', '.join(worst_left(null, rho))}"
     )
 
 
 def maps_structure(null: Null, rho: Array, left: float, found: list[str]) -> dict[str, Any]:
-    """What is left once all that helps is in."""
+    """The structure of the difference that remains beside all effects that help."""
     return {
         "light": "rates alone: in the dark and in the light",
         "left": round(left, 3),
         "found": found,
         "worst": worst_left(null, rho),
-        "patch": f"what helps: {', '.join(found)}, and spreads" if found else "spreads as fitted",
+        "patch": f"the effects that help ({', '.join(found)}), and fitted spreads" if found else "spreads as fitted",
     }
 
 

@@ -39,8 +39,8 @@ def motion_section(d: Diagnosis) -> Iterator[str]:
     """What moves in recordings that are said to be static, as a picture of each; which pixels were kept."""
     if not d.motion:
         return
-    kept = f"{100 * d.static_share:.3g} % of pixels stand still in all of them"
-    yield element("p", f"{kept}; only these were looked at." if d.verdict != "data" and d.static_only else f"{kept}.")
+    kept = f"{100 * d.static_share:.3g} % of pixels are static in all of them"
+    yield element("p", f"{kept}; only these were used." if d.verdict != "data" and d.static_only else f"{kept}.")
     yield '<div class="plots">'
     for m in d.motion:
         caption = (
@@ -59,13 +59,13 @@ def evidence_section(d: Diagnosis) -> Iterator[str]:
     yield legend(after=d.evidence.after is not None)
     if not shown:
         yield element(
-            "p", f"Nowhere do measured and model differ by {LEAST_Z:g} standard deviations. What was looked at:"
+            "p", f"Nowhere do measured and model differ by {LEAST_Z:g} standard deviations. These were compared:"
         )
         shown, folded = folded[:3], folded[3:]
     for exhibit in shown:
         yield from exhibit_parts(exhibit, d)
     if folded:
-        also = f"Also looked at, largest |z| below {LEAST_Z:g}: " + ", ".join(e.title.lower() for e in folded)
+        also = f"Also compared, largest |z| below {LEAST_Z:g}: " + ", ".join(e.title.lower() for e in folded)
         yield f"<details>{element('summary', also)}"
         for exhibit in folded:
             yield from exhibit_parts(exhibit, d)

@@ -18,7 +18,7 @@ def meaning_section(d: Diagnosis) -> Iterator[str]:
     """The verdict explained, and what to do with it."""
     yield from _OPENINGS[d.verdict](d)
     if d.verdict != "parameter" and d.parameters:
-        yield element("p", "Parameters of effects that the model has, off as well:")
+        yield element("p", "Parameters of the model's own effects are off as well:")
         yield parameters_table(d)
 
 
@@ -26,15 +26,15 @@ def none_meaning(d: Diagnosis) -> Iterator[str]:
     """Nothing found: upper bounds."""
     yield element(
         "p",
-        "After this unit's own response, dark level and noise were fitted, no statistic of the bank differs from the "
-        "model by more than chance explains. Effects may still be there, below what these recordings can show:",
+        "With this unit's own response, dark level and noise fitted, no statistic differs from the model by more than "
+        "chance. Weaker effects may be present; these are the upper bounds:",
     )
     yield from bounds_tables(d)
 
 
 def named_meaning(d: Diagnosis) -> Iterator[str]:
     """A card an effect."""
-    said = f"The model {d.model_name}, fitted to this unit, does not make these recordings."
+    said = f"The model {d.model_name}, fitted to this unit, does not reproduce these recordings."
     if d.statistics:
         before, after = max(abs(s.z) for s in d.statistics), max(abs(s.z_after) for s in d.statistics)
         said += (
@@ -49,20 +49,20 @@ def named_meaning(d: Diagnosis) -> Iterator[str]:
 
 
 def remainder_card(left: Remainder) -> Iterator[str]:
-    """What is left beside effects that are named, and what to make of it."""
+    """The remainder beside the named effects, and how to read it."""
     yield '<div class="do">'
-    yield element("h3", "What is left")
+    yield element("h3", "Remainder")
     yield element(
         "p",
-        "The name takes nearly all of the difference wherever there was one. What it leaves is more than chance, and "
-        "small beside what was there: the law of this camera differs in details from the catalogue's, or a much weaker "
+        "The named effects explain nearly all of the difference in every group of statistics. The remainder is more "
+        "than chance, but small: the law of this camera differs in details from the catalogue's, or a much weaker "
         "effect hides beside it. Parameters may be off by more than their errors; the patched model holds for light "
         "like that of these recordings.",
     )
     rows = [
-        ("Largest deviation left, in noise", f"{left.noises:.1f} ({human(left.worst)})"),
-        ("Share of the sum of squares left", percent(left.share)),
-        ("Statistics, by their share in it", "; ".join(f"{human(g)} {percent(s)}" for g, s in left.groups.items())),
+        ("Largest deviation, in noise", f"{left.noises:.1f} ({human(left.worst)})"),
+        ("Share of the sum of squares", percent(left.share)),
+        ("Groups of statistics, by share", "; ".join(f"{human(g)} {percent(s)}" for g, s in left.groups.items())),
         ("Recordings, the furthest off first", ", ".join(left.recordings)),
         ("Where", left.where or "no part of the array stands out"),
         ("When", left.when or "no part of the recordings stands out"),
@@ -81,7 +81,7 @@ def class_meaning(d: Diagnosis) -> Iterator[str]:
         yield from effect_summary(str(name))
     if class_.get("experiment"):
         yield '<div class="do">'
-        yield element("h3", "The experiment that would tell")
+        yield element("h3", "The experiment that separates them")
         yield element("p", str(class_["experiment"]))
         yield "</div>"
     for effect in d.effects:
@@ -89,13 +89,13 @@ def class_meaning(d: Diagnosis) -> Iterator[str]:
 
 
 def unknown_meaning(d: Diagnosis) -> Iterator[str]:
-    """What the discrepancy looks like."""
+    """The structure of the discrepancy."""
     about = d.unknown or {}
     one = "no single candidate" if "not_looked_for" in about else "no candidate"
     yield element(
         "p",
-        f"The recordings and the model differ by more than chance, and {one} of the catalogue leaves the noise "
-        "alone once it is fitted. What the difference looks like:",
+        f"The recordings and the model differ by more than chance, and {one} of the catalogue, once fitted, leaves "
+        "nothing but noise. The difference has this structure:",
     )
     yield structure_table(about)
     yield element(
@@ -112,7 +112,7 @@ def parameter_meaning(d: Diagnosis) -> Iterator[str]:
     """Strengths as measured and as the model has them."""
     yield element(
         "p",
-        "No effect is missing. An effect that the model has is there with another strength; the patched model has the "
+        "No effect is missing. An effect of the model has another strength in this camera; the patched model has the "
         "fitted value.",
     )
     yield parameters_table(d)
@@ -122,8 +122,8 @@ def data_meaning(d: Diagnosis) -> Iterator[str]:
     """The contradictions."""
     yield element(
         "p",
-        "These recordings disagree with what their campaign says of them, so a comparison with a model would blame the "
-        "camera for it. Correct the following and diagnose again:",
+        "These recordings contradict the labels of their campaign. A comparison with a model would blame the camera "
+        "for that. Correct the following and diagnose again:",
     )
     yield bullets(d.data)
 
@@ -139,7 +139,7 @@ _OPENINGS: dict[str, Callable[[Diagnosis], Iterator[str]]] = {
 
 
 def effect_card(effect: NamedEffect) -> Iterator[str]:
-    """An effect that was found: what it is, how large, and what may be there instead."""
+    """An effect that was found: its law, its size, and its alternatives."""
     yield '<div class="card">'
     yield from effect_summary(effect.name)
     rows = [parameter_row(effect.name, name, e) for name, e in effect.parameters.items()]
@@ -147,7 +147,7 @@ def effect_card(effect: NamedEffect) -> Iterator[str]:
         yield table(("parameter", "value ± sd", "90 % interval", "meaning"), rows, numbers=(1, 2), stack=True)
     others = "; ".join(f"{human(n)} {percent(c) if c > 1e-3 else 'below 0.1 %'}" for n, c in effect.alternatives)
     family = f"Family: {human(effect.family)}. Confidence in the name: {percent(effect.confidence)}."
-    yield element("p", family + (f" Instead of it: {others}." if others else ""))
+    yield element("p", family + (f" Alternatives: {others}." if others else ""))
     yield "</div>"
 
 
@@ -210,12 +210,12 @@ _STRUCTURE = {
     "where": "Where",
     "when": "When",
     "best_candidate": "Nearest candidate",
-    "not_looked_for": "Not looked for",
-    "effort": "--effort that looks for it",
-    "worst_group": "Statistics that are off most",
-    "groups": "Share of what is off, by statistics",
-    "patch": "What the patched model holds",
-    "left": "Share of the mean square that is left",
-    "found": "What helps",
-    "worst": "What is left, the largest, in noise",
+    "not_looked_for": "Not searched for",
+    "effort": "--effort that includes it",
+    "worst_group": "Group of statistics that is off most",
+    "groups": "Share of the deviation, by group of statistics",
+    "patch": "Content of the patched model",
+    "left": "Remaining share of the mean square",
+    "found": "Effects that help",
+    "worst": "Largest remaining deviations, in noise",
 }

@@ -19,7 +19,19 @@ from spikecam_env.whole import write_text_whole
 
 
 def write_report(diagnosis: Diagnosis, path: str | Path, campaign_command: str = "") -> None:
-    """Write the page; it appears whole.  Needs nothing beside it.  campaign_command: as of `report`."""
+    """Write a diagnosis as one HTML page, which needs no other file; it appears whole.
+
+    Args:
+        diagnosis: as `diagnose` returns it.
+        path: of the page.
+        campaign_command: the command that made the campaign, shown beside the one that made the page.
+
+    Example:
+        >>> flats = [Dark(), *(Flat(radiance=level) for level in (0.1, 0.3))]
+        >>> campaign = write_campaign("camera", "scsim", shape=(8, 8), frames=400, recordings=flats)
+        >>> diagnosis = diagnose(campaign, "scsim", candidates=["dead_time"], twin_count=6, progress=False)
+        >>> write_report(diagnosis, "report.html")
+    """
     write_text_whole(path, report(diagnosis, campaign_command))
 
 

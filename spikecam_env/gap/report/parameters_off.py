@@ -1,4 +1,4 @@
-"""Parameters of the model that are off, as a reader wants them: what recordings tell as one number is one row.
+"""Parameters of the model that are off, for a reader: those that recordings show only together share a row.
 
 At one V_D the spreads of conversion gain, capacitor and bias voltage only add up to the spread of the response; all of
 them were scaled by one factor.
@@ -70,5 +70,5 @@ def _response_spread(rows: Parameters, circuit: Circuit) -> ParameterOff:
     parts = listed([human(name) for name in rows], "and")
     return ParameterOff(
         "response spread", "sigma", "relative", measured, nominal, measured / nominal,
-        f"standard deviation over mean; {parts} in one, which recordings at one V_D do not tell apart",
+        f"standard deviation over mean; {parts} together, which recordings at one V_D cannot separate",
     )  # fmt: skip

@@ -34,7 +34,7 @@ def named_sentence(found: Conclusion, model_name: str) -> str:
 
 
 def remainder_sentence(left: Remainder, names: int) -> str:
-    """What effects that are named leave beyond chance."""
+    """The remainder beside the named effects."""
     whose = "Its law differs" if names == 1 else "Their laws differ"
     groups = listed([human(group) for group in list(left.groups)[:MOST_GROUPS]], "and")
     return (
@@ -49,7 +49,7 @@ def class_sentence(found: Conclusion, model_name: str) -> str:
     beside = [human(e.name) for e in found.effects if human(e.name) not in members]
     said = listed([*beside, listed(members, "or")], "and")
     removed = removed_phrase(found, "them" if beside else "either")
-    return f"Your camera has {said}: these recordings cannot tell which{removed}."
+    return f"Your camera has {said}: these recordings do not show which{removed}."
 
 
 def unknown_sentence(found: Conclusion, model_name: str) -> str:
@@ -61,12 +61,12 @@ def unknown_sentence(found: Conclusion, model_name: str) -> str:
     best = f"; {human(about['best_candidate'])} comes nearest" if about["best_candidate"] else ""
     return (
         f"Your camera does something that no single candidate explains{best}{patch}. "
-        f"{about['not_looked_for'].capitalize()} was not looked for: --effort {about['effort']} looks for it."
+        f"{about['not_looked_for'].capitalize()} was not searched for: --effort {about['effort']} includes it."
     )
 
 
 def parameter_sentence(found: Conclusion, model_name: str) -> str:
-    """Effects of the model that are there in another amount."""
+    """Effects of the model whose strength is off."""
     return f"No effect is missing, but parameters of the model {model_name} are off: {all_off(found)}."
 
 
@@ -98,19 +98,19 @@ def removed_phrase(found: Conclusion, what: str) -> str:
     if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
         return ""
     fitted = gap_is_fitted(found.notes)
-    which = "the recordings held out, which told parameters too" if fitted else "recordings that were not used"
+    which = "the held-out recordings, which were fitted too" if fitted else "recordings that were not used"
     return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on {which}"
 
 
 def gap_line(gap: Gap) -> str:
     """What a model's patch did to the gap."""
-    off = f"statistics are {three_digits(gap.before)} off the model (mean square, in noise)"
-    chance = "1 is chance" if gap.floor == CHANCE else f"chance, by two halves of the measurement, {gap.floor:.3g}"
-    said = f"On the recordings held out, {off}; {chance}."
+    off = f"the mean square distance of statistics from the model, in noise, is {three_digits(gap.before)}"
+    chance = "1 is chance" if gap.floor == CHANCE else f"chance, by two halves of the measurement, is {gap.floor:.3g}"
+    said = f"On the held-out recordings {off}; {chance}."
     if not math.isfinite(gap.removed) or gap.before <= HARDLY_A_GAP * gap.floor:
         return said
     removed = f"{100 * min(gap.removed, 1.0):.0f} % of the gap is removed"
-    return f"{said} With the patched model they are {three_digits(gap.after)} off: {removed}."
+    return f"{said} With the patched model it is {three_digits(gap.after)}: {removed}."
 
 
 MOST_GROUPS = 2
@@ -123,4 +123,4 @@ HARDLY_A_GAP = 1.2
 def unfinished(effort: Budget) -> list[str]:
     """A note on what was not begun because enough had been simulated; none where nothing was left out."""
     left_out = listed([human(what) for what in effort.left_out], "and")
-    return [f"To save time, not looked for: {left_out}. A larger --effort does."] if left_out else []
+    return [f"Skipped to stay within --effort: {left_out}. A larger --effort includes them."] if left_out else []

@@ -41,7 +41,7 @@ def statistics_section(d: Diagnosis) -> Iterator[str]:
         yield element("h3", title)
         yield table(head, rows, numbers=range(2, 7), optional=range(2, 5))
         groups = dict.fromkeys(s.group for s in found[:MOST_ROWS])
-        yield table(("group", "what its statistics look at"), [(g, group_meaning(g)) for g in groups], stack=True)
+        yield table(("group", "what it measures"), [(g, group_meaning(g)) for g in groups], stack=True)
 
 
 def candidates_section(d: Diagnosis) -> Iterator[str]:
@@ -51,9 +51,9 @@ def candidates_section(d: Diagnosis) -> Iterator[str]:
     yield element(
         "p",
         "Candidates were fitted step by step, each with the unit's own parameters free. A step adds at most one of "
-        "them, and the next step looks at what is left. Misfit: how far what a candidate leaves is from noise, a sum "
-        "of squares in noise; the smaller the better, within a step. Noise is that of each step's own simulations, so "
-        "that a step need not begin at the very misfit at which the last one ended.",
+        "them; the next step starts from the remaining difference. Misfit is a sum of squares of that difference, in "
+        "noise; within a step, smaller is better. Each step has its own simulations and so its own noise: its first "
+        "misfit may differ from the last misfit of the step before.",
     )
     beside: list[str] = []
     for number_of, (before, tried) in enumerate(groupby(d.ranking, key=lambda r: r.misfit_before), start=1):
@@ -84,7 +84,7 @@ def step_table(d: Diagnosis, tried: Sequence[Ranked]) -> str:
 def bounds_section(d: Diagnosis) -> Iterator[str]:
     """Upper bounds, where the meaning of the verdict has none."""
     if d.bounds and d.verdict != "none":
-        yield element("p", "Effects that were looked for and not found are smaller than:")
+        yield element("p", "Upper bounds of the effects that were not found:")
         yield from bounds_tables(d)
 
 
@@ -94,14 +94,14 @@ def bounds_tables(d: Diagnosis) -> Iterator[str]:
     if rows:
         yield table(("effect", "parameter", "at most (95 %)"), rows, numbers=(2,), stack=True)
     if d.not_bounded:
-        yield element("p", "Not bounded by these data; the right column would bound it:")
+        yield element("p", "These recordings give no bound; the right column names what would give one:")
         yield table(("effect", "needs"), [(human(name), needs) for name, needs in d.not_bounded], stack=True)
 
 
 def not_testable_section(d: Diagnosis) -> Iterator[str]:
     """Effects that these recordings cannot show."""
     if d.not_testable:
-        yield element("p", "These recordings say nothing about the following; the right column would make it testable.")
+        yield element("p", "These recordings cannot show these effects; the right column names what would.")
         yield table(("effect", "needs"), [(human(name), needs) for name, needs in d.not_testable])
 
 

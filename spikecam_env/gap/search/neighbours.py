@@ -97,7 +97,7 @@ def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[F
     has = {e.name for e in best.model.effects}
     others = sorted((f for f in turn.fits if f.name not in has and f.misfit < least), key=lambda f: f.misfit)
     others = others[: searching.earlier_tried]
-    if not others or not problem.allows(f"others in place of {first.name}"):
+    if not others or not problem.allows(f"alternatives to {first.name}"):
         return best, turn
     rest = best.model.without(first.name)
     alone = confirmed(problem, resettled(problem, best, rest))
@@ -128,7 +128,7 @@ def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: S
         (round, errors): with the runner-up if it leaves less misfit by more than a tie, else as given.
     """
     for other in runner_up(last, names, problem.settings.searching.same_share):
-        if not problem.allows(f"others in place of {names[-1]}"):
+        if not problem.allows(f"alternatives to {names[-1]}"):
             continue
         tried, known, used_held_out = refined_together(problem, other, [*names[:-1], other.name])
         if tried.misfit < last.fits[0].misfit - problem.settings.deviance.tie:
@@ -156,7 +156,7 @@ def runner_up(turn: Round, names: Sequence[str], same_share: float) -> list[Fit]
 def may_try_without_earlier(problem: Problem, count: int) -> bool:
     """Whether the budget allows so many effects to be simulated together, and without each that came before."""
     cost = count * problem.settings.twins.to_confirm * len(problem.case.conditions)
-    return problem.allows("whether all that was found is needed", cost, needed=True)
+    return problem.allows("a test of each effect found", cost, needed=True)
 
 
 def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Array]) -> Fit:
@@ -203,7 +203,7 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
         return rounds
     if not is_significant(null, residual(null, problem.values, last.prediction), last.prediction):
         return rounds
-    if not problem.allows("two bends that cancel", needed=True):
+    if not problem.allows("two nonlinearities that cancel", needed=True):
         return rounds
     found = fit_pair(problem, names)
     if found is None or found.misfit > last.misfit:

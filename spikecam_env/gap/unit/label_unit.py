@@ -42,6 +42,6 @@ def label_unit_note(factor: float, base: BaseFit) -> list[str]:
         return []
     gain = factor * float(np.median(base.gain[base.live]))
     return [
-        f"The gain is {gain:.3g} of nominal: light is labelled in another unit. It was counted anew, 1 of the labels "
-        f"as {factor:.3g}, and so it is on this page; nothing but light depends on the unit."
+        f"The gain is {gain:.3g} of nominal: the labels are in another unit. A label of 1 was taken as radiance "
+        f"{factor:.3g}, on this page too; nothing but light depends on the unit."
     ]

@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 LARGEST_SCALING = 40.0
 """Factor by which statistics are made larger or smaller at once, on the way to a score."""
 
-LONGER_RECORDINGS = "longer recordings, or more of them: in these it would hardly show"
-MORE_EFFORT = "a larger --effort: enough had been simulated"
+LONGER_RECORDINGS = "longer recordings, or more of them; in these it hardly shows"
+MORE_EFFORT = "a larger --effort: the budget was spent"
 """What is needed for a bound."""
 
 

@@ -8,11 +8,11 @@ from spikecam_env.gap.result import Conclusion
 from spikecam_env.sensor import SensorModel
 
 TO_DO = (
-    "What to do: crop to what stands still (spikecam campaign import with --rows and --columns), or keep the static "
-    "pixels alone (spikecam diagnose --static-only)."
+    "To go on, crop the recordings to a static part (spikecam campaign import with --rows and --columns), or use only "
+    "the static pixels (spikecam diagnose --static-only)."
 )
 
-TO_DO_IN_KNOWN_LIGHT = "What to do in known light: give the light over time (an .npz) as the label, or leave it out."
+TO_DO_IN_KNOWN_LIGHT = "In known light, give the light over time (an .npz) as the label, or leave the recording out."
 
 
 def moves(model: SensorModel, motion: tuple[Motion, ...], *, static_only: bool) -> Conclusion:
@@ -33,19 +33,19 @@ def moves(model: SensorModel, motion: tuple[Motion, ...], *, static_only: bool) 
 
 
 def what_to_do(motion: tuple[Motion, ...], static_only: bool) -> list[str]:
-    """What would make the campaign usable."""
+    """Steps that make the campaign usable."""
     share = float(static_pixels(motion).mean())
     advice = [TO_DO] if any(not m.light_known for m in motion) else []
     if any(m.light_known for m in motion):
         advice.append(TO_DO_IN_KNOWN_LIGHT)
     if static_only and share < LEAST_STATIC:
-        advice.insert(0, f"Static are {100 * share:.3g} % of pixels; --static-only needs {100 * LEAST_STATIC:g} %.")
+        advice.insert(0, f"{100 * share:.3g} % of pixels are static; --static-only needs {100 * LEAST_STATIC:g} %.")
     return advice
 
 
 def static_note(motion: tuple[Motion, ...]) -> list[str]:
-    """What was left out because it moves; nothing where nothing does."""
+    """Notes on the pixels that were left out because they move."""
     if not motion:
         return []
     share = 100 * float(static_pixels(motion).mean())
-    return [f"Only static pixels of unknown scenes were looked at, {share:.3g} % of all.", *(m.text for m in motion)]
+    return [f"Only the static pixels of unknown scenes were used, {share:.3g} % of all.", *(m.text for m in motion)]

@@ -12,14 +12,14 @@ class Note(str, Enum):
     """Why the gap on recordings held out is no check.  The value is the sentence that page, terminal and JSON state."""
 
     PARAMETERS_FROM_HELD_OUT = (
-        "Within the errors of their fit, parameters were told by the recordings held out as well: "
-        "the gap on them is a fit, and no check."
+        "The held-out recordings were fitted too, within the errors of the first fit: the gap on them is no "
+        "independent check."
     )
     """The recordings to fit left parameters open, and those held out were fitted too."""
 
     ONLY_HELD_OUT_DISAGREE = (
-        "The recordings to fit agree with the model, as given or with what was found first, and those held out do not. "
-        "What moves among them was fitted: the gap on it is a fit, and no check."
+        "The recordings to fit agree with the model, as given or with the effects found first; those held out do not. "
+        "Held-out recordings of moving light were therefore fitted: the gap on them is no independent check."
     )
     """Nothing but motion held out shows what is missing."""
 

@@ -40,7 +40,7 @@ def reason_against(found: Fit, turn: Round, accept: float) -> str:
     chosen = turn.fits[0]
     if turn.misfit - found.misfit >= accept:
         if found is chosen:
-            return "not kept: beside the others, or on recordings held out, it explains no more"
+            return "not kept: it explains nothing more beside the others, or on held-out recordings"
         if found.misfit < chosen.misfit:
             return _reason_against_better(found, chosen)
     return why_rejected(found.misfit, turn.misfit, chosen.name, accept)
@@ -49,6 +49,6 @@ def reason_against(found: Fit, turn: Round, accept: float) -> str:
 def _reason_against_better(found: Fit, chosen: Fit) -> str:
     """Why one with a smaller misfit was not chosen (`search.choice`)."""
     if len(found.prediction.draws) < 2:
-        return "smaller misfit, but by one simulation, which no other confirmed"
+        return "smaller misfit in a single simulation; further ones did not confirm it"
     preferred = chosen.name.replace("_", " ")
-    return f"smaller misfit, but {preferred} is preferred by all recordings and its number of parameters"
+    return f"smaller misfit, but all recordings together, and the number of parameters, favour {preferred}"

@@ -223,14 +223,15 @@ def linear(
     """The score along what an effect changes (S,) at some strength; None where it changes nothing.
 
     scatter: (S,) by which that differs from campaign to campaign: what few events change by much is known poorly.
+    Statistics of unknown noise, as those of a pattern in the dark without a spike, count for nothing.
     """
     most = null.settings.judging.clear  # one false spike in a quiet pixel is a hundred noises
-    deviates = np.clip(change / null.noise, -most, most)
-    weight = null.weight * deviates / (1.0 + np.minimum(scatter / null.noise, most) ** 2)
+    deviates = np.clip(np.nan_to_num(change / null.noise), -most, most)
+    weight = null.weight * deviates / (1.0 + np.minimum(np.nan_to_num(scatter / null.noise), most) ** 2)
     if not weight.any():
         return None
     of = partial(linear_score, null, weight)
-    error = float(np.sqrt(np.sum((weight * null.floor / null.noise) ** 2)))
+    error = float(np.sqrt(np.nansum((weight * null.floor / null.noise) ** 2)))
     return Score(of, np.array([of(v) for v in without]), error, parameters, float(weight @ deviates))
 
 

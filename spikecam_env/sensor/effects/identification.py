@@ -39,7 +39,7 @@ class Needs(Enum):
 
 MORE_LEVELS = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 SECOND_V_D = "flats at a second V_d"
-"""Experiments that tell members of a class apart."""
+"""Experiments that separate the members of a class."""
 
 
 @dataclass(frozen=True)

@@ -125,7 +125,7 @@ def folder_label(file: str, radiance="0.3", **options) -> Label:
         ([folder_label("h.h5")], {"frame_rate_hz": 40_000.0}, "says 20000 frames a second"),
         ([folder_label("last.npz", reading={"time_axis": 5})], {}, "time_axis is 5"),
         ([folder_label("h.h5"), folder_label("small.npz")], {}, r"'small' has \(4, 4\) pixels, 'h' has \(10, 16\)"),
-        ([folder_label("flat.npz")], {}, "cannot tell which axis"),
+        ([folder_label("flat.npz")], {}, "which axis is time"),
         ([folder_label("text.npz")], {}, r"not a readable \.npz"),
         ([folder_label("notes.txt")], {}, "ends in '.txt'"),
         ([folder_label("up.dat", "light.npz", reading={"height": 5, "width": 32})], {"columns": (0, 3)}, None),

@@ -42,11 +42,11 @@ SECTIONS = {
     "data": ALWAYS,
 }
 OPENINGS = {
-    "none": "no statistic of the bank differs",
+    "none": "no statistic differs",
     "named": "Confidence in the name: 97 %",
-    "class": "The experiment that would tell",
+    "class": "The experiment that separates them",
     "unknown": "it claims no physics",
-    "parameter": "is there with another strength",
+    "parameter": "has another strength in this camera",
     "data": "Correct the following and diagnose again",
 }
 
@@ -118,9 +118,9 @@ def test_a_page_fetches_nothing_runs_nothing_and_is_small(verdict: str) -> None:
 
 def test_a_page_says_what_a_name_leaves() -> None:
     page = Page(report(made_up.with_remainder())).text
-    assert "Effect named, with a remainder" in page and "What is left" in page
+    assert "Effect named, with a remainder" in page and "Largest deviation, in noise" in page
     assert "8.1 (step: up 16-32)" in page and "step 86 %; moving 14 %" in page and "step, bars" in page
-    assert "What is left" not in Page(written("named")).text
+    assert "Largest deviation, in noise" not in Page(written("named")).text
 
 
 def test_the_page_says_what_the_diagnosis_says() -> None:
@@ -141,7 +141,9 @@ def test_nothing_found_shows_its_upper_bounds_and_unknown_its_structure() -> Non
     for b in made_up.none().bounds:
         assert f"< {at_most(b)}" in none
     assert (
-        "modulation (frequency 2000 Hz)" in none and "Not bounded by these data" in none and "longer recordings" in none
+        "modulation (frequency 2000 Hz)" in none
+        and "These recordings give no bound" in none
+        and "longer recordings" in none
     )
     unknown = Page(written("unknown")).text
     assert "Grows with the level to the power of 1.02" in unknown

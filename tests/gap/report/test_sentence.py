@@ -25,7 +25,7 @@ def sentence_of(d: Diagnosis) -> str:
         ("none", "No gap: these recordings and the model scsim agree to within the noise."),
         ("named", "Your camera has photodiode lag (fraction 6.12 %, tau 1.22 ms); adding it removes 97 % of the gap on "
          "recordings that were not used."),
-        ("class", "Your camera has photo response nonlinearity or IR drop: these recordings cannot tell which; adding "
+        ("class", "Your camera has photo response nonlinearity or IR drop: these recordings do not show which; adding "
          "either removes 97 % of the gap on recordings that were not used."),
         ("unknown", "Your camera does something that no candidate explains; adding an empirical patch removes 79 % of "
          "the gap on recordings that were not used."),
@@ -41,9 +41,7 @@ def test_a_sentence_says_the_verdict(verdict: str, said: str) -> None:
 
 def test_a_gap_on_recordings_that_told_parameters_is_not_called_a_check() -> None:
     fitted = replace(made_up.named(), data=(Note.PARAMETERS_FROM_HELD_OUT,))
-    assert sentence_of(fitted).endswith(
-        "removes 97 % of the gap on the recordings held out, which told parameters too."
-    )
+    assert sentence_of(fitted).endswith("removes 97 % of the gap on the held-out recordings, which were fitted too.")
 
 
 def test_what_a_note_is_decides_and_not_what_it_says() -> None:

@@ -50,7 +50,8 @@ def test_what_is_left_out_is_said_once():
     assert not budget.allows("a third effect") and not budget.allows("a third effect")
     assert not budget.allows("photodiode_lag of another shape")
     assert unfinished(budget) == [
-        "To save time, not looked for: a third effect and photodiode lag of another shape. A larger --effort does."
+        "Skipped to stay within --effort: a third effect and photodiode lag of another shape. A larger --effort "
+        "includes them."
     ]
 
 
@@ -109,7 +110,7 @@ def test_runners_up_are_not_tried_anew_when_enough_was_simulated():
     best = SimpleNamespace(model=SimpleNamespace(effects=()))
     case = SimpleNamespace(budget=Budget(0))
     assert try_in_place_of_earlier(problem_of(case), best, turn) == (best, turn)
-    assert case.budget.left_out == ["others in place of blooming"]
+    assert case.budget.left_out == ["alternatives to blooming"]
 
 
 def test_a_shape_is_fitted_up_to_three_tenths_more(monkeypatch):
@@ -126,7 +127,7 @@ def test_two_effects_are_simulated_together_and_alone_while_effort_is_left():
     left, spent = (SimpleNamespace(budget=Budget(40, [n]), conditions=range(5)) for n in (31, 32))
     assert may_try_without_earlier(problem_of(left), 2) and left.budget.left_out == []
     assert not may_try_without_earlier(problem_of(spent), 2)
-    assert spent.budget.left_out == ["whether all that was found is needed"]
+    assert spent.budget.left_out == ["a test of each effect found"]
 
 
 @pytest.mark.parametrize("spent", [51, 52])
@@ -176,7 +177,7 @@ def test_what_is_not_simulated_together_is_judged_by_the_model_given(monkeypatch
     _, joint = joined(Problem(case, None, null, seen, seen), [first, turn], 0.0)
     rho, misfit = residual_and_misfit(null, seen, both)
     assert joint.fits[0].misfit == misfit > 0 and np.array_equal(joint.fits[0].rho, rho)
-    assert case.budget.left_out == ["whether all that was found is needed", "finer strengths"]
+    assert case.budget.left_out == ["a test of each effect found", "finer strengths"]
 
 
 def test_the_command_asks_for_what_the_function_does():

@@ -33,8 +33,8 @@ def test_a_better_candidate_below_the_kept_one_says_why() -> None:
     assert [r.accepted for r in rows] == [True, False, False, False]
     assert [r.reason for r in rows] == [
         "leaves 4.0 noises at worst",
-        "smaller misfit, but by one simulation, which no other confirmed",
-        "smaller misfit, but light flicker is preferred by all recordings and its number of parameters",
+        "smaller misfit in a single simulation; further ones did not confirm it",
+        "smaller misfit, but all recordings together, and the number of parameters, favour light flicker",
         "larger misfit than light flicker",
     ]
 
@@ -42,7 +42,7 @@ def test_a_better_candidate_below_the_kept_one_says_why() -> None:
 def test_where_nothing_was_kept_the_best_comes_first_and_the_chosen_says_why_not() -> None:
     rows = ranking([turn(fit("crosstalk", 85.0, draws=4), fit("dead_time", 95.0), fit("lamp_drift", 100.0))], [], 12.0)
     assert [r.name for r in rows] == ["crosstalk", "dead_time", "lamp_drift"] and not any(r.accepted for r in rows)
-    assert rows[0].reason == "not kept: beside the others, or on recordings held out, it explains no more"
+    assert rows[0].reason == "not kept: it explains nothing more beside the others, or on held-out recordings"
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_where_nothing_was_kept_the_best_comes_first_and_the_chosen_says_why_not
     [
         (100.0, "explains nothing"),
         (99.98, "explains nothing"),
-        (89.0, "removes 11.0 of the misfit, and 12 are asked of an effect"),
+        (89.0, "removes 11.0 of the misfit; an effect must remove 12"),
         (80.0, "larger misfit than dead time"),
     ],
 )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap.settings import DiagnosisSettings
-from spikecam_env.gap.verdict.score import RULE_OF_THREE, Score, StrengthTest, TwinProbe, linear_score
+from spikecam_env.gap.verdict.score import RULE_OF_THREE, Score, StrengthTest, TwinProbe, linear, linear_score
 
 
 def test_a_strength_of_which_few_events_are_expected_is_never_refuted():
@@ -34,3 +34,15 @@ def test_a_statistic_counts_as_five_noises_off_at_most() -> None:
     null = SimpleNamespace(mean=np.zeros(2), noise=np.ones(2), settings=DiagnosisSettings())
     score = [linear_score(null, np.array([1.0, 0.0]), np.array([x, 9.0])) for x in (4.0, 6.0, 100.0, np.nan)]
     assert score == [4.0, 5.0, 5.0, 0.0]
+
+
+def test_a_statistic_of_unknown_noise_counts_for_nothing() -> None:
+    null = SimpleNamespace(
+        mean=np.zeros(2),
+        noise=np.array([1.0, np.nan]),
+        floor=np.array([0.1, 0.1]),
+        weight=1.0,
+        settings=DiagnosisSettings(),
+    )
+    score = linear(null, np.array([2.0, 2.0]), [np.zeros(2), np.ones(2)], {}, scatter=np.zeros(2))
+    assert score is not None and (score.rise, score.error) == pytest.approx((4.0, 0.2))

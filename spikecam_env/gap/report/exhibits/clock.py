@@ -15,7 +15,7 @@ from spikecam_env.gap.result import Evidence
 TITLE = "Spikes against the clock"
 CAPTION = (
     "Pixels of a scene by how far their mean interval is from a whole number of frames. A pixel that integrates freely "
-    "knows nothing of frames: counts go evenly through 0, and noise is the same on both sides of it."
+    "does not depend on frames: counts run evenly through 0, and noise is the same on both sides of it."
 )
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from spikecam_env.gap.report.panels import Panel, largest, scaled_by_twins, take
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Lengths of intervals"
-CAPTION = "How often intervals of each length occur, less the model's share."
+CAPTION = "Share of intervals of each length, less the model's."
 
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:

@@ -13,8 +13,8 @@ from spikecam_env.gap.statistics.film import light_film
 
 TITLE = "Moving light"
 CAPTION = (
-    "Spikes over the model's, of all moments and pixels at which the light did the same: brightened, had just been "
-    "brighter (lag), had brighter neighbours (blur, crosstalk), brightened in low rows (rows read at other times)."
+    "Spikes relative to the model's, over all pixels and times with the same change of light: brightening, brighter "
+    "just before (lag), brighter neighbours (blur, crosstalk), brightening in low rows (rows read at other times)."
 )
 
 

@@ -12,7 +12,8 @@ from spikecam_env.gap.result import Evidence
 
 TITLE = "Neighbours"
 CAPTION = (
-    "How often a pixel fires with its neighbour, in the same frame (0) and one or two frames after, over the model's."
+    "Coincidences of a pixel and its neighbour, in the same frame (0) and one or two frames later, relative to the "
+    "model's."
 )
 
 

@@ -14,8 +14,9 @@ from spikecam_env.gap.result import Evidence
 
 TITLE = "Temporal noise"
 CAPTION = (
-    "Noise of single spikes, from second differences A_k of spike times k apart. Level over k: drawn anew for each "
-    "spike; rising: slow noise. Then the variance of intervals, and whether a long one follows a short one."
+    "Noise of single spikes, from second differences A_k of spike times k apart. If A_k is level over k, the noise is "
+    "independent from spike to spike; if it rises, the noise is slow. Below: the variance of intervals, and the "
+    "correlation of successive ones."
 )
 
 

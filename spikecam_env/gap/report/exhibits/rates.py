@@ -12,8 +12,8 @@ from spikecam_env.gap.result import Evidence
 
 TITLE = "Rates and levels"
 CAPTION = (
-    "How far mean rates are off a straight line through each pixel's own levels (a camera that saturates bends down "
-    "at high levels), and the array's rate over the model's, recording by recording."
+    "Distance of mean rates from a straight line through each pixel's own levels (a camera that saturates bends down "
+    "at high levels), and the array's rate relative to the model's, by recording."
 )
 
 

@@ -39,7 +39,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             scale = 100 / max(height, 1e-9)
             yield rates
             yield Panel(
-                f"What is left after a {name} ({t.shown.name})", f"time from the {name} [ms]",
+                f"Residual after a {name} ({t.shown.name})", f"time from the {name} [ms]",
                 "less the model's [% of step]", ms, scale * (rates.measured - rates.before), np.zeros(x.size),
                 None if after is None else scale * (after - rates.before), scale * sd,
             )  # fmt: skip
