@@ -63,6 +63,8 @@ def train(envs: Cameras, run: Run, ppo: PPO, seed: int, save: Callable[[], None]
     """Go on learning until `ppo.steps`.  run: of a `Policy`; `save` is called after every leg."""
     policy, a_rollout = run.network, ppo.rollout * envs.num_envs
     assert isinstance(policy, Policy)
+    for weights in policy.parameters():  # all have moments, also those that a loss leaves alone: a run is one of all
+        weights.grad = torch.zeros_like(weights)
     updates = -(-ppo.steps // a_rollout)
     for first in tqdm(range(run.step // a_rollout, updates, ppo.leg), desc="learning", unit="leg", disable=None):
         began, last = time.process_time(), min(first + ppo.leg, updates)
@@ -144,7 +146,7 @@ def _learn(policy: Policy, optimiser: torch.optim.Optimizer, seen: list[Samples]
                 wrong = wrong + (mean - part["best"]).square().mean()
             else:
                 wrong = wrong + 0.5 * (value - part["worth"]).square().mean() - _surrogate(policy, mean, part, ppo)
-            optimiser.zero_grad()
+            optimiser.zero_grad(set_to_none=False)
             wrong.backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), ppo.most_gradient)
             optimiser.step()
@@ -153,4 +155,5 @@ def _learn(policy: Policy, optimiser: torch.optim.Optimizer, seen: list[Samples]
 def _surrogate(policy: Policy, mean: Tensor, part: Samples, ppo: PPO) -> Tensor:
     ratio = (Normal(mean, policy.log_sigma.exp()).log_prob(part["action"]).sum(1) - part["log_p"]).exp()
     gain = (part["gain"] - part["gain"].mean()) / (part["gain"].std() + 1e-8)
-    return torch.min(ratio * gain, ratio.clamp(1 - ppo.clip, 1 + ppo.clip) * gain).mean()
+    least: Tensor = torch.min(ratio * gain, ratio.clamp(1 - ppo.clip, 1 + ppo.clip) * gain)
+    return least.mean()

@@ -88,11 +88,12 @@ def test_gain_is_the_discounted_sum_of_surprises_to_the_end_of_an_episode() -> N
     assert _gain(surprise, over, SMALL)[:, 0].tolist() == pytest.approx([1 + 2 * weight, 2, 4])
 
 
-def test_a_run_that_was_stopped_and_resumed_is_the_run_that_was_not(tmp_path: Path, monkeypatch) -> None:
-    study, whole, parts = Study("Catch-v1"), tmp_path / "whole", tmp_path / "parts"
+@pytest.mark.parametrize("how", [SMALL, replace(SMALL, imitate=True)], ids=["rewards", "oracle"])
+def test_a_run_that_was_stopped_and_resumed_is_the_run_that_was_not(how: PPO, tmp_path: Path, monkeypatch) -> None:
+    study, whole, parts = Study("Catch-v1", options={"shape": (16, 16)}), tmp_path / "whole", tmp_path / "parts"
     whole.mkdir()
     parts.mkdir()
-    train_agent(study, whole, SMALL, seed=3, environments=2)
+    train_agent(study, whole, how, seed=3, environments=2)
     save = Run.save
 
     def stop(run: Run, path: Path) -> None:
@@ -101,9 +102,9 @@ def test_a_run_that_was_stopped_and_resumed_is_the_run_that_was_not(tmp_path: Pa
 
     monkeypatch.setattr(Run, "save", stop)
     with pytest.raises(KeyboardInterrupt):
-        train_agent(study, parts, SMALL, seed=3, environments=2)
+        train_agent(study, parts, how, seed=3, environments=2)
     monkeypatch.setattr(Run, "save", save)
-    train_agent(study, parts, SMALL, seed=3, environments=2)
+    train_agent(study, parts, how, seed=3, environments=2)
     one, two = (Agent.load(folder / "agent.pt") for folder in (whole, parts))
     assert len(one.training["curve"]) == 2
     for name, weights in one.policy.state_dict().items():
@@ -174,7 +175,14 @@ def test_the_tracker_is_as_good_as_the_oracle(task: str, episodes: int, obs: str
 
 @pytest.mark.parametrize(
     "task, least, episodes",
-    [("Catch-v1", 0.6, 20), ("Saccade-v1", 0.5, 10), ("Track-v1", 0.7, 1), ("LowLight-v1", 0.7, 1)],
+    [
+        ("Catch-v1", 0.6, 20),
+        ("Saccade-v1", 0.5, 10),
+        ("Track-v1", 0.7, 1),
+        ("LowLight-v1", 0.7, 1),
+        ("Exposure-v1", 0.7, 1),
+        ("ReadSpin-v1", 0.3, 10),
+    ],
 )
 def test_a_shipped_agent_does_its_task(task: str, least: float, episodes: int) -> None:
     agent = Agent.load(task)
