@@ -1,6 +1,6 @@
 """The denoised picture as an observation: the newest rate plane that the denoiser has finished.
 
-    picture = 255 * rate          [spikes/frame], of a frame that is `age` frames old (`best`: 17 to 32)
+    picture = 255 * rate / `white`      rate: [spikes/frame], of a frame that is `age` frames old (`best`: 17 to 32)
 
 Before the first plane is finished agents see the noisy rate of all frames so far (TFP), and the age is -1.
 """
@@ -8,7 +8,7 @@ Before the first plane is finished agents see the noisy rate of all frames so fa
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -20,28 +20,36 @@ from numpy.typing import NDArray
 from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
 from denoiser.recipe import RECIPES
+from spikecam_env.checked import checked_number
 from spikecam_env.envs.observations.protocol import Blocks, Observation, Streams, View, grey, picture_space
 
 
 @dataclass(frozen=True)
 class Rate(Observation):
-    """(1, H, W) uint8: 255 where the denoised rate is a spike a frame.
+    """(1, H, W) uint8: 255 where the denoised rate is `white` or above.
 
-    mode: "best", "paper", or the path of a checkpoint (.pt).
-    Raises InputError, when an episode begins, for another mode and for an unusable checkpoint.
+    mode: "best", "paper", or the path of a checkpoint (.pt).  white: [spikes/frame]; eight bits round what is below a
+    500th of it to 0.
+    Raises InputError for a white that is not above 0, and, when an episode begins, for another mode and for an unusable
+    checkpoint.
     """
 
     mode: str | os.PathLike[str] = "best"
+    white: float = field(default=1.0, kw_only=True)
 
     takes_tensors = True
+
+    def __post_init__(self) -> None:
+        checked_number(self.white, "white", 0.0, above=True)
 
     def space(self, view: View) -> spaces.Box:
         return picture_space(view)
 
     def start(self, view: View, streams: int) -> Denoising:
         if view.device is not None:
-            return DenoisingThere(ManyDnSS(_denoiser(self.mode, str(view.device)), streams, view.shape), view.device)
-        return Denoising(ManyDnSS(_denoiser(self.mode), streams, view.shape))
+            there = ManyDnSS(_denoiser(self.mode, str(view.device)), streams, view.shape)
+            return DenoisingThere(there, self.white, view.device)
+        return Denoising(ManyDnSS(_denoiser(self.mode), streams, view.shape), self.white)
 
     def step(self, blocks: Blocks, state: Denoising) -> tuple[NDArray[np.uint8], Denoising]:
         spikes: Any = blocks.spikes
@@ -57,9 +65,9 @@ class Denoising:
     Memory of the denoiser is large, so it is changed in place: a step cannot be taken again from the state before.
     """
 
-    def __init__(self, denoiser: ManyDnSS) -> None:
+    def __init__(self, denoiser: ManyDnSS, white: float) -> None:
         streams, shape = len(denoiser), denoiser.shape
-        self._denoiser = denoiser
+        self._denoiser, self._white = denoiser, white
         self._fired: Any = np.zeros((streams, *shape), np.int64)
         self._picture: Any = np.zeros((streams, 1, *shape), np.uint8)
         self.pushed = np.zeros(streams, np.int64)
@@ -79,16 +87,16 @@ class Denoising:
         for stream, rates in enumerate(self._denoiser.push(spikes)):
             self.finished[stream] += len(rates)
             if len(rates):
-                self._picture[stream, 0] = grey(rates[-1])
-        noisy = grey(self._fired / np.maximum(self.pushed, 1)[:, None, None])[:, None]
+                self._picture[stream, 0] = grey(rates[-1] / self._white)
+        noisy = grey(self._fired / (self._white * np.maximum(self.pushed, 1)[:, None, None]))[:, None]
         return np.where((self.finished > 0)[:, None, None, None], self._picture, noisy)
 
 
 class DenoisingThere(Denoising):
     """The same with tensors on a device."""
 
-    def __init__(self, denoiser: ManyDnSS, device: torch.device) -> None:
-        super().__init__(denoiser)
+    def __init__(self, denoiser: ManyDnSS, white: float, device: torch.device) -> None:
+        super().__init__(denoiser, white)
         self._fired = torch.from_numpy(self._fired).to(device)
         self._picture = torch.from_numpy(self._picture).to(device)
 
@@ -101,11 +109,11 @@ class DenoisingThere(Denoising):
         self.finished += [len(its) for its in rates]
         if finish:
             newest: Any = torch.stack([rates[stream][-1] for stream in finish])
-            self._picture[finish, 0] = torch.as_tensor(grey(newest))
+            self._picture[finish, 0] = torch.as_tensor(grey(newest / self._white))
         pushed, there = (
             torch.from_numpy(array).to(spikes.device)[:, None, None] for array in (self.pushed, self.finished)
         )
-        noisy = torch.as_tensor(grey(self._fired.double() / pushed.clamp(min=1)))[:, None]
+        noisy = torch.as_tensor(grey(self._fired.double() / (self._white * pushed.clamp(min=1))))[:, None]
         return torch.where(there[:, None] > 0, self._picture, noisy)
 
 

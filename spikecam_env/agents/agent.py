@@ -118,7 +118,7 @@ def shipped() -> list[str]:
     """Tasks of which an agent comes with the package.
 
     >>> shipped()
-    ['Catch-v1', 'LowLight-v1', 'Saccade-v1', 'Track-v1']
+    ['Catch-v1', 'Exposure-v1', 'LowLight-v1', 'ReadSpin-v1', 'Saccade-v1', 'Track-v1']
     """
     return sorted(path.name[: -len(ENDING)] for path in _folder().glob(f"*{ENDING}"))
 

@@ -5,7 +5,12 @@
     loss   = -E[min(r A, clip(r, 1 - c, 1 + c) A)] + (V - A - V_old)^2 / 2 + w (place - target)^2
 
 The last term asks the policy where the target is, which is known in training alone (`info["target"]`); w = 0 is plain
-PPO.  An episode that ends by its time is worth V beyond its end; a decided one nothing.  Everything is drawn anew from
+PPO.  An agent that imitates plays its mean action, without noise, and has E[(mean - oracle's action)^2] in place of the
+first two terms: in the states that it has come to itself, in all rollouts of the leg, it learns what `envs.oracle`
+would do.  Where the oracle acts on what cannot be seen it learns the expectation: of an answer, its probability.
+Source: DAgger, Ross et al., AISTATS 2011.
+
+An episode that ends by its time is worth V beyond its end; a decided one nothing.  Everything is drawn anew from
 (seed, update) when a leg begins: a run that was resumed is the run that was not stopped.  Sources: Schulman et al.,
 arXiv 1707.06347 and 1506.02438; the form of Huang et al., JMLR 23 (2022), "CleanRL".
 """
@@ -20,6 +25,7 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium.vector import VectorEnv
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.distributions import Normal
 from tqdm import tqdm
@@ -27,14 +33,17 @@ from tqdm import tqdm
 from denoiser.run import Run
 from spikecam_env.agents.history import History
 from spikecam_env.agents.policy import Policy
+from spikecam_env.envs.oracle import oracle
 
 Cameras = VectorEnv[Any, Any, Any]
 Ended = tuple[float, ...]  # (return, performance, success) of an episode
+Samples = dict[str, Tensor]  # of a rollout, by name
 
 
 @dataclass(frozen=True)
 class PPO:
-    """steps: of all environments together; rollout: of each between updates; leg: updates; place: w."""
+    """steps: of all environments together; rollout: of each between updates; leg: updates; place: w;
+    imitate: the oracle, instead of what rewards teach."""
 
     steps: int = 49_152
     rollout: int = 64
@@ -46,6 +55,7 @@ class PPO:
     decay: float = 0.95
     clip: float = 0.2
     place: float = 1.0
+    imitate: bool = False
     most_gradient: float = 0.5
 
 
@@ -53,17 +63,20 @@ def train(envs: Cameras, run: Run, ppo: PPO, seed: int, save: Callable[[], None]
     """Go on learning until `ppo.steps`.  run: of a `Policy`; `save` is called after every leg."""
     policy, a_rollout = run.network, ppo.rollout * envs.num_envs
     assert isinstance(policy, Policy)
+    for weights in policy.parameters():  # all have moments, also those that a loss leaves alone: a run is one of all
+        weights.grad = torch.zeros_like(weights)
     updates = -(-ppo.steps // a_rollout)
     for first in tqdm(range(run.step // a_rollout, updates, ppo.leg), desc="learning", unit="leg", disable=None):
         began, last = time.process_time(), min(first + ppo.leg, updates)
         drawn, *seeds = np.random.SeedSequence([seed, first]).generate_state(envs.num_envs + 1).tolist()
         torch.manual_seed(drawn)
-        player, ended = _Player(envs, policy, ppo, seeds), list[Ended]()
+        player, ended, seen = _Player(envs, policy, ppo, seeds), list[Ended](), list[Samples]()
         for update in range(first, last):
             run.set_rate(ppo.lr * (1 - update / updates))
             batch, episodes = player.roll()
             ended += episodes
-            _learn(policy, run.optimiser, batch, ppo)
+            seen = [*seen, batch] if ppo.imitate else [batch]
+            _learn(policy, run.optimiser, seen, ppo)
         run.step, run.seconds = last * a_rollout, run.seconds + time.process_time() - began
         means = np.mean(ended or [(0.0, 0.0, 0.0)], axis=0).tolist()
         row = dict(zip(("return", "performance", "success"), means, strict=True))
@@ -82,7 +95,7 @@ class _Player:
         self.seen = self.history.push(observation, self.over)
 
     @torch.no_grad()
-    def roll(self) -> tuple[dict[str, Tensor], list[Ended]]:
+    def roll(self) -> tuple[Samples, list[Ended]]:
         """A rollout's samples by name, and the episodes that ended in it."""
         rows, ended, sigma = [], list[Ended](), self.policy.log_sigma.exp()
         for _ in range(self.ppo.rollout):
@@ -90,8 +103,9 @@ class _Player:
             self.policy.watch(state)
             mean, value, _ = self.policy(pictures, state)
             place = self.policy.scaled(torch.from_numpy(np.stack(self.info["target"]).astype(np.float32)))
+            best = torch.from_numpy(self._oracles()) if self.ppo.imitate else mean
             law = Normal(mean, sigma)
-            action = law.sample()
+            action = mean if self.ppo.imitate else law.sample()
             observation, reward, terminated, truncated, self.info = self.envs.step(action.clamp(-1, 1).numpy())
             played, self.over = ~self.over, terminated | truncated  # an episode's last picture is no step of it
             self.seen = self.history.push(observation, ~played)
@@ -99,12 +113,17 @@ class _Player:
             figures = np.stack([self.totals, self.info["performance"], self.info["is_success"]], axis=1)
             ended += map(tuple, figures[self.over].tolist())
             known = (torch.from_numpy(np.array(x, np.float32)) for x in (reward, terminated, self.over, played))
-            rows.append((pictures, state, place, action, law.log_prob(action).sum(1), value, *known))
+            rows.append((pictures, state, place, best, action, law.log_prob(action).sum(1), value, *known))
         *samples, value, paid, decided, over, counts = (torch.stack(column) for column in zip(*rows, strict=True))
         after = torch.cat([value[1:], self.policy(*map(torch.from_numpy, self.seen))[1][None]])
         gain = _gain(paid + self.ppo.gamma * after * (1 - decided) - value, over, self.ppo)
-        names = ("pictures", "state", "place", "action", "log_p", "gain", "worth")
+        names = ("pictures", "state", "place", "best", "action", "log_p", "gain", "worth")
         return {k: x[counts > 0] for k, x in zip(names, (*samples, gain, gain + value), strict=True)}, ended
+
+    def _oracles(self) -> NDArray[np.float32]:
+        """(N, A) what the oracle would do now."""
+        cameras: Any = self.envs.unwrapped
+        return np.stack([oracle(env.course) for env in cameras.envs])
 
 
 def _gain(surprise: Tensor, over: Tensor, ppo: PPO) -> Tensor:
@@ -115,16 +134,26 @@ def _gain(surprise: Tensor, over: Tensor, ppo: PPO) -> Tensor:
     return gain
 
 
-def _learn(policy: Policy, optimiser: torch.optim.Optimizer, batch: dict[str, Tensor], ppo: PPO) -> None:
+def _learn(policy: Policy, optimiser: torch.optim.Optimizer, seen: list[Samples], ppo: PPO) -> None:
+    """As many samples as `epochs` times the last rollout's, from all rollouts."""
+    batch = {name: torch.cat([samples[name] for samples in seen]) for name in seen[-1]}
     for _ in range(ppo.epochs):
-        for some in torch.randperm(len(batch["gain"])).split(ppo.minibatch):
+        for some in torch.randperm(len(batch["gain"]))[: len(seen[-1]["gain"])].split(ppo.minibatch):
             part = {name: column[some] for name, column in batch.items()}
             mean, value, place = policy(part["pictures"], part["state"])
-            ratio = (Normal(mean, policy.log_sigma.exp()).log_prob(part["action"]).sum(1) - part["log_p"]).exp()
-            gain = (part["gain"] - part["gain"].mean()) / (part["gain"].std() + 1e-8)
-            surrogate = torch.min(ratio * gain, ratio.clamp(1 - ppo.clip, 1 + ppo.clip) * gain).mean()
-            wrong = 0.5 * (value - part["worth"]).square().mean() + ppo.place * (place - part["place"]).square().mean()
-            optimiser.zero_grad()
-            (wrong - surrogate).backward()
+            wrong = ppo.place * (place - part["place"]).square().mean()
+            if ppo.imitate:
+                wrong = wrong + (mean - part["best"]).square().mean()
+            else:
+                wrong = wrong + 0.5 * (value - part["worth"]).square().mean() - _surrogate(policy, mean, part, ppo)
+            optimiser.zero_grad(set_to_none=False)
+            wrong.backward()
             torch.nn.utils.clip_grad_norm_(policy.parameters(), ppo.most_gradient)
             optimiser.step()
+
+
+def _surrogate(policy: Policy, mean: Tensor, part: Samples, ppo: PPO) -> Tensor:
+    ratio = (Normal(mean, policy.log_sigma.exp()).log_prob(part["action"]).sum(1) - part["log_p"]).exp()
+    gain = (part["gain"] - part["gain"].mean()) / (part["gain"].std() + 1e-8)
+    least: Tensor = torch.min(ratio * gain, ratio.clamp(1 - ppo.clip, 1 + ppo.clip) * gain)
+    return least.mean()

@@ -22,12 +22,12 @@ from spikecam_env.agents.agent import Agent, shipped
 from spikecam_env.agents.playing import Actor, episodes_of, score_of
 from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.tracker import Tracker
-from spikecam_env.agents.training import SIGHTS, Study, train_agent
+from spikecam_env.agents.training import SIGHTS, Study, learner, train_agent
 from spikecam_env.checked import checked_number
 from spikecam_env.datasets.ray_cluster import connected
 from spikecam_env.envs.tasks.low_light import LowLight
-from spikecam_env.errors import unknown_name
-from spikecam_env.untrusted import Count, Declared, Name, Positive, Seed, Whole, declared, parse_json, read_text
+from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.untrusted import Count, Declared, Name, Positive, Seed, Side, Whole, declared, parse_json, read_text
 from spikecam_env.whole import write_text_whole
 
 T = TypeVar("T")
@@ -43,7 +43,10 @@ class Case(Declared):
 
     task      an id
     sight     a name of `training.SIGHTS`, or of READY
-    interval  mean interval of a pixel [frames], of LowLight alone; None is the task's own light
+    interval  mean interval of a pixel [frames] that is played, of LowLight alone; None is the task's own light
+    trained   shortest and longest of training, of LowLight alone; None is as played
+    shape     (rows, columns) of the camera; None is the id's
+    imitate   whether the oracle is imitated (`agents.ppo`)
     steps     of training; 0 of READY
     episodes  of the test split that judge; None is `playing.episodes_of` the task
     """
@@ -51,26 +54,43 @@ class Case(Declared):
     task: Name
     sight: Name
     interval: Positive | None = None
+    trained: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = None
+    shape: Annotated[tuple[Side, Side], Field(strict=False)] | None = None
+    imitate: bool = False
     seed: Seed = 0
     steps: Whole = 0
     episodes: Count | None = None
 
     @property
-    def cell(self) -> tuple[str, str, float | None]:
+    def cell(self) -> Case:
         """Without the seed."""
-        return self.task, self.sight, self.interval
+        return self.model_copy(update={"seed": 0})
 
     @property
-    def study(self) -> Study:
+    def played(self) -> Study:
+        """What is put before the agent on test episodes."""
+        return self._under(self._light)
+
+    @property
+    def learned(self) -> Study:
         """What is put before the learner."""
-        light = {} if self.interval is None else {"task": LowLight(mean_interval=(self.interval, self.interval))}
-        return Study(self.task, READY.get(self.sight, self.sight), light)
+        return self._under(self.trained or self._light)
 
     @property
     def folder(self) -> str:
-        """Where its training is kept."""
-        light = "" if self.interval is None else f"-{self.interval:g}"
-        return f"{self.task}{light}-{self.sight}-{self.seed}"
+        """Where its training is kept; cases that are played alone differently have it in common."""
+        marks = [self.task, *(f"{size}" for size in self.shape or ())]
+        marks += [f"{interval:g}" for interval in dict.fromkeys(self.trained or self._light or ())]
+        return "-".join([*marks, self.sight, *["imitating"] * self.imitate, str(self.seed)])
+
+    @property
+    def _light(self) -> tuple[float, float] | None:
+        return None if self.interval is None else (self.interval, self.interval)
+
+    def _under(self, light: tuple[float, float] | None) -> Study:
+        task = {} if light is None else {"task": LowLight(mean_interval=light)}
+        shape = {} if self.shape is None else {"shape": self.shape}
+        return Study(self.task, READY.get(self.sight, self.sight), task | shape)
 
 
 class Result(Declared):
@@ -89,17 +109,35 @@ def cases(
     seeds: Iterable[int],
     steps: int | None,
     episodes: int | None = None,
+    *,
+    trained: tuple[float, float] | None = None,
+    shape: tuple[int, int] | None = None,
+    imitate: bool = False,
 ) -> list[Case]:
-    """Every cell with every seed, all cells of the first seed first; `intervals` are of LowLight."""
+    """Every cell with every seed, all cells of the first seed first; `intervals` and `trained` are of LowLight."""
     for task in tasks:
         Study(task)  # refuses unknown names
     for sight in sights:
         if sight not in (*SIGHTS, *READY):
             raise unknown_name("observation", sight, (*SIGHTS, *READY))
-    for interval in intervals:
+    for interval in (*intervals, *(trained or ())):
         checked_number(interval, "interval", 1.0, unit="frames")
+    if trained is not None and trained[0] > trained[1]:
+        raise InputError(f"intervals of training are {trained}; give the shortest, then the longest")
     found = [
-        Case(task=task, sight=sight, interval=interval, seed=seed, steps=_steps(sight, steps), episodes=episodes)
+        Case(task=task, sight=sight, interval=interval, shape=shape, seed=seed, episodes=episodes)
+        if sight in READY
+        else Case(
+            task=task,
+            sight=sight,
+            interval=interval,
+            trained=trained if task.startswith("LowLight") else None,
+            shape=shape,
+            imitate=imitate,
+            seed=seed,
+            steps=steps or PPO.steps,
+            episodes=episodes,
+        )
         for seed in seeds
         for task in tasks
         for sight in sights
@@ -111,14 +149,24 @@ def cases(
     return found
 
 
-def measure(case: Case, out: Path) -> Result:
-    """Train, unless nothing is to be learned, and play the test episodes; out: folder in which its run is kept."""
-    curve: tuple[dict[str, float], ...] = ()
-    if case.sight not in READY:
-        folder = out / case.folder
-        folder.mkdir(parents=True, exist_ok=True)
-        curve = tuple(train_agent(case.study, folder, PPO(steps=case.steps), case.seed).training["curve"])
-    env = case.study.make(split="test")
+def measure(cases: Sequence[Case], out: Path) -> list[Result]:
+    """Of cases with one training: train, unless nothing is to be learned, and play the test episodes of each; out:
+    folder in which the run is kept."""
+    curve = _curve(cases[0], out)
+    return [_played(case, curve, out) for case in cases]
+
+
+def _curve(case: Case, out: Path) -> tuple[dict[str, float], ...]:
+    """Of its training, which is done or gone on with if it is not whole."""
+    if case.sight in READY:
+        return ()
+    folder, ppo = out / case.folder, learner(case.steps, imitate=case.imitate)
+    folder.mkdir(parents=True, exist_ok=True)
+    return tuple(train_agent(case.learned, folder, ppo, case.seed).training["curve"])
+
+
+def _played(case: Case, curve: tuple[dict[str, float], ...], out: Path) -> Result:
+    env = case.played.make(split="test")
     try:
         score = score_of(actor_of(case, out, env), env, case.episodes or episodes_of(case.task))
     finally:
@@ -137,10 +185,13 @@ def actor_of(case: Case, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
 def study(wanted: Sequence[Case], out: Path, *, jobs: int = 1, ray: str | None = None) -> list[Result]:
     """What the record in `out` lacks is measured and written to it; the results of `wanted`."""
     known = {result.case: result for result in read_record(out / RECORD)}
-    missing = [case for case in wanted if case not in known]
-    work = partial(measure, out=out)
-    for result in tqdm(spread(work, missing, jobs, ray), total=len(missing), desc="agents", unit="run", disable=None):
-        known[result.case] = result
+    missing: dict[str, list[Case]] = {}
+    for case in wanted:
+        if case not in known:
+            missing.setdefault(case.folder, []).append(case)
+    runs = spread(partial(measure, out=out), missing.values(), jobs, ray)
+    for results in tqdm(runs, total=len(missing), desc="agents", unit="run", disable=None):
+        known |= {result.case: result for result in results}
         lines = "".join(result.model_dump_json() + "\n" for result in known.values())
         write_text_whole(out / RECORD, lines)
     return [known[case] for case in wanted]
@@ -182,26 +233,22 @@ def _done(work: Callable[[T], R], item: T) -> R:
 
 def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
     """A row a cell: mean score, its standard deviation over seeds, how many there are, processor minutes a seed."""
-    cells: dict[tuple[str, str, float | None], list[Result]] = {}
+    cells: dict[Case, list[Result]] = {}
     for result in results:
         cells.setdefault(result.case.cell, []).append(result)
     return [_row(cell, found) for cell, found in cells.items()]
 
 
-def _row(cell: tuple[str, str, float | None], found: list[Result]) -> dict[str, Any]:
-    task, sight, interval = cell
+def _row(cell: Case, found: list[Result]) -> dict[str, Any]:
     scores = np.array([result.score for result in found])
     return {
-        "task": task,
-        "sees": sight,
-        "interval [frames]": interval,
+        "task": cell.task,
+        "sees": cell.sight,
+        "interval [frames]": cell.interval,
         "score": float(scores.mean()),
         "sd": float(scores.std(ddof=1)) if len(scores) > 1 else None,
         "seeds": len(scores),
-        "steps": found[0].case.steps,
+        "steps": cell.steps,
         "cpu [min]": float(np.mean([result.cpu_s for result in found]) / 60),
+        "learned at [frames]": cell.trained and "{:g} to {:g}".format(*cell.trained),
     }
-
-
-def _steps(sight: str, steps: int | None) -> int:
-    return 0 if sight in READY else steps or PPO.steps

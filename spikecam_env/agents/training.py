@@ -73,15 +73,15 @@ class Study:
 
 
 SIGHTS: dict[str, dict[str, Any]] = {
-    **{obs: {"obs": obs} for obs in ("tfp", "tfi", "spikes", "rate", "frame30", "frame1000")},
+    **{obs: {"obs": obs} for obs in ("tfp", "tfi", "spikes", "rate", "dim_rate", "frame30", "frame1000")},
     "clean": {"obs": "tfp", "model": "ideal"},
 }
 """What an agent sees, by name: an observation of the noisy camera, or `clean`, the rates of a camera without noise."""
 
-LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4)}
-"""Steps ago of the pictures that a task is learned from; others from (0, 4)."""
-POOL = {"Saccade": 1, "ReadSpin": 1}
-"""Pixels squared that are averaged; others 2.  Spokes are finer than two pixels."""
+LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4), "LowLight": (0, 1, 2, 3, 4)}
+"""Steps ago of the pictures that a task is learned from; others from (0, 4).  In the dark every spike counts."""
+POOL = {"Saccade": 1, "ReadDigit": 1}
+"""Pixels squared that are averaged; others 2.  Spokes and strokes are finer than two pixels."""
 
 
 def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
@@ -108,6 +108,21 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
         pool=POOL.get(name, 2),
         answers=task.further if issubclass(task, ReadSpin) else 0,
     )
+
+
+IMITATED = 16
+"""Times that a sample is learned from by who imitates.  A policy must not go far from where its rewards were paid, so
+that PPO takes 4; an oracle's action stays right."""
+
+
+def learner(steps: int | None = None, *, imitate: bool = False, plain: bool = False) -> PPO:
+    """PPO of so many steps, by default those of the shipped agents.
+
+    imitate: the oracle, instead of what rewards teach; plain: without the loss that asks for the target's place
+    """
+    given: dict[str, Any] = {} if steps is None else {"steps": steps}
+    given |= {"imitate": True, "epochs": IMITATED} if imitate else {}
+    return PPO(**given, place=0.0 if plain else PPO.place)
 
 
 def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16) -> Agent:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from spikecam_env.checked import checked_count, checked_whole
-from spikecam_env.cli.options import Checked, Count, Workers
+from spikecam_env.cli.options import Checked, Count, Size, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.agents.study import Case
@@ -42,11 +42,18 @@ class Agents:
         "frame1000",
         "tracker",
     )
-    """What agents see: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30, frame1000; without
+    """What agents see: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), frame30,
+    frame1000; without
     training: tracker (classical, sees tfp), tracker-rate, tracker-clean; shipped (the task's shipped agent, trained on
     tfp, sees it), shipped-rate, shipped-clean."""
     intervals: tuple[float, ...] = ()
-    """Mean intervals [frames] at which LowLight-v1 is learned and played, each a row."""
+    """Mean intervals [frames] at which LowLight-v1 is played, each a row, and learned."""
+    trained: tuple[float, float] | None = None
+    """Shortest and longest mean interval [frames] at which LowLight-v1 is learned, one agent for all --intervals."""
+    size: Size | None = None
+    """Rows and columns of the camera.  Default: those of the id."""
+    imitate: bool = False
+    """Learn to act like the oracle, instead of from rewards (as of `train-agent`)."""
     seeds: Annotated[int, Checked(checked_count, most=MOST_SEEDS)] = 5
     """Trainings of each task and observation, with different seeds."""
     first_seed: Annotated[int, Checked(checked_whole, least=0, most=10**9)] = 0
@@ -72,7 +79,17 @@ class Agents:
 
         tasks = [name.removeprefix("spikecam_env/") for name in self.tasks]
         seeds = range(self.first_seed, self.first_seed + self.seeds)
-        wanted = cases(tasks, self.observations, self.intervals, seeds, self.steps, self.episodes)
+        wanted = cases(
+            tasks,
+            self.observations,
+            self.intervals,
+            seeds,
+            self.steps,
+            self.episodes,
+            trained=self.trained,
+            shape=self.size,
+            imitate=self.imitate,
+        )
         with out_folder(self.out):
             results = study(wanted, self.out, jobs=self.jobs, ray=self.ray)
             text = table(summary(results))
@@ -89,7 +106,7 @@ class Agents:
         from spikecam_env.cli.panels import write_film
 
         for case in played:
-            env = case.study.make(split="test", render_mode="rgb_array")
+            env = case.played.make(split="test", render_mode="rgb_array")
             try:
                 write_film(
                     self.out / f"{case.folder}.mp4", pictures(actor_of(case, self.out, env), env, seed=0), FILM_FPS

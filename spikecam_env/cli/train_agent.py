@@ -27,7 +27,8 @@ class TrainAgent:
     out: Path
     """Folder of the run: agent.pt, curve.json, and last.pt to go on from."""
     obs: str = "tfp"
-    """What the agent sees: tfp, tfi, spikes, rate (denoised), clean (no noise), frame30 or frame1000."""
+    """What the agent sees: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise),
+    frame30 or frame1000."""
     steps: Count | None = None
     """Steps of all environments together.  Default: as many as the shipped agents had."""
     seed: Seed = 0
@@ -37,15 +38,17 @@ class TrainAgent:
     plain: bool = False
     """Train by PPO from rewards alone, without the auxiliary loss that asks for the target's place."""
 
+    imitate: bool = False
+    """Learn to act like the oracle, in the states that the agent itself comes to, instead of from rewards (DAgger)."""
+
     def run(self) -> None:
-        from spikecam_env.agents.ppo import PPO
-        from spikecam_env.agents.training import Study, train_agent
+        from spikecam_env.agents.training import Study, learner, train_agent
         from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.table import table
 
         study = Study(self.task.removeprefix("spikecam_env/"), self.obs)
         with out_folder(self.out):
-            ppo = PPO(steps=self.steps or PPO.steps, place=0.0 if self.plain else PPO.place)
+            ppo = learner(self.steps, imitate=self.imitate, plain=self.plain)
             agent = train_agent(study, self.out, ppo, self.seed, self.environments)
         print(table(agent.training["curve"][-10:]))
         print(f"wrote agent.pt, curve.json and last.pt in {self.out}")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 import torch
 
 from denoiser.run import Run
+from spikecam_env.agents import ppo
 from spikecam_env.agents import study as studies
 from spikecam_env.agents.agent import Agent, shipped
 from spikecam_env.agents.history import History
@@ -19,7 +22,7 @@ from spikecam_env.agents.playing import score_of
 from spikecam_env.agents.policy import LOG_SIGMA, Recipe
 from spikecam_env.agents.ppo import PPO, _gain
 from spikecam_env.agents.tracker import Tracker
-from spikecam_env.agents.training import Study, train_agent
+from spikecam_env.agents.training import Study, learner, train_agent
 from spikecam_env.cli.main import run as command
 from spikecam_env.envs.tasks.read_spin import SAID
 from spikecam_env.errors import InputError
@@ -85,11 +88,12 @@ def test_gain_is_the_discounted_sum_of_surprises_to_the_end_of_an_episode() -> N
     assert _gain(surprise, over, SMALL)[:, 0].tolist() == pytest.approx([1 + 2 * weight, 2, 4])
 
 
-def test_a_run_that_was_stopped_and_resumed_is_the_run_that_was_not(tmp_path: Path, monkeypatch) -> None:
-    study, whole, parts = Study("Catch-v1"), tmp_path / "whole", tmp_path / "parts"
+@pytest.mark.parametrize("how", [SMALL, replace(SMALL, imitate=True)], ids=["rewards", "oracle"])
+def test_a_run_that_was_stopped_and_resumed_is_the_run_that_was_not(how: PPO, tmp_path: Path, monkeypatch) -> None:
+    study, whole, parts = Study("Catch-v1", options={"shape": (16, 16)}), tmp_path / "whole", tmp_path / "parts"
     whole.mkdir()
     parts.mkdir()
-    train_agent(study, whole, SMALL, seed=3, environments=2)
+    train_agent(study, whole, how, seed=3, environments=2)
     save = Run.save
 
     def stop(run: Run, path: Path) -> None:
@@ -98,13 +102,31 @@ def test_a_run_that_was_stopped_and_resumed_is_the_run_that_was_not(tmp_path: Pa
 
     monkeypatch.setattr(Run, "save", stop)
     with pytest.raises(KeyboardInterrupt):
-        train_agent(study, parts, SMALL, seed=3, environments=2)
+        train_agent(study, parts, how, seed=3, environments=2)
     monkeypatch.setattr(Run, "save", save)
-    train_agent(study, parts, SMALL, seed=3, environments=2)
+    train_agent(study, parts, how, seed=3, environments=2)
     one, two = (Agent.load(folder / "agent.pt") for folder in (whole, parts))
     assert len(one.training["curve"]) == 2
     for name, weights in one.policy.state_dict().items():
         assert torch.equal(weights, two.policy.state_dict()[name]), name
+
+
+def test_who_imitates_plays_without_noise_and_comes_to_act_like_the_oracle(tmp_path: Path, monkeypatch) -> None:
+    misses: list[float] = []
+    learn = ppo._learn
+
+    def watch(policy: Any, optimiser: Any, seen: list[dict[str, torch.Tensor]], how: PPO) -> None:
+        misses.append(float((seen[-1]["action"] - seen[-1]["best"]).square().mean()))
+        learn(policy, optimiser, seen, how)
+
+    monkeypatch.setattr(ppo, "_learn", watch)
+    imitating = replace(learner(2048, imitate=True), rollout=32)
+    train_agent(Study("Catch-v1", options={"shape": (16, 16)}), tmp_path, imitating, environments=4)
+    first, last = np.mean(misses[:2]), np.mean(misses[-4:])
+    print(f"mean square from the oracle's action: {first:.2f} at first, {last:.2f} at last")
+    assert last < first / 2
+    policy = Agent.load(tmp_path / "agent.pt").policy
+    assert policy.log_sigma.tolist() == [LOG_SIGMA]  # noise is not played, and not learned
 
 
 def test_an_agent_acts_for_many_as_for_each(tmp_path: Path) -> None:
@@ -153,7 +175,14 @@ def test_the_tracker_is_as_good_as_the_oracle(task: str, episodes: int, obs: str
 
 @pytest.mark.parametrize(
     "task, least, episodes",
-    [("Catch-v1", 0.6, 20), ("Saccade-v1", 0.5, 10), ("Track-v1", 0.7, 1), ("LowLight-v1", 0.7, 1)],
+    [
+        ("Catch-v1", 0.6, 20),
+        ("Saccade-v1", 0.5, 10),
+        ("Track-v1", 0.7, 1),
+        ("LowLight-v1", 0.7, 1),
+        ("Exposure-v1", 0.7, 1),
+        ("ReadSpin-v1", 0.3, 10),
+    ],
 )
 def test_a_shipped_agent_does_its_task(task: str, least: float, episodes: int) -> None:
     agent = Agent.load(task)
@@ -199,8 +228,26 @@ def test_a_study_goes_on_from_its_record(tmp_path: Path, monkeypatch, capsys) ->
     assert [row[1] for row in rows] == ["tracker", "frame30"] and float(rows[0][3]) == 1.0
 
 
+def test_one_training_is_played_at_every_light(tmp_path: Path) -> None:
+    wanted = studies.cases(
+        ["LowLight-v1"], ["tfp", "tracker"], [50, 100], [3], 2, 1, trained=(20, 200), shape=(16, 16), imitate=True
+    )
+    results = studies.study(wanted, tmp_path)
+    assert [(result.case.sight, result.case.interval) for result in results] == [
+        ("tfp", 50),
+        ("tfp", 100),
+        ("tracker", 50),
+        ("tracker", 100),
+    ]
+    (folder,) = tmp_path.glob("*/")
+    assert folder.name == "LowLight-v1-16-16-20-200-tfp-imitating-3"
+    assert Agent.load(folder / "agent.pt").training["ppo"]["imitate"] is True
+    with pytest.raises(InputError, match="shortest"):
+        studies.cases(["LowLight-v1"], ["tfp"], [], [0], 2, trained=(200, 20))
+
+
 def test_a_study_plays_the_agent_that_comes_with_the_package(tmp_path: Path) -> None:
-    result = studies.measure(studies.Case(task="Catch-v1", sight="shipped", episodes=5), tmp_path)
+    (result,) = studies.measure([studies.Case(task="Catch-v1", sight="shipped", episodes=5)], tmp_path)
     agent = Agent.load("Catch-v1")
     env = agent.make(split="test")
     assert result.score == score_of(agent, env, 5) > 0

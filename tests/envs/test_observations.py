@@ -176,6 +176,18 @@ def test_before_the_denoiser_has_a_picture_it_is_the_noisy_rate_and_marked() -> 
     assert ages == [-1, -1, 16, 24, 16]
 
 
+def test_a_dim_rate_is_the_same_plane_ten_times_brighter() -> None:
+    def shown_last(obs: str) -> Any:
+        env = gymnasium.make(DISK, **SMALL, obs=obs)
+        pictures = [env.reset(seed=1, options={"light": 0.05})[0]]
+        return [*pictures, *(env.step(np.zeros(2, np.float32))[0] for _ in range(3))]
+
+    for bright, dim in zip(shown_last("rate"), shown_last("dim_rate"), strict=True):
+        low, high = 10 * (bright.astype(float) - 0.5), 10 * (bright.astype(float) + 0.5)
+        assert np.all((dim >= np.minimum(low - 0.5, 255)) & (dim <= high + 0.5))
+        assert dim.max() > bright.max()
+
+
 @pytest.mark.parametrize("obs", ["tfp", "isi", "rate", "frame1000"])
 def test_one_stream_begins_anew_while_another_goes_on(obs: str) -> None:
     law, view = observation(obs), View((8, 8), 20)

@@ -33,9 +33,9 @@ __all__ = [
 ]
 
 
-def _denoised() -> Observation:
+def _denoised(white: float = 1.0) -> Observation:
     """Imported when first asked for: torch takes seconds, and the denoiser lies above the environments."""
-    law: Observation = import_module("denoiser.observation").Rate()
+    law: Observation = import_module("denoiser.observation").Rate(white=white)
     return law
 
 
@@ -47,6 +47,7 @@ OBSERVATIONS: dict[str, Callable[[], Observation]] = {
     "tfi": TFI,
     "isi": ISI,
     "rate": _denoised,
+    "dim_rate": partial(_denoised, white=0.1),
     "frame30": partial(FrameCamera, 30.0),
     "frame1000": partial(FrameCamera, 1000.0),
 }
