@@ -1,24 +1,30 @@
-"""Steps a second of environments, alone and as vectors, and what a step costs beside scene and sensor.
+"""Steps a second of environments, alone and as vectors, and where the processor's time of a step goes.
 
 spikecam bench env
 
-Other programs slow a machine by tens of per cent.  So what is compared is measured in turn, in short rounds; a ratio is
-the median over rounds of ratios within one round, and a share is one of CPU time.
+Other programs slow a machine, and take turns with what is measured.  So what is compared is measured in turn, in short
+rounds; a ratio is the median over rounds of ratios within one round; and the processor's time, of all processes of a
+vector, is given beside the clock's.
 """
 
 from __future__ import annotations
 
+import ctypes
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 import spikecam_env.envs  # noqa: F401
-from spikecam_env.envs.spike_camera import SpikeCameraEnv, expose
+from spikecam_env.envs.spike_camera import SpikeCameraEnv, lights_of
+from spikecam_env.sensor import Keyframes, step_together
 from spikecam_env.threads import as_many
 
 OPTIONS: dict[str, Any] = {"shape": (64, 64), "frames_per_step": 40}
@@ -34,21 +40,23 @@ WARM_UP = 3
 @dataclass(frozen=True)
 class Contestant:
     """how: of the row.  step: one step of all environments.  envs: in this process, whose scenes and cameras can be
-    asked alone; empty where there are none.  close: gives everything back."""
+    asked alone; empty where there are none.  processes: others that do the work.  close: gives everything back."""
 
     how: str
     environments: int
     step: Callable[[], Any]
     envs: Sequence[SpikeCameraEnv]
     close: Callable[[], Any]
+    processes: Sequence[int] = ()
 
-    def steps_a_second(self, seconds: float) -> float:
-        """All environments together."""
-        begin, calls = time.perf_counter(), 0
+    def seconds_a_step(self, seconds: float) -> tuple[float, float]:
+        """Of one environment: by the clock, and of the processor; measured for so long at least."""
+        begin, busy, calls = time.perf_counter(), cpu_seconds(self.processes), 0
         while (elapsed := time.perf_counter() - begin) < seconds or calls == 0:
             self.step()
             calls += 1
-        return self.environments * calls / elapsed
+        steps = self.environments * calls
+        return elapsed / steps, (cpu_seconds(self.processes) - busy) / steps
 
 
 def bench_environments(
@@ -57,13 +65,15 @@ def bench_environments(
     seconds: float = 0.4,
     rounds: int = ROUNDS,
 ) -> list[dict[str, Any]]:
-    """Steps of 40 frames of 64 x 64 pixels a second, all environments together; cameras that do not turn.
+    """Steps of 40 frames of 64 x 64 pixels, all environments together; cameras that do not turn.
 
     seconds: of each row in a round.
     Columns: id, observation, environments, how (single, sync, async, native), steps/s (median over rounds), x single
     (one environment of the same id and observation) and x async (as many environments), medians over rounds of ratios
-    within a round; x real time (1000 steps a second each camera); beside scene and sensor, %: of a step's CPU time,
-    what is left when the same light is painted and the same frames are exposed alone, where that can be measured.
+    within a round; x real time (1000 steps a second each camera).
+    Of the processor, which other programs take from the clock's time but not from its own: processor ms of an
+    environment's step, all processes together, and x async of it.  Where it goes, %, of environments in this process:
+    the same light painted alone, the same frames exposed alone, and what is left.
     """
     jobs = [(name, obs, count) for name, obs in cases for count in counts]
     rows: list[dict[str, Any]] = []
@@ -84,50 +94,82 @@ def _group(
     for one in contestants:
         for _ in range(WARM_UP):
             one.step()
-    rates = np.array([[one.steps_a_second(seconds) for one in contestants] for _ in range(rounds)])
+    taken = np.array([[one.seconds_a_step(seconds) for one in contestants] for _ in range(rounds)])
+    clock, processor = taken[:, :, 0], taken[:, :, 1]
     asynchronous = [one.how for one in contestants].index("async")
     rows = []
     for place, one in enumerate(contestants):
         if place == 0 and not with_single:
             continue
-        real_time = 40_000 / OPTIONS["frames_per_step"] * one.environments
+        rate = 1.0 / float(np.median(clock[:, place]))
+        light, camera = shares(one, seconds, rounds) if one.envs else ("", "")
         rows.append(
             {
                 "id": name,
                 "observation": obs,
                 "environments": one.environments,
                 "how": one.how,
-                "steps/s": float(np.median(rates[:, place])),
-                "x single": float(np.median(rates[:, place] / rates[:, 0])),
-                "x async": float(np.median(rates[:, place] / rates[:, asynchronous])),
-                "x real time": float(np.median(rates[:, place]) / real_time),
-                "beside scene and sensor, %": 100 * beside(one, seconds, rounds) if one.envs else "",
+                "steps/s": rate,
+                "x single": _times(clock, 0, place),
+                "x async": _times(clock, asynchronous, place),
+                "x real time": rate * OPTIONS["frames_per_step"] / 40_000 / one.environments,
+                "processor ms": 1e3 * float(np.median(processor[:, place])),
+                "x async, processor": _times(processor, asynchronous, place),
+                "light, %": light,
+                "camera, %": camera,
+                "beside both, %": 100.0 - light - camera if one.envs else "",
             }
         )
     return rows
 
 
-def beside(one: Contestant, seconds: float, rounds: int) -> float:
-    """Share of the CPU time of a step that is not the scenes' and the cameras'."""
-    threads = as_many(None, len(one.envs)) if one.how == "native" else 1
+def _times(seconds: NDArray[np.float64], other: int, place: int) -> float:
+    """How many times as fast as another contestant one is, of seconds (rounds, contestants)."""
+    return float(np.median(seconds[:, other] / seconds[:, place]))
 
-    def alone() -> None:
+
+def shares(one: Contestant, seconds: float, rounds: int) -> tuple[float, float]:
+    """Of the processor's time of a step [%]: the scenes', and the cameras'."""
+    threads = as_many(None, len(one.envs)) if one.how == "native" else 1
+    calls = max(1, round(seconds / one.seconds_a_step(seconds)[0] / one.environments))
+    light: list[Keyframes] = []
+
+    def paint() -> None:
+        light[:] = lights_of(one.envs, threads=threads)
+
+    def expose() -> None:
         for env in one.envs:  # the block of the last step once more
             env.sensor.frame = env.asked[0]
-        expose(one.envs, threads=threads)
+        step_together([env.sensor for env in one.envs], light, OPTIONS["frames_per_step"], threads=threads)
 
-    alone()
-    calls = max(1, round(seconds * one.steps_a_second(seconds) / one.environments))
-    shares = [1.0 - cpu_seconds(alone, calls) / cpu_seconds(one.step, calls) for _ in range(rounds)]
-    return float(np.median(shares))
+    found = []
+    for _ in range(rounds):
+        alone = [cpu_of(part, calls) for part in (paint, expose)]
+        of_step = cpu_of(one.step, calls)
+        found.append([100.0 * part / of_step for part in alone])
+    of_light, of_camera = np.median(found, axis=0)
+    return float(of_light), float(of_camera)
 
 
-def cpu_seconds(call: Callable[[], Any], calls: int) -> float:
-    """Of this process, all its threads."""
-    begin = time.process_time()
+def cpu_of(call: Callable[[], Any], calls: int) -> float:
+    """Seconds of the processor that so many calls take, all threads of this process."""
+    begin = cpu_seconds()
     for _ in range(calls):
         call()
-    return time.process_time() - begin
+    return cpu_seconds() - begin
+
+
+def cpu_seconds(others: Sequence[int] = ()) -> float:
+    """Of the processor so far: of this process and these others; NaN where others cannot be asked."""
+    return time.process_time() + sum(time.clock_gettime(clock) if clock else np.nan for clock in map(_clock, others))
+
+
+@lru_cache(maxsize=256)
+def _clock(process: int) -> int:
+    """POSIX's clock of a process's time on the processor; 0 where there is none."""
+    found = ctypes.c_int(0)
+    ask = getattr(ctypes.CDLL(None), "clock_getcpuclockid", None) if os.name == "posix" else None
+    return found.value if ask is not None and ask(process, ctypes.byref(found)) == 0 else 0
 
 
 def single(name: str, obs: str) -> Contestant:
@@ -151,4 +193,5 @@ def vector(name: str, obs: str, how: str, count: int) -> Contestant:
     env.reset(seed=0)
     still = np.zeros(env.action_space.shape, np.float32)
     envs = env.unwrapped.envs if how == "native" else []
-    return Contestant(how, count, lambda: env.step(still), envs, env.close)
+    processes = [process.pid for process in env.unwrapped.processes] if how == "async" else []
+    return Contestant(how, count, lambda: env.step(still), envs, env.close, processes)

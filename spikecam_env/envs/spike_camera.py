@@ -314,15 +314,20 @@ def expose(
 
     outs: arrays (K, H, W) uint8 for the spikes.  threads: of these calls.  each: asks the scenes that are no planes.
     """
+    lights = lights_of(envs, threads=threads, each=each)
+    spikes = step_together([env.sensor for env in envs], lights, envs[0].frames_per_step, outs=outs, threads=threads)
+    for env, own, block in zip(envs, lights, spikes, strict=True):
+        env.take(own, block)
+
+
+def lights_of(envs: Sequence[SpikeCameraEnv], *, threads: int | None = 1, each: Each = in_turn) -> list[Keyframes]:
+    """The light of the block that every environment is to expose; arguments as of `expose`."""
     flat = [n for n, env in enumerate(envs) if not env.renders]
     other = [n for n, env in enumerate(envs) if env.renders]
     planes = [envs[n].scene.plane(*envs[n].asked) for n in flat]  # type: ignore[attr-defined]
     light = dict(zip(flat, painted_planes(planes, threads), strict=True))
     light |= dict(zip(other, each(lambda n: envs[n].scene.radiance(*envs[n].asked), other), strict=True))
-    lights = [light[n] for n in range(len(envs))]
-    spikes = step_together([env.sensor for env in envs], lights, envs[0].frames_per_step, outs=outs, threads=threads)
-    for env, own, block in zip(envs, lights, spikes, strict=True):
-        env.take(own, block)
+    return [light[n] for n in range(len(envs))]
 
 
 def _observation(obs: str | Observation, packed: bool) -> Observation:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import cv2
@@ -15,7 +15,6 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 import spikecam_env.envs  # noqa: F401
-from denoiser import DenoiseObservation
 from spikecam_env.envs.registration import ENVIRONMENTS, SMALL_TASKS
 
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20}
@@ -43,7 +42,23 @@ def plain(name: str) -> Maker:
 
 def denoised(name: str) -> Maker:
     """Its observations are denoised, and its spikes beside them."""
-    return lambda: DenoiseObservation(plain(name)())
+
+    def make() -> gymnasium.Env:
+        from denoiser import DenoiseObservation  # torch takes seconds, which a process without the denoiser need not
+
+        return DenoiseObservation(plain(name)())
+
+    return make
+
+
+def alike(names: Iterable[str]) -> list[list[str]]:
+    """The ids with equal actions together; each is made once, so that what follows from its scene is known to forks."""
+    groups: dict[tuple[int, ...], list[str]] = {}
+    for name in names:
+        env = plain(name)()
+        groups.setdefault(env.action_space.shape or (), []).append(name)
+        env.close()
+    return list(groups.values())
 
 
 def seen(vector: Any) -> dict[str, np.ndarray]:
@@ -84,13 +99,12 @@ def use_every_pool() -> None:
 
 
 def every_id() -> None:
-    """Forked from a fresh process, two ids at once where their actions are alike; then the same here; then forked from
-    a process that has used every pool, with and without the denoiser."""
-    names = list(ENVIRONMENTS)
+    """Forked from a process that has exposed nothing, all ids at once whose actions are alike; then the same here; then
+    forked from a process that has used every pool, with and without the denoiser."""
     vector = gymnasium.make_vec("spikecam_env/Fan-v0", num_envs=2, vectorization_mode="async", **SMALL)
     vector.reset(seed=0)
     vector.close()
-    groups = [names[i : i + 2] for i in range(0, len(names), 2)] + [[name] for name in SMALL_TASKS]
+    groups = alike([*ENVIRONMENTS, *SMALL_TASKS])
     fresh = [seen(AsyncVectorEnv([denoised(name) for name in group])) for group in groups]
     for group, forked in zip(groups, fresh, strict=True):
         same(forked, seen(SyncVectorEnv([denoised(name) for name in group])), f"{group}, synchronous")

@@ -61,30 +61,32 @@ class TFP(Observation):
         if kept:
             frames = np.concatenate([state.frames, frames], axis=1)
         seen = np.minimum(state.seen + count, window)
-        fired = counts(frames[:, -window:])
-        rate = fired[:, None] / seen[:, None, None, None].astype(np.float32)
-        return grey(rate), Recent(frames[:, frames.shape[1] - kept :], seen)
+        levels = grey(np.arange(window + 1) / seen[:, None].astype(np.float32))
+        return looked_up(frames[:, -window:], levels), Recent(frames[:, frames.shape[1] - kept :], seen)
 
 
-def counts(spikes: NDArray[np.uint8]) -> NDArray[np.int32]:
-    """Spikes of each pixel (N, H, W) in blocks (N, K, H, W)."""
+def looked_up(spikes: NDArray[np.uint8], levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Pictures (N, 1, H, W) of blocks (N, K, H, W): of each pixel what levels (N, K + 1) say of so many spikes."""
     streams, frames, rows, columns = spikes.shape
-    total = np.zeros((streams, rows * columns), np.int32)
-    _count(np.ascontiguousarray(spikes).reshape(streams, frames, -1), total)
-    return total.reshape(streams, rows, columns)
+    pictures = np.empty((streams, 1, rows, columns), np.uint8)
+    _look_up(np.ascontiguousarray(spikes).reshape(streams, frames, -1), levels, pictures.reshape(streams, -1))
+    return pictures
 
 
 @njit(cache=True, nogil=True)
-def _count(spikes: NDArray[np.uint8], total: NDArray[np.int32]) -> None:
-    """spikes (N, K, P) uint8; total (N, P) int32, added to.  Sums of up to 255 frames fit in bytes, which are added
-    faster than numpy adds them, as numbers of 32 bits."""
+def _look_up(spikes: NDArray[np.uint8], levels: NDArray[np.uint8], pictures: NDArray[np.uint8]) -> None:
+    """spikes (N, K, P); pictures (N, P).  Sums of up to 255 frames fit in bytes, which are added faster than numpy adds
+    them, as numbers of 32 bits."""
     streams, frames, pixels = spikes.shape
-    few = np.empty(pixels, np.uint8)
+    few, total = np.empty(pixels, np.uint8), np.empty(pixels, np.int32)
     for n in range(streams):
+        total[:] = 0
         for begin in range(0, frames, 255):
             few[:] = 0
             for k in range(begin, min(begin + 255, frames)):
                 for i in range(pixels):
                     few[i] += spikes[n, k, i]
             for i in range(pixels):
-                total[n, i] += few[i]
+                total[i] += few[i]
+        for i in range(pixels):
+            pictures[n, i] = levels[n, min(total[i], frames)]
