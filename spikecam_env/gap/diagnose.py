@@ -40,7 +40,7 @@ from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
-from spikecam_env.gap.settings import DiagnosisSettings
+from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
@@ -80,15 +80,16 @@ def diagnose(
     jobs: threads, which change no bit.  effort: times the campaign may be simulated before nothing more is begun that
     an answer can do without, such as a third effect; infinite for whatever it takes.  static_only: of unknown scenes
     that move, look at the pixels that do not.  search: `forward`, or `race`, which is experimental.  settings: tuned
-    numbers, by default `DiagnosisSettings()`.  Raises InputError
-    for an unreadable campaign, an unknown name, no effort, or too few static recordings of known light to refit the
-    unit by.
+    numbers, by default `DiagnosisSettings()`.
+
+    Raises InputError for an unreadable campaign, an unknown name, no effort, settings of another type,
+    or too few static recordings of known light to refit the unit by.
     """
     if search not in SEARCHES:
         raise unknown_name("search", search, SEARCHES)
     if not effort > 0:
         raise InputError(f"effort {effort:g}: it must be above 0")
-    settings = settings or DiagnosisSettings()
+    settings = checked_settings(settings)
     stages = Stages(progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     tested = model if isinstance(model, SensorModel) else SensorModel.load(model)
@@ -204,12 +205,13 @@ def of_spikes(
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: DiagnosisSettings | None = None) -> Case:
     """Observe and refit a campaign; recordings at another V_d than most, and rates only, are left to SNEE.
 
-    Raises InputError where a recording of steady light moves.
+    Raises InputError where a recording of steady light moves, and for settings of another type.
     """
+    settings = checked_settings(settings)
     seen, motion = without_motion(observed(campaign), static_only=False)
     if motion:
         raise InputError(f"{motion[0].text}; a static recording is needed")
-    return case_of_observed(campaign, seen, seed, jobs, settings or DiagnosisSettings())
+    return case_of_observed(campaign, seen, seed, jobs, settings)
 
 
 def observed(campaign: Campaign) -> Observed:

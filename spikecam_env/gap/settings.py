@@ -18,11 +18,15 @@ declarations below.  `tests/gap/test_settings.py` changes each of them by a fact
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import Field, asdict, dataclass, field, fields, replace
 from typing import Any
 
-from spikecam_env.errors import unknown_name
+from spikecam_env.checked import checked_number, checked_whole
+from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.untrusted import read_toml
 
 CHOICE = "a choice; the blind trial measures it with the others"
 TUNED = "set on the blind trial's part `tune`"
@@ -31,16 +35,34 @@ PER_PARAMETER = 2.0
 """Mean reduction of the deviance by a parameter without a meaning (Akaike)."""
 
 
-def setting(default: Any, unit: str, what: str, source: str) -> Any:
+def setting(default: Any, unit: str, what: str, source: str, least: float = 0.0, most: float = math.inf) -> Any:
     """A field of settings.
 
     Args:
-        default: its value.
-        unit: of the value; "" where it is a plain number.
+        default: its value, whose kind others have: a whole number, a number, or two numbers, the lower first.
+        unit: of the value.
         what: what it decides, in one sentence.
         source: where the value comes from: a command that measures it, literature, or a choice.
+        least: its lowest value; 0 is none.
+        most: its highest value.
     """
-    return field(default=default, metadata={"unit": unit, "what": what, "source": source})
+    about = {"unit": unit, "what": what, "source": source, "range": (least, most)}
+    return field(default=default, metadata=about)
+
+
+def check_setting(name: str, declared: Field[Any], value: object) -> None:
+    """Raises InputError unless a value has the kind of its setting's default, and is in its range."""
+    least, most = declared.metadata["range"]
+    if isinstance(declared.default, tuple):
+        if not (isinstance(value, tuple) and len(value) == 2):
+            raise InputError(f"{name} = {shown(value)}; it must be two numbers, the lower first")
+        low, high = (checked_number(v, name, least, most, above=least == 0) for v in value)
+        if low >= high:
+            raise InputError(f"{name} = {shown(value)}; the lower number must come first")
+    elif isinstance(declared.default, int):
+        checked_whole(value, name, max(int(least), 1))
+    else:
+        checked_number(value, name, least, most, above=least == 0)
 
 
 @dataclass(frozen=True)
@@ -111,19 +133,24 @@ class Judging:
         "p, adjusted",
         "Below it, recordings and model disagree.",
         "one false alarm in fifty campaigns; 2.0 % of 200 by `python -m benchmarks.moderated_variances`",
+        most=1.0,
     )
     gate: float = setting(
         0.005,
         "p, adjusted",
         "Below it, a named effect leaves something.",
         "stricter than the alarm, as a named effect is itself only good to its tolerance",
+        most=1.0,
     )
-    chance_p: float = setting(0.002, "p, adjusted", "Above it, what no candidate explains may be chance.", TUNED)
+    chance_p: float = setting(
+        0.002, "p, adjusted", "Above it, what no candidate explains may be chance.", TUNED, most=1.0
+    )
     tolerance: float = setting(
         0.05,
         "of an effect",
         "Error of an effect's simulated change.",
         "laws of first order in sub-frame time, beside a camera's; more twins do not make it smaller",
+        most=1.0,
     )
     clear: float = setting(
         5.0,
@@ -156,21 +183,28 @@ class UnitSettings:
         "times nominal",
         "Dark level and spreads of units; beyond it, a parameter is off.",
         "units differ by 5-20 %",
+        least=1.0,
     )
     usual_noise: float = setting(
         1.5,
         "times nominal",
         "The same of s^2, the relative variance of an interval.",
         "the electrons, or the square of the millivolts, of a unit 20 % off",
+        least=1.0,
     )
     identifiable: float = setting(
         0.5,
         "of the refit's s^2",
         "If the unit's own share is smaller, refits of twins do not identify it, and it stays as it was.",
         CHOICE,
+        most=1.0,
     )
     own_share: float = setting(
-        0.9, "of the refit's s^2", "If the unit's own share is smaller, it is fitted with the effects.", CHOICE
+        0.9,
+        "of the refit's s^2",
+        "If the unit's own share is smaller, it is fitted with the effects.",
+        CHOICE,
+        most=1.0,
     )
 
 
@@ -183,6 +217,7 @@ class Twins:
         "units",
         "Drawn for the fixed pattern of a model; ten times as many where these do not show the measured value.",
         CHOICE,
+        least=2,
     )
     spread_limits: tuple[float, float] = setting(
         (0.6, 1.67), "times nominal", "Spreads of drawn units; beyond them it is a gap.", "units differ by 5-20 %"
@@ -191,7 +226,11 @@ class Twins:
         2, "twins", "Confirm a candidate; show a model whose gap is large beside what two leave open.", CHOICE
     )
     in_the_end: int = setting(
-        4, "twins", "Confirm the chosen effects, give the covariance of their parameters, test a bound.", CHOICE
+        4,
+        "twins",
+        "Confirm the chosen effects, give the covariance of their parameters, test a bound.",
+        CHOICE,
+        least=2,
     )
     of_events: int = setting(
         3,
@@ -199,7 +238,7 @@ class Twins:
         "Of a sparse or mixed effect, which cannot be simulated stronger to exceed one twin's noise.",
         CHOICE,
     )
-    of_random_course: int = setting(6, "twins", "Of an effect that shows by the scatter of its twins.", CHOICE)
+    of_random_course: int = setting(6, "twins", "Of an effect that shows by the scatter of its twins.", CHOICE, least=2)
     target_size: float = setting(
         60.0,
         "noises",
@@ -211,6 +250,7 @@ class Twins:
         "times",
         "A strength, and the unit under it, are extrapolated at once.",
         "in proportion so far: `python -m benchmarks.in_proportion`",
+        least=1.0,
     )
     converged: float = setting(
         3e-4,
@@ -263,21 +303,24 @@ class Searching:
         "What removes less is not worth another fit: a start, a shape, a runner-up of an earlier effect; nor is a "
         "second bend that removes less of what is beyond chance refined before more is found.",
         CHOICE,
+        most=1.0,
     )
     same_share: float = setting(
         0.8,
         "of what the best removes",
         "A runner-up, or another start, that removes more is tried in its place.",
         CHOICE,
+        most=1.0,
     )
     least_share: float = setting(
         0.2,
         "of what is beyond chance",
         "A first effect that removes less and leaves something is not refined before another is found.",
         CHOICE,
+        most=1.0,
     )
     earlier_tried: int = setting(4, "candidates", "Runners-up that are tried in place of an earlier effect.", CHOICE)
-    least_chance: float = setting(0.01, "p", "Of a lead; below it, a candidate is no rival.", CHOICE)
+    least_chance: float = setting(0.01, "p", "Of a lead; below it, a candidate is no rival.", CHOICE, most=1.0)
     least_events: float = setting(
         0.5, "pixels, spikes or frames", "An effect that changes fewer is not there.", "they round to none"
     )
@@ -289,10 +332,14 @@ class Searching:
     )
     least_spikes: int = setting(1000, "spikes", "Of a recording whose spectrum says something.", CHOICE)
     close_factor: float = setting(
-        1.25, "times", "Two effects that cancel are scaled by less without another twin.", CHOICE
+        1.25, "times", "Two effects that cancel are scaled by less without another twin.", CHOICE, least=1.0
     )
     grid_factor: float = setting(
-        2.0, "times", "Two effects that start jointly are scaled by so much at most, to compare their starts.", CHOICE
+        2.0,
+        "times",
+        "Two effects that start jointly are scaled by so much at most, to compare their starts.",
+        CHOICE,
+        least=1.0,
     )
     descents: int = setting(2, "starts", "Of two effects that start jointly, from which both are fitted.", CHOICE)
 
@@ -301,12 +348,15 @@ class Searching:
 class Concluding:
     """From a search to a verdict."""
 
-    most_left: float = setting(0.05, "of the deviance beyond chance", "A name may leave so much in all.", TUNED)
+    most_left: float = setting(
+        0.05, "of the deviance beyond chance", "A name may leave so much in all.", TUNED, most=1.0
+    )
     most_left_there: float = setting(
         0.25,
         "of the sum of squares",
         "A name may leave so much in a group of statistics of a recording.",
         TUNED,
+        most=1.0,
     )
     large_share: float = setting(
         0.3,
@@ -314,6 +364,7 @@ class Concluding:
         "What many pixels have in common is common to them; irregular intervals that the halves differ by are of one "
         "half.",
         CHOICE,
+        most=1.0,
     )
     local_noises: float = setting(
         8.0,
@@ -322,7 +373,7 @@ class Concluding:
         "comparisons are many; in the clean campaigns of `tests/gap/verdict` none does",
     )
     times_expected: float = setting(
-        2.0, "times expected", "Irregular intervals of a field in which an effect acts.", CHOICE
+        2.0, "times expected", "Irregular intervals of a field in which an effect acts.", CHOICE, least=1.0
     )
     least_frames: int = setting(
         1000,
@@ -330,7 +381,7 @@ class Concluding:
         "Shortest recording whose halves are compared by their lines.",
         "pixels of one rate make a line of their own at first",
     )
-    line_ratio: float = setting(6.0, "times", "Power of a line in one half over that in the other.", CHOICE)
+    line_ratio: float = setting(6.0, "times", "Power of a line in one half over that in the other.", CHOICE, least=1.0)
 
 
 @dataclass(frozen=True)
@@ -350,9 +401,15 @@ class Bounding:
         "1.645 of a normal score at 95 %, and more where few campaigns estimate its scatter",
     )
     resolution: float = setting(
-        0.6, "of a bound", "The least strength that would be refuted is not below it.", "a choice, stated on the page"
+        0.6,
+        "of a bound",
+        "The least strength that would be refuted is not below it.",
+        "a choice, stated on the page",
+        most=1.0,
     )
-    overshoot: float = setting(1.2, "times", "The first strength that is tested, over what is expected.", CHOICE)
+    overshoot: float = setting(
+        1.2, "times", "The first strength that is tested, over what is expected.", CHOICE, least=1.0
+    )
     campaigns: int = setting(150, "campaigns", "Cost of all bounds, by which the budget allows them.", "measured")
 
 
@@ -360,7 +417,7 @@ class Bounding:
 class MapSettings:
     """Recordings that are rates only."""
 
-    units: int = setting(8, "units", "Over which a prediction is averaged.", CHOICE)
+    units: int = setting(8, "units", "Over which a prediction is averaged.", CHOICE, least=2)
     steps: int = setting(6, "steps", "Of a fit.", CHOICE)
     least_improvement: float = setting(
         25.0,
@@ -398,20 +455,46 @@ class DiagnosisSettings:
     bounding: Bounding = field(default_factory=Bounding)
     maps: MapSettings = field(default_factory=MapSettings)
 
+    def __post_init__(self) -> None:
+        for stage in fields(self):
+            own: Any = getattr(self, stage.name)
+            kind: Any = stage.default_factory
+            if type(own) is not kind:
+                raise InputError(f"{stage.name} = {shown(own)}; it must be a {kind.__name__}")
+            for declared in fields(own):
+                check_setting(f"{stage.name}.{declared.name}", declared, getattr(own, declared.name))
+
     @classmethod
     def of(cls, changes: Mapping[str, Any]) -> DiagnosisSettings:
-        """The defaults with some settings changed, as `changed` lists them.  Raises InputError for an unknown name.
+        """The defaults with some settings changed, as `changed` lists them.
+
+        Raises InputError for an unknown name, and a value of another kind or out of range.
 
         >>> DiagnosisSettings.of({"deviance.tie": 8.0}).deviance.dismiss
         16.0
         """
-        known, out = [f"{stage}.{name}" for stage, name, _ in every_setting()], cls()
+        stages: dict[str, dict[str, Any]] = {}
         for name, value in changes.items():
-            if name not in known:
-                raise unknown_name("setting", name, known)
-            stage, key = name.split(".")
-            out = replace(out, **{stage: replace(getattr(out, stage), **{key: value})})
-        return out
+            stage, key = _known(name).split(".")
+            stages.setdefault(stage, {})[key] = tuple(value) if isinstance(value, list) else value
+        default = cls()
+        return replace(default, **{stage: replace(getattr(default, stage), **own) for stage, own in stages.items()})
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> DiagnosisSettings:
+        """The defaults with some settings changed, as a TOML file lists them: `deviance.tie = 8.0`, or a table a stage.
+
+        Raises InputError as `of`, and for a file that is no TOML.
+        """
+        changes: dict[str, Any] = {}
+        for stage, own in read_toml(os.fspath(path)).items():
+            changes |= (
+                {f"{stage}.{name}": value for name, value in own.items()} if isinstance(own, dict) else {stage: own}
+            )
+        try:
+            return cls.of(changes)
+        except InputError as error:
+            raise InputError(f"{os.fspath(path)}: {error}") from error
 
     def changed(self) -> dict[str, Any]:
         """Settings that differ from their defaults: {"stage.name": value}."""
@@ -422,6 +505,28 @@ class DiagnosisSettings:
             for name, value in values.items()
             if value != default[stage][name]
         }
+
+
+def checked_settings(settings: DiagnosisSettings | None) -> DiagnosisSettings:
+    """The settings; the defaults for None.  Raises InputError for anything else."""
+    if settings is None:
+        return DiagnosisSettings()
+    if not isinstance(settings, DiagnosisSettings):
+        raise InputError(
+            f"settings = {shown(settings)}; they must be a DiagnosisSettings: DiagnosisSettings.of({{...}})"
+        )
+    return settings
+
+
+def _known(name: str) -> str:
+    """A setting's name.  Raises InputError for an unknown one, with those that are like it."""
+    known = [f"{stage}.{key}" for stage, key, _ in every_setting()]
+    if name in known:
+        return name
+    stage, _, key = name.partition(".")
+    same_name = [n for n in known if n.split(".")[1] in (key, stage)]
+    same_stage = [n for n in known if n.split(".")[0] == stage]
+    raise unknown_name("setting", name, same_name or same_stage or [f.name for f in fields(DiagnosisSettings)])
 
 
 def every_setting() -> list[tuple[str, str, Any]]:

@@ -24,6 +24,7 @@ from spikecam_env.gap.candidates.strength import amplified
 from spikecam_env.gap.compare.distance import is_significant, loss
 from spikecam_env.gap.compare.prediction import Draw, Prediction, law_error
 from spikecam_env.gap.compare.step import own_step_covariance
+from spikecam_env.gap.diagnose import diagnose, read_case
 from spikecam_env.gap.fit import predict
 from spikecam_env.gap.fit.candidate import fit, slope_between, until_visible
 from spikecam_env.gap.fit.confirm import confirmed
@@ -32,6 +33,7 @@ from spikecam_env.gap.fit.joint import is_noisy
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
 from spikecam_env.gap.maps import conclude as maps_conclude
+from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.maps import search as maps_search
 from spikecam_env.gap.maps.conclude import has_clear_strength
 from spikecam_env.gap.maps.search import MapFit, PatternModel, search_maps
@@ -39,7 +41,7 @@ from spikecam_env.gap.report.reproduce import reproduce_section
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import cancelling_pair, forward, joint_start, neighbours, rivals, shortlist
 from spikecam_env.gap.search.round import Round, absent, is_improvement, is_small_share, is_visible
-from spikecam_env.gap.settings import DiagnosisSettings, every_setting
+from spikecam_env.gap.settings import Deviance, DiagnosisSettings, every_setting
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.twins.fresh_units import drawn_banks
@@ -74,18 +76,24 @@ def beside(value: float) -> tuple[float, float]:
     return LEAST * value, MOST * value
 
 
-def changes_of(value) -> list:
-    """A setting at half and at twice its value."""
+def changes_of(field) -> list:
+    """A setting at half and at twice its value, as far as its range goes."""
+    value = field.default
     if isinstance(value, tuple):
         return [tuple(factor * v for v in value) for factor in (0.5, 2.0)]
-    return [max(value // 2, 1), 2 * value] if isinstance(value, int) else [value / 2, 2 * value]
+    least, most = field.metadata["range"]
+    return (
+        [max(value // 2, least, 1), 2 * value]
+        if isinstance(value, int)
+        else [max(value / 2, least), min(2 * value, most)]
+    )
 
 
 CASES = [
     pytest.param(f"{stage}.{name}", changed, id=f"{stage}.{name}-{('half', 'twice')[i]}")
     for stage, name, field in every_setting()
     if f"{stage}.{name}" not in NOT_COVERED
-    for i, changed in enumerate(changes_of(field.default))
+    for i, changed in enumerate(changes_of(field))
 ]
 
 
@@ -115,6 +123,21 @@ def test_changed_settings_are_listed_and_made_from_the_list():
     assert DiagnosisSettings.of(changes).changed() == changes and DiagnosisSettings().changed() == {}
     with pytest.raises(InputError, match=r"unknown setting 'deviance\.ties'.*deviance\.tie\?"):
         DiagnosisSettings.of({"deviance.ties": 1.0})
+
+
+@pytest.mark.parametrize("settings", [{"deviance.tie": 8.0}, {}, 0, "fast", DiagnosisSettings, Deviance()])
+@pytest.mark.parametrize("asked", [diagnose, read_case, diagnose_maps])
+def test_settings_of_another_type_are_refused_before_any_work(asked, settings):
+    options = {"names": ()} if asked is diagnose_maps else {}
+    with pytest.raises(InputError, match=r"settings = .*; they must be a DiagnosisSettings"):
+        asked(None, "scsim", settings=settings, **options)
+
+
+def test_a_stage_of_another_type_is_refused():
+    with pytest.raises(InputError, match=r"twins = Deviance.*; it must be a Twins"):
+        DiagnosisSettings(twins=Deviance())
+    with pytest.raises(InputError, match=r"deviance\.tie = 'x'"):
+        DiagnosisSettings(deviance=Deviance(tie="x"))
 
 
 def test_a_diagnosis_states_settings_that_are_not_the_defaults():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from dataclasses import Field, fields
 from typing import Any
 
@@ -17,7 +18,7 @@ def page() -> str:
 
 def _section(stage: str, settings: Any) -> str:
     rows = [_row(f, getattr(settings, f.name)) for f in fields(settings)]
-    table = ["| setting | value | unit | what it decides | source |", "|---|---|---|---|---|", *rows]
+    table = ["| setting | value | unit | range | what it decides | source |", "|---|---|---|---|---|---|", *rows]
     lines = [f"## {stage}", "", inspect.getdoc(settings) or "", "", *table, ""]
     return "\n".join([*lines, *(_derived() if isinstance(settings, Deviance) else [])])
 
@@ -25,7 +26,16 @@ def _section(stage: str, settings: Any) -> str:
 def _row(declared: Field[Any], value: Any) -> str:
     said = declared.metadata
     number = " to ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value:g}"
-    return f"| `{declared.name}` | {number} | {said['unit']} | {' '.join(said['what'].split())} | {said['source']} |"
+    what = " ".join(said["what"].split())
+    return f"| `{declared.name}` | {number} | {said['unit']} | {_range(declared)} | {what} | {said['source']} |"
+
+
+def _range(declared: Field[Any]) -> str:
+    """What a setting may be."""
+    (least, most), whole = declared.metadata["range"], isinstance(declared.default, int)
+    least = max(least, 1) if whole else least
+    low = f"{least:g} or more" if least else "above 0"
+    return low if most == math.inf else f"{least:g} to {most:g}" if least else f"above 0, to {most:g}"
 
 
 def _derived() -> list[str]:
