@@ -170,9 +170,9 @@ def of_spikes(
     with stages.timed("read"):
         seen = observed(measured)
     with stages.timed("motion"):
-        seen, motion = without_motion(seen, static_only=asked.static_only)
+        seen, motion = without_motion(seen, static_only=asked.static_only, settings=asked.settings)
     if motion and not seen.recordings:
-        return Findings(moves(tested, motion, static_only=asked.static_only), None, motion=motion)
+        return Findings(moves(tested, motion, asked.settings, static_only=asked.static_only), None, motion=motion)
     with stages.timed("refit"):
         case = case_of_observed(measured, seen, asked.seed, asked.jobs, asked.settings)
         notes = [*static_note(motion), *label_unit_note(case.nominal_per_label, case.base)]
@@ -208,7 +208,7 @@ def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: Diagno
     Raises InputError where a recording of steady light moves, and for settings of another type.
     """
     settings = checked_settings(settings)
-    seen, motion = without_motion(observed(campaign), static_only=False)
+    seen, motion = without_motion(observed(campaign), static_only=False, settings=settings)
     if motion:
         raise InputError(f"{motion[0].text}; a static recording is needed")
     return case_of_observed(campaign, seen, seed, jobs, settings)

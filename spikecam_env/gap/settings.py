@@ -39,7 +39,7 @@ def setting(default: Any, unit: str, what: str, source: str, least: float = 0.0,
     """A field of settings.
 
     Args:
-        default: its value, whose kind others have: a whole number, a number, or two numbers, the lower first.
+        default: its value, whose kind others have: a whole number, or a number.
         unit: of the value.
         what: what it decides, in one sentence.
         source: where the value comes from: a command that measures it, literature, or a choice.
@@ -53,13 +53,7 @@ def setting(default: Any, unit: str, what: str, source: str, least: float = 0.0,
 def check_setting(name: str, declared: Field[Any], value: object) -> None:
     """Raises InputError unless a value has the kind of its setting's default, and is in its range."""
     least, most = declared.metadata["range"]
-    if isinstance(declared.default, tuple):
-        if not (isinstance(value, tuple) and len(value) == 2):
-            raise InputError(f"{name} = {shown(value)}; it must be two numbers, the lower first")
-        low, high = (checked_number(v, name, least, most, above=least == 0) for v in value)
-        if low >= high:
-            raise InputError(f"{name} = {shown(value)}; the lower number must come first")
-    elif isinstance(declared.default, int):
+    if isinstance(declared.default, int):
         checked_whole(value, name, max(int(least), 1))
     else:
         checked_number(value, name, least, most, above=least == 0)
@@ -117,6 +111,12 @@ class Deviance:
         much."""
         return 10 * self.keep
 
+    @property
+    def accept_map(self) -> float:
+        """Reduction to accept an effect of maps of rates: twice `accept`, as statistics of one map depend on each
+        other."""
+        return 2 * self.accept
+
 
 @dataclass(frozen=True)
 class Judging:
@@ -165,13 +165,79 @@ class Judging:
         "Two simulations, or two values of a parameter, that differ by more are not the same.",
         CHOICE,
     )
-    shows: float = setting(
-        6.0,
-        "noises",
-        "A change so large is clear of the twins' own noise: of a pattern or of motion that stands out by itself, of a "
-        "step for a derivative, of an effect for its bound.",
+    as_well: float = setting(
+        0.5,
+        "of its size on the best",
+        "An effect that is clear on no statistic counts on those on which it shows as well as this; one that shows "
+        "clearly, on those of the square of this.",
         CHOICE,
+        most=1.0,
     )
+
+    @property
+    def shows(self) -> float:
+        """Noises of a change that is clear of the twins' own noise, twice `apart`: of a pattern or motion that stands
+        out by itself, of a step for a derivative, of an effect for its bound, of lost frames."""
+        return 2 * self.apart
+
+    @property
+    def least_chance(self) -> float:
+        """Probability of a lead, which has one side: half of `alarm`, which has two.  Below it, a candidate is no
+        rival."""
+        return self.alarm / 2
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Before a search: labels, lost frames, orientation and motion, and what a refit shows to be missing."""
+
+    least_error: float = setting(
+        1e-3,
+        "relative",
+        "Error of a label from which it is reported.  An array that fires in all frames but so few fires in every one.",
+        CHOICE,
+        most=1.0,
+    )
+    least_gross: float = setting(
+        0.02,
+        "relative",
+        "Error of a dark recording, and curvature by exchanged labels, from which they are reported.",
+        "of few spikes a pixel, the rate between first and last is biased by their number squared",
+        most=1.0,
+    )
+    irregular: float = setting(
+        0.1,
+        "of the error of a label",
+        "Share of irregular intervals from which the label is not at fault: light of another level makes none.  In all "
+        "frames but so many, frames that are missing are late by little.",
+        CHOICE,
+        most=1.0,
+    )
+    least_counts: float = setting(
+        20.0,
+        "spikes or pixels",
+        "Expected in a window that is looked at for motion; timed in a recording that is looked at for lost frames.",
+        "fewer are no normal deviates",
+    )
+    false_alarm: float = setting(
+        1e-3,
+        "p, of a recording",
+        "Below it, a window of a static recording moves (Bonferroni).",
+        "`python -m benchmarks.motion_limits`",
+        most=1.0,
+    )
+    least_contrast: float = setting(
+        0.05,
+        "relative",
+        "Change of a window's rate from which it moves.",
+        "local effects of a camera in the blind trial, at forty times their limit, change a corner by 0.01",
+    )
+
+    @property
+    def least_spread(self) -> float:
+        """Standard deviation of pixels' response, or of an interval, from which there is any, relative: its two sides
+        are `least_error` apart."""
+        return self.least_error / 2
 
 
 @dataclass(frozen=True)
@@ -181,7 +247,7 @@ class UnitSettings:
     usual: float = setting(
         1.8,
         "times nominal",
-        "Dark level and spreads of units; beyond it, a parameter is off.",
+        "Dark level and spreads of units; beyond it, a parameter is off.  Errors of dark levels that are alike.",
         "units differ by 5-20 %",
         least=1.0,
     )
@@ -207,6 +273,11 @@ class UnitSettings:
         most=1.0,
     )
 
+    @property
+    def spread_limits(self) -> tuple[float, float]:
+        """Spreads of drawn units, times nominal: what is usual.  Beyond, a wider or narrower pattern is a gap."""
+        return 1 / self.usual, self.usual
+
 
 @dataclass(frozen=True)
 class Twins:
@@ -219,18 +290,8 @@ class Twins:
         CHOICE,
         least=2,
     )
-    spread_limits: tuple[float, float] = setting(
-        (0.6, 1.67), "times nominal", "Spreads of drawn units; beyond them it is a gap.", "units differ by 5-20 %"
-    )
     to_confirm: int = setting(
         2, "twins", "Confirm a candidate; show a model whose gap is large beside what two leave open.", CHOICE
-    )
-    in_the_end: int = setting(
-        4,
-        "twins",
-        "Confirm the chosen effects, give the covariance of their parameters, test a bound.",
-        CHOICE,
-        least=2,
     )
     of_events: int = setting(
         3,
@@ -238,7 +299,6 @@ class Twins:
         "Of a sparse or mixed effect, which cannot be simulated stronger to exceed one twin's noise.",
         CHOICE,
     )
-    of_random_course: int = setting(6, "twins", "Of an effect that shows by the scatter of its twins.", CHOICE, least=2)
     target_size: float = setting(
         60.0,
         "noises",
@@ -260,6 +320,17 @@ class Twins:
     )
     overrun: float = setting(1.3, "budgets", "Limit of steps that an undecided verdict needs.", CHOICE)
 
+    @property
+    def in_the_end(self) -> int:
+        """Twins that confirm the chosen effects, give the covariance of their parameters, test a bound, and show what a
+        model without noise refits to: twice `to_confirm`."""
+        return 2 * self.to_confirm
+
+    @property
+    def of_random_course(self) -> int:
+        """Twins whose scatter counts, twice `of_events`: of an effect of random course, of what is relabelled."""
+        return 2 * self.of_events
+
 
 @dataclass(frozen=True)
 class Fitting:
@@ -268,10 +339,7 @@ class Fitting:
     visible: float = setting(
         4.0, "noises", "Least size of a simulated effect from which its strength is scaled.", CHOICE
     )
-    most_tries: int = setting(
-        5, "strengths", "Tried for one strength, for the score of a bound, and for a bound.", CHOICE
-    )
-    most_steps: int = setting(4, "steps", "Of a descent, and of two effects that cancel.", CHOICE)
+    most_steps: int = setting(4, "steps", "Of a descent, and of effects that start together.", CHOICE)
     small_step: float = setting(
         0.05, "of a logarithm", "A step so small needs no other; two strengths so close show no slope.", CHOICE
     )
@@ -279,9 +347,23 @@ class Fitting:
     longest_step: float = setting(
         0.7, "of a logarithm", "Largest step at once, within what was open of the parameter before.", "a factor of two"
     )
-    round_off: tuple[float, float] = setting(
-        (0.7, 1.4), "times", "Factors within which a strength is scaled without another twin.", CHOICE
-    )
+
+    @property
+    def most_tries(self) -> int:
+        """Strengths that are tried for one strength, for the score of a bound, and for a bound: one more than the steps
+        between them."""
+        return self.most_steps + 1
+
+    @property
+    def round_off(self) -> tuple[float, float]:
+        """Factors within which a strength is scaled without another twin: half of `longest_step`."""
+        return math.exp(-self.longest_step / 2), math.exp(self.longest_step / 2)
+
+    @property
+    def largest_factor(self) -> float:
+        """Factor by which starts are scaled to compare them, or one that mostly scatters without other twins: a
+        `longest_step`."""
+        return math.exp(self.longest_step)
 
 
 @dataclass(frozen=True)
@@ -301,26 +383,19 @@ class Searching:
         0.5,
         "of what the best removes",
         "What removes less is not worth another fit: a start, a shape, a runner-up of an earlier effect; nor is a "
-        "second bend that removes less of what is beyond chance refined before more is found.",
+        "second bend that removes less of what is beyond chance refined before more is found.  Pixels differ by no "
+        "more of a label's error; a recording that was turned gains more of what its correlation lacks.",
         CHOICE,
         most=1.0,
     )
     same_share: float = setting(
         0.8,
         "of what the best removes",
-        "A runner-up, or another start, that removes more is tried in its place.",
+        "Nearly all: a runner-up, or another start, that removes more is tried in its place.  A mistake of a campaign, "
+        "once undone, removes so much of the disagreement.",
         CHOICE,
         most=1.0,
     )
-    least_share: float = setting(
-        0.2,
-        "of what is beyond chance",
-        "A first effect that removes less and leaves something is not refined before another is found.",
-        CHOICE,
-        most=1.0,
-    )
-    earlier_tried: int = setting(4, "candidates", "Runners-up that are tried in place of an earlier effect.", CHOICE)
-    least_chance: float = setting(0.01, "p", "Of a lead; below it, a candidate is no rival.", CHOICE, most=1.0)
     least_events: float = setting(
         0.5, "pixels, spikes or frames", "An effect that changes fewer is not there.", "they round to none"
     )
@@ -330,18 +405,27 @@ class Searching:
     line: float = setting(
         30.0, "times the usual power", "A line from whose frequency periodic candidates start.", CHOICE
     )
-    least_spikes: int = setting(1000, "spikes", "Of a recording whose spectrum says something.", CHOICE)
-    close_factor: float = setting(
-        1.25, "times", "Two effects that cancel are scaled by less without another twin.", CHOICE, least=1.0
-    )
-    grid_factor: float = setting(
-        2.0,
-        "times",
-        "Two effects that start jointly are scaled by so much at most, to compare their starts.",
-        CHOICE,
-        least=1.0,
+    least_spikes: int = setting(
+        1000, "spikes", "Of a recording whose spectrum, or orientation, says something.", CHOICE
     )
     descents: int = setting(2, "starts", "Of two effects that start jointly, from which both are fitted.", CHOICE)
+
+    @property
+    def earlier_tried(self) -> int:
+        """Runners-up that are tried in place of an earlier effect: all that are fitted in a round, but the first."""
+        return self.most_fitted - 1
+
+    @property
+    def least_share(self) -> float:
+        """Share that is little: what `same_share` leaves.  A first effect that removes less, and leaves something, is
+        not refined before another is found; a mistake that is undone leaves no more of the disagreement."""
+        return 1 - self.same_share
+
+    @property
+    def largest_sd(self) -> float:
+        """Standard deviation of a strength, relative, up to which an effect of maps is there: one by which it is
+        `least_change` from 0."""
+        return 1 / self.least_change
 
 
 @dataclass(frozen=True)
@@ -362,7 +446,8 @@ class Concluding:
         0.3,
         "of all",
         "What many pixels have in common is common to them; irregular intervals that the halves differ by are of one "
-        "half.",
+        "half; static pixels are enough to be looked at alone; spikes of an expected dark level are there; of a frame, "
+        "pixels are late.",
         CHOICE,
         most=1.0,
     )
@@ -378,7 +463,7 @@ class Concluding:
     least_frames: int = setting(
         1000,
         "frames",
-        "Shortest recording whose halves are compared by their lines.",
+        "Shortest recording whose halves are compared, by their lines or for the floor of the gap.",
         "pixels of one rate make a line of their own at first",
     )
     line_ratio: float = setting(6.0, "times", "Power of a line in one half over that in the other.", CHOICE, least=1.0)
@@ -393,12 +478,6 @@ class Bounding:
         "noises",
         "Size of an effect at most for its score.",
         "what it changes there is like what it changes at its bound",
-    )
-    likely_sds: float = setting(
-        1.8,
-        "standard deviations",
-        "Of the score by which a refuted strength is likely to lie above what is seen.",
-        "1.645 of a normal score at 95 %, and more where few campaigns estimate its scatter",
     )
     resolution: float = setting(
         0.6,
@@ -419,12 +498,6 @@ class MapSettings:
 
     units: int = setting(8, "units", "Over which a prediction is averaged.", CHOICE, least=2)
     steps: int = setting(6, "steps", "Of a fit.", CHOICE)
-    least_improvement: float = setting(
-        25.0,
-        "deviance",
-        "Reduction to accept an effect.",
-        "larger than of spikes, as statistics of one map depend on each other",
-    )
     most_effects: int = setting(5, "effects", "Named together.", CHOICE)
     most_left: float = setting(
         0.08,
@@ -432,7 +505,6 @@ class MapSettings:
         "A name may leave so much.",
         "of a mean square: statistics of maps are hundreds of noises off",
     )
-    largest_sd: float = setting(0.5, "of a strength", "Its standard deviation, if it is significant.", "two of them")
 
 
 @dataclass(frozen=True)
@@ -447,6 +519,7 @@ class DiagnosisSettings:
 
     deviance: Deviance = field(default_factory=Deviance)
     judging: Judging = field(default_factory=Judging)
+    baseline: Baseline = field(default_factory=Baseline)
     unit: UnitSettings = field(default_factory=UnitSettings)
     twins: Twins = field(default_factory=Twins)
     fitting: Fitting = field(default_factory=Fitting)
@@ -476,7 +549,7 @@ class DiagnosisSettings:
         stages: dict[str, dict[str, Any]] = {}
         for name, value in changes.items():
             stage, key = _known(name).split(".")
-            stages.setdefault(stage, {})[key] = tuple(value) if isinstance(value, list) else value
+            stages.setdefault(stage, {})[key] = value
         default = cls()
         return replace(default, **{stage: replace(getattr(default, stage), **own) for stage, own in stages.items()})
 

@@ -48,10 +48,10 @@ def test_it_writes_three_files_and_prints_verdict_parameters_and_gap(campaign: P
 
 def test_settings_come_from_a_file(campaign: Path, tmp_path: Path) -> None:
     file = tmp_path / "settings.toml"
-    file.write_text("deviance.tie = 8\n\n[twins]\nto_confirm = 3\nspread_limits = [0.5, 2.0]\n")
+    file.write_text("deviance.tie = 8\n\n[twins]\nto_confirm = 3\n")
     assert run(["diagnose", str(campaign), "--out", str(tmp_path / "out"), "--settings", str(file)]) == 0
     assert made_up.ASKED["settings"].changed() == {
-        "deviance.tie": 8, "twins.to_confirm": 3, "twins.spread_limits": (0.5, 2.0),
+        "deviance.tie": 8, "twins.to_confirm": 3,
     }  # fmt: skip
 
 
@@ -71,10 +71,9 @@ def test_settings_come_from_a_file(campaign: Path, tmp_path: Path) -> None:
         ("deviance.tie = {}", "deviance.tie = {}; it must be"),
         ("judging.alarm = 1.5", "judging.alarm = 1.5; it must be a number above 0 and up to 1"),
         ("twins.to_confirm = 2.0", "twins.to_confirm = 2.0; it must be a whole number, 1 or more"),
-        ("twins.in_the_end = 1", "twins.in_the_end = 1; it must be a whole number, 2 or more"),
-        ("twins.spread_limits = [0.6]", "twins.spread_limits = (0.6,); it must be two numbers, the lower first"),
-        ("twins.spread_limits = [1.6, 0.6]", "the lower number must come first"),
-        ("twins.spread_limits = 1.6", "it must be two numbers"),
+        ("twins.drawn_units = 1", "twins.drawn_units = 1; it must be a whole number, 2 or more"),
+        ("unit.usual = 0.9", "unit.usual = 0.9; it must be a finite number of at least 1"),
+        ("unit.usual = [1.8]", "unit.usual = [1.8]; it must be"),
         ("deviance", "is not a TOML file"),
     ],
 )  # fmt: skip
