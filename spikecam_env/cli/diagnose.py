@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -45,6 +45,9 @@ class Diagnose:
     """In unknown scenes with motion, use only the pixels in which nothing moves."""
     search: Literal["forward", "race"] = "forward"
     """How effects are looked for: one after another, or as a race over sets of them, which is experimental."""
+    settings: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Tuned numbers other than the defaults, a TOML file of lines such as `deviance.tie = 8.0`; all of them stand in
+    docs/reference/diagnosis_settings.md."""
     outside: bool = False
     """Also read files of the campaign that lie outside its folder."""
 
@@ -55,6 +58,11 @@ class Diagnose:
 
         SensorModel.load(self.model)
         self._known_effects()
+        settings = None
+        if self.settings is not None:
+            from spikecam_env.gap.settings import DiagnosisSettings
+
+            settings = DiagnosisSettings.from_toml(self.settings)
         campaign = read_campaign(self.campaign, outside=True) if self.outside else self.campaign
         from spikecam_env.gap.diagnose import diagnose
         from spikecam_env.gap.report.page import write_report
@@ -70,6 +78,7 @@ class Diagnose:
                 effort=self.effort,
                 static_only=self.static_only,
                 search=self.search,
+                settings=settings,
                 progress=True,
             )
             diagnosis.write(folder)

@@ -40,7 +40,7 @@ from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
-from spikecam_env.gap.settings import DiagnosisSettings
+from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
@@ -94,8 +94,8 @@ def diagnose(
         The answer; `write` and `write_report` save it.
 
     Raises:
-        InputError: for an unreadable campaign, an unknown name, no effort, or too few static recordings of known light
-            to refit the unit by.
+        InputError: for an unreadable campaign, an unknown name, no effort, settings of another type, or too few static
+            recordings of known light to refit the unit by.
 
     Example:
         >>> flats = [Dark(), *(Flat(radiance=level) for level in (0.1, 0.3))]
@@ -108,7 +108,7 @@ def diagnose(
         raise unknown_name("search", search, SEARCHES)
     if not effort > 0:
         raise InputError(f"effort {effort:g}: it must be above 0")
-    settings = settings or DiagnosisSettings()
+    settings = checked_settings(settings)
     stages = Stages(progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     tested = model if isinstance(model, SensorModel) else SensorModel.load(model)
@@ -189,9 +189,9 @@ def of_spikes(
     with stages.timed("read"):
         seen = observed(measured)
     with stages.timed("motion"):
-        seen, motion = without_motion(seen, static_only=asked.static_only)
+        seen, motion = without_motion(seen, static_only=asked.static_only, settings=asked.settings)
     if motion and not seen.recordings:
-        return Findings(moves(tested, motion, static_only=asked.static_only), None, motion=motion)
+        return Findings(moves(tested, motion, asked.settings, static_only=asked.static_only), None, motion=motion)
     with stages.timed("refit"):
         case = case_of_observed(measured, seen, asked.seed, asked.jobs, asked.settings)
         notes = [*static_note(motion), *label_unit_note(case.nominal_per_label, case.base)]
@@ -224,12 +224,13 @@ def of_spikes(
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: DiagnosisSettings | None = None) -> Case:
     """Observe and refit a campaign; recordings at another V_d than most, and rates only, are left to SNEE.
 
-    Raises InputError where a recording of steady light moves.
+    Raises InputError where a recording of steady light moves, and for settings of another type.
     """
-    seen, motion = without_motion(observed(campaign), static_only=False)
+    settings = checked_settings(settings)
+    seen, motion = without_motion(observed(campaign), static_only=False, settings=settings)
     if motion:
         raise InputError(f"{motion[0].text}; a static recording is needed")
-    return case_of_observed(campaign, seen, seed, jobs, settings or DiagnosisSettings())
+    return case_of_observed(campaign, seen, seed, jobs, settings)
 
 
 def observed(campaign: Campaign) -> Observed:

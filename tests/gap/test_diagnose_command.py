@@ -41,9 +41,51 @@ def test_it_writes_three_files_and_prints_verdict_parameters_and_gap(campaign: P
     wanted = {
         "campaign": campaign, "model": "scsim", "candidates": ("photodiode_lag", "dead_time"),
         "exclude": ("crosstalk",), "seed": 7, "jobs": 2, "effort": 200.0, "static_only": False,
-        "search": "forward", "progress": True,
+        "search": "forward", "settings": None, "progress": True,
     }  # fmt: skip
     assert wanted == made_up.ASKED
+
+
+def test_settings_come_from_a_file(campaign: Path, tmp_path: Path) -> None:
+    file = tmp_path / "settings.toml"
+    file.write_text("deviance.tie = 8\n\n[twins]\nto_confirm = 3\n")
+    assert run(["diagnose", str(campaign), "--out", str(tmp_path / "out"), "--settings", str(file)]) == 0
+    assert made_up.ASKED["settings"].changed() == {
+        "deviance.tie": 8, "twins.to_confirm": 3,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("deviance.ties = 8.0", "unknown setting 'deviance.ties'; choose one of deviance.accept, deviance.stop, "
+                                "deviance.tie (deviance.tie?)"),
+        ("tie = 8.0", "unknown setting 'tie'; choose one of deviance.tie"),
+        ("judging.tie = 8.0", "unknown setting 'judging.tie'; choose one of deviance.tie (deviance.tie?)"),
+        ("devaince.accepts = 8.0", "unknown setting 'devaince.accepts'"),
+        ("deviance = 8.0", "unknown setting 'deviance'"),
+        ("deviance.tie = 'x'", "deviance.tie = 'x'; it must be a finite number above 0"),
+        ("deviance.tie = true", "deviance.tie = True; it must be"),
+        ("deviance.tie = nan", "deviance.tie = nan; it must be"),
+        ("deviance.tie = -6.0", "deviance.tie = -6.0; it must be"),
+        ("deviance.tie = {}", "deviance.tie = {}; it must be"),
+        ("judging.alarm = 1.5", "judging.alarm = 1.5; it must be a number above 0 and up to 1"),
+        ("twins.to_confirm = 2.0", "twins.to_confirm = 2.0; it must be a whole number, 1 or more"),
+        ("twins.drawn_units = 1", "twins.drawn_units = 1; it must be a whole number, 2 or more"),
+        ("unit.usual = 0.9", "unit.usual = 0.9; it must be a finite number of at least 1"),
+        ("unit.usual = [1.8]", "unit.usual = [1.8]; it must be"),
+        ("deviance", "is not a TOML file"),
+    ],
+)  # fmt: skip
+def test_settings_that_are_none_are_refused_in_one_line(
+    text: str, said: str, campaign: Path, tmp_path: Path, capsys
+) -> None:
+    file = tmp_path / "settings.toml"
+    file.write_text(text)
+    assert run(["diagnose", str(campaign), "--out", str(tmp_path / "out"), "--settings", str(file)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"spikecam: {file}") and error.count("\n") == 1 and len(error) < 1000
+    assert said in error and not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("verdict", sorted(made_up.EVERY))

@@ -13,18 +13,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_up import named
+from made_up_labels import wrong_labels
 from scipy import stats
 from scripted import COUNT, FREE, NAME, TWINS, Scripted, found_at, null, scripted, some_fit, with_reset
 from small import MODEL, SHAPE, conditions, unit
 
 from spikecam_env.errors import InputError
+from spikecam_env.gap.baseline import motion, static_part
 from spikecam_env.gap.baseline.alarm import is_discrepant
 from spikecam_env.gap.baseline.off_nominal import off_nominal
+from spikecam_env.gap.baseline.static_part import Observed, without_motion
 from spikecam_env.gap.candidates.strength import amplified
 from spikecam_env.gap.compare.distance import is_significant, loss
 from spikecam_env.gap.compare.prediction import Draw, Prediction, law_error
-from spikecam_env.gap.compare.step import own_step_covariance
-from spikecam_env.gap.fit import predict
+from spikecam_env.gap.compare.step import is_clear, own_step_covariance
+from spikecam_env.gap.diagnose import diagnose, read_case
+from spikecam_env.gap.fit import candidate, predict
 from spikecam_env.gap.fit.candidate import fit, slope_between, until_visible
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.gauss_newton import descend
@@ -32,6 +36,7 @@ from spikecam_env.gap.fit.joint import is_noisy
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
 from spikecam_env.gap.maps import conclude as maps_conclude
+from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.maps import search as maps_search
 from spikecam_env.gap.maps.conclude import has_clear_strength
 from spikecam_env.gap.maps.search import MapFit, PatternModel, search_maps
@@ -39,7 +44,7 @@ from spikecam_env.gap.report.reproduce import reproduce_section
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import cancelling_pair, forward, joint_start, neighbours, rivals, shortlist
 from spikecam_env.gap.search.round import Round, absent, is_improvement, is_small_share, is_visible
-from spikecam_env.gap.settings import DiagnosisSettings, every_setting
+from spikecam_env.gap.settings import Deviance, DiagnosisSettings, every_setting
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.twins.fresh_units import drawn_banks
@@ -54,16 +59,16 @@ from spikecam_env.gap.verdict.where_and_when import later_half, line_in_one_half
 NOT_COVERED: set[str] = set()
 """Settings without a probe; the list may only shrink."""
 
-PROBES = {}
+PROBES: dict[str, list] = {}
 LEAST, MOST = 0.75, 1.5
 """Times the default, where a probe looks: a threshold at half or at twice the default is on the other side of one."""
 
 
 def probe_of(name: str):
-    """Registers the probe of a setting."""
+    """Registers a probe of a setting: of what it decides itself, or of what follows from it."""
 
     def register(function):
-        PROBES[name] = function
+        PROBES.setdefault(name, []).append(function)
         return function
 
     return register
@@ -74,34 +79,40 @@ def beside(value: float) -> tuple[float, float]:
     return LEAST * value, MOST * value
 
 
-def changes_of(value) -> list:
-    """A setting at half and at twice its value."""
-    if isinstance(value, tuple):
-        return [tuple(factor * v for v in value) for factor in (0.5, 2.0)]
-    return [max(value // 2, 1), 2 * value] if isinstance(value, int) else [value / 2, 2 * value]
+def changes_of(field) -> list:
+    """A setting at half and at twice its value, as far as its range goes."""
+    value = field.default
+    least, most = field.metadata["range"]
+    return (
+        [max(value // 2, least, 1), 2 * value]
+        if isinstance(value, int)
+        else [max(value / 2, least), min(2 * value, most)]
+    )
 
 
 CASES = [
     pytest.param(f"{stage}.{name}", changed, id=f"{stage}.{name}-{('half', 'twice')[i]}")
     for stage, name, field in every_setting()
     if f"{stage}.{name}" not in NOT_COVERED
-    for i, changed in enumerate(changes_of(field.default))
+    for i, changed in enumerate(changes_of(field))
 ]
 
 
 @pytest.mark.parametrize("name, changed", CASES)
 def test_a_setting_at_half_or_twice_its_value_decides_otherwise(name, changed):
-    said = []
-    for settings in (DiagnosisSettings(), DiagnosisSettings.of({name: changed})):
-        with pytest.MonkeyPatch.context() as patch:
-            said.append(PROBES[name](settings, patch))
-    print(f"{name}: {said[0]}, at {changed} {said[1]}")
-    assert said[0] != said[1]
+    for probe in PROBES[name]:
+        said = []
+        for settings in (DiagnosisSettings(), DiagnosisSettings.of({name: changed})):
+            with pytest.MonkeyPatch.context() as patch:
+                said.append(probe(settings, patch))
+        print(f"{name}: {said[0]}, at {changed} {said[1]}")
+        assert said[0] != said[1]
 
 
 def test_settings_without_a_probe_are_listed():
     names = {f"{stage}.{name}" for stage, name, _ in every_setting()}
     print(f"{len(names)} settings, {len(NOT_COVERED)} without a probe")
+    assert len(names) <= 60
     assert names - PROBES.keys() == NOT_COVERED and PROBES.keys() <= names
 
 
@@ -111,10 +122,25 @@ def test_every_setting_has_a_unit_a_meaning_and_a_source():
 
 
 def test_changed_settings_are_listed_and_made_from_the_list():
-    changes = {"deviance.tie": 8.0, "twins.spread_limits": (0.5, 2.0)}
+    changes = {"deviance.tie": 8.0, "twins.to_confirm": 3}
     assert DiagnosisSettings.of(changes).changed() == changes and DiagnosisSettings().changed() == {}
     with pytest.raises(InputError, match=r"unknown setting 'deviance\.ties'.*deviance\.tie\?"):
         DiagnosisSettings.of({"deviance.ties": 1.0})
+
+
+@pytest.mark.parametrize("settings", [{"deviance.tie": 8.0}, {}, 0, "fast", DiagnosisSettings, Deviance()])
+@pytest.mark.parametrize("asked", [diagnose, read_case, diagnose_maps])
+def test_settings_of_another_type_are_refused_before_any_work(asked, settings):
+    options = {"names": ()} if asked is diagnose_maps else {}
+    with pytest.raises(InputError, match=r"settings = .*; they must be a DiagnosisSettings"):
+        asked(None, "scsim", settings=settings, **options)
+
+
+def test_a_stage_of_another_type_is_refused():
+    with pytest.raises(InputError, match=r"twins = Deviance.*; it must be a Twins"):
+        DiagnosisSettings(twins=Deviance())
+    with pytest.raises(InputError, match=r"deviance\.tie = 'x'"):
+        DiagnosisSettings(deviance=Deviance(tie="x"))
 
 
 def test_a_diagnosis_states_settings_that_are_not_the_defaults():
@@ -206,10 +232,79 @@ def _(settings, patch):
     return [bool(np.allclose(rivals.most_likely(n, here, other)[0], other.mean)) for other in there]
 
 
-@probe_of("judging.shows")
+@probe_of("judging.apart")
 def _(settings, patch):
     n = replace(null(settings), keys=(Key("rates", "r", "0"), Key("moving", "r", "0")))
     return [shortlist.groups_that_stand_out(n, np.array([20.0, noises])) for noises in beside(6.0)]
+
+
+@probe_of("judging.apart")
+@probe_of("judging.as_well")
+def _(settings, patch):
+    """Where an effect counts that shows by 4 noises at best; and by 20."""
+    few, many = 4.0 * np.array([1.0, *beside(0.5)]), np.array([20.0, 4.0, 5.5, 7.0])
+    return [is_clear(effect, np.ones(len(effect)), settings.judging).tolist() for effect in (few, many)]
+
+
+# ---- baseline
+
+
+@probe_of("baseline.least_error")
+def _(settings, patch):
+    return [wrong_labels("flat-4", off, settings=settings) for off in beside(1e-3)]
+
+
+@probe_of("baseline.least_gross")
+def _(settings, patch):
+    return [wrong_labels("dark", off, settings=settings) for off in beside(0.02)]
+
+
+@probe_of("baseline.irregular")
+def _(settings, patch):
+    return [wrong_labels("flat-4", 0.02, irregular=0.02 * share, settings=settings) for share in beside(0.1)]
+
+
+@probe_of("searching.worth")
+def _(settings, patch):
+    return [wrong_labels("flat-4", 0.02, spread=spread, settings=settings) for spread in beside(0.5)]
+
+
+def is_off(settings, spikes: float, contrast: float) -> bool:
+    """Whether a window of 16 pixels, of whose spikes so many are missing beyond chance, moves."""
+    expected = np.full((4, 4), spikes / 16)
+    planes = [-contrast * expected, -contrast * expected, np.full((4, 4), 1e-9), expected]
+    return bool([*motion.beyond(planes, (4, 4), (0, 1), 5.0, settings.baseline)])
+
+
+@probe_of("baseline.least_counts")
+def _(settings, patch):
+    return [is_off(settings, spikes, 0.5) for spikes in beside(20.0)]
+
+
+@probe_of("baseline.least_contrast")
+def _(settings, patch):
+    return [is_off(settings, 1e6, contrast) for contrast in beside(0.05)]
+
+
+@probe_of("baseline.false_alarm")
+def _(settings, patch):
+    """Noises of the weakest of a thousand windows that is found."""
+    return round(motion.least_deviate(1000, settings.baseline), 6)
+
+
+@probe_of("concluding.large_share")
+def _(settings, patch):
+    """Static pixels that are enough."""
+    said = []
+    patch.setattr(static_part, "observe", lambda *_, static: static)
+    for share in beside(0.3):
+        moving = np.arange(100).reshape(10, 10) >= 100 * share
+        patch.setattr(static_part, "find_motion", lambda *_, of=moving: SimpleNamespace(recording="a", moving=of))
+        scene = SimpleNamespace(name="a", light=None, kind="unknown", static=None)
+        patch.setattr(static_part, "replace", lambda condition, static: SimpleNamespace(static=static))
+        seen = Observed((SimpleNamespace(packed=lambda: None),), (scene,), (SimpleNamespace(shape=(10, 10)),))
+        said.append(bool(without_motion(seen, static_only=True, settings=settings)[0].recordings))
+    return said
 
 
 # ---- unit
@@ -260,10 +355,10 @@ def _(settings, patch):
     return asked
 
 
-@probe_of("twins.spread_limits")
+@probe_of("unit.usual")
 def _(settings, patch):
     """Of a unit whose pixels differ twice as much as the model's."""
-    base, limits = unit(), settings.twins.spread_limits
+    base, limits = unit(), settings.unit.spread_limits
     wide = replace(base, gain=np.median(base.gain) + 2.5 * (base.gain - np.median(base.gain)))
     [bank] = drawn_banks(MODEL, wide, conditions()[:2], SHAPE, 1, 0, limits)
     return {k: round(v, 6) for k, v in bank.items()}
@@ -276,7 +371,7 @@ def _(settings, patch):
     return problem.counts
 
 
-@probe_of("twins.in_the_end")
+@probe_of("twins.to_confirm")
 def _(settings, patch):
     """Covariance by draws, where as many show it."""
     n = null(settings)
@@ -290,7 +385,7 @@ def _(settings, patch):
     return twins_of("missed_spikes", settings.twins)
 
 
-@probe_of("twins.of_random_course")
+@probe_of("twins.of_events")
 def _(settings, patch):
     problem = scripted(repeat(10.0), settings=settings)
     confirmed(problem, some_fit("lamp_drift", 10.0))
@@ -341,9 +436,9 @@ class Shown:
         return np.inf
 
     def score(self, parameters) -> Score:
-        """Of three campaigns without it."""
+        """Of eleven campaigns without it."""
         self.scored.append(parameters["tau_us"])
-        without = np.array([-1.0, 1.0, 0.0])
+        without = np.linspace(-1.0, 1.0, 11)
         sd = Score(None, without, 0.0, {}, 1.0).sd
         rise = sd * min(self.per * self.scored[-1], self.most)
         return Score(lambda v: float(v[0]), without, 0.0, parameters, rise)
@@ -361,7 +456,7 @@ class Shown:
 NOTHING = np.zeros(1)
 
 
-@probe_of("fitting.most_tries")
+@probe_of("fitting.most_steps")
 def _(settings, patch):
     """Of an effect that shows less than it has to, however strong."""
     probe = Shown(settings, most=5.0)
@@ -399,12 +494,16 @@ def _(settings, patch):
     return round(problem.predicted[1 + len(FREE)] / problem.predicted[0], 6)
 
 
-@probe_of("fitting.round_off")
+@probe_of("fitting.longest_step")
 def _(settings, patch):
-    """Twins of a fit that begins near the right strength."""
-    problem = scripted([100.0], repeat(0.0), settings=settings)
-    fit(problem, NAME, {"fraction": 0.0167, "tau_us": 300.0})
-    return len(problem.predicted)
+    """Twins of a fit whose strength has to be made so many times as large, whatever was tried."""
+    said = []
+    for factor in (1.3, 1.7):
+        patch.setattr(candidate, "factor_to", lambda *_, of=factor: of)
+        problem = scripted([100.0], repeat(0.0), settings=settings)
+        fit(problem, NAME, {"fraction": 0.01, "tau_us": 300.0})
+        said.append(len(problem.predicted))
+    return said
 
 
 # ---- searching
@@ -479,13 +578,13 @@ def _(settings, patch):
     return said
 
 
-@probe_of("searching.least_share")
+@probe_of("searching.same_share")
 def _(settings, patch):
     turn = Round(MODEL, unit(), null().prediction, NOTHING, 1000.0)
     return [is_small_share(turn, 1000.0 - share * 900.0, 100.0, False, settings.searching) for share in beside(0.2)]
 
 
-@probe_of("searching.earlier_tried")
+@probe_of("searching.most_fitted")
 def _(settings, patch):
     asked, problem = [], scripted(settings=settings)
     patch.setattr(neighbours, "fit", lambda here, name, start: asked.append(name))
@@ -501,7 +600,7 @@ def _(settings, patch):
     return len(asked)
 
 
-@probe_of("searching.least_chance")
+@probe_of("judging.alarm")
 def _(settings, patch):
     """A lead that is so rare where draws scatter by 10."""
     by_chance, said = np.random.default_rng(0).normal(0.0, 10.0, TWINS), []
@@ -558,11 +657,11 @@ def _(settings, patch):
     return [line_found(settings, patch, spikes, 1e6) for spikes in beside(1000.0)]
 
 
-@probe_of("searching.close_factor")
+@probe_of("fitting.longest_step")
 def _(settings, patch):
     """Twins of two bends that have to be made so much stronger, whatever was tried."""
     said = []
-    for factor in (1.15, 1.7):
+    for factor in (1.3, 1.7):
         problem = scripted(repeat(10.0), settings=settings)
         problem = replace(problem, case=SimpleNamespace(base=unit(), frame_rate_hz=40_000.0))
         patch.setattr(cancelling_pair, "scale_to", lambda *_, of=factor: (of**2, 0.0))
@@ -584,7 +683,7 @@ def pair_started(settings, patch) -> tuple[float, int]:
     return round(next(iter(found.parameters.values())), 9), len(descents)
 
 
-@probe_of("searching.grid_factor")
+@probe_of("fitting.longest_step")
 def _(settings, patch):
     return pair_started(settings, patch)[0]
 
@@ -688,12 +787,6 @@ def _(settings, patch):
     return [len(probe.scored) for probe in probes]
 
 
-@probe_of("bounding.likely_sds")
-def _(settings, patch):
-    probe = Shown(settings)
-    return round(ScoredShape(probe, probe.score({"tau_us": 0.12}), 0.0).expected, 9)
-
-
 def strengths_tried(settings, start: float) -> list[float]:
     """Strengths that are tested for a bound; start: what the score lets expect, over what is refuted."""
     probe = Shown(settings)
@@ -766,9 +859,9 @@ def map_effects(settings, patch, removed: float) -> int:
     return len(rounds) - 1
 
 
-@probe_of("maps.least_improvement")
+@probe_of("deviance.accept")
 def _(settings, patch):
-    return [map_effects(settings, patch, removed) > 0 for removed in beside(25.0)]
+    return [map_effects(settings, patch, removed) > 0 for removed in beside(24.0)]
 
 
 @probe_of("maps.most_effects")
@@ -792,9 +885,9 @@ def _(settings, patch):
     return said
 
 
-@probe_of("maps.largest_sd")
+@probe_of("searching.least_change")
 def _(settings, patch):
     fits = [
         MapFit("", PatternModel(MODEL, {}), {"vignetting.falloff": sd}, NOTHING, NOTHING, 0.0) for sd in beside(0.5)
     ]
-    return [has_clear_strength(one, "vignetting", settings.maps.largest_sd) for one in fits]
+    return [has_clear_strength(one, "vignetting", settings.searching.largest_sd) for one in fits]

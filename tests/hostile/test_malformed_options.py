@@ -185,6 +185,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--candidates": ("", "lag"),
             "--exclude": ("", "lag"),
             "--effect-file": EFFECT_FILES,
+            "--settings": ("", "{here}", "{here}/none.toml", "{here}/a.dat", "{here}/a.dat/x.toml", "\x00.toml"),
             "--model": ("scs", "", "{here}/none.toml"),
         },
     ),

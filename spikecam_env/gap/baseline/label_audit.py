@@ -25,29 +25,11 @@ from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-LEAST_LABEL = 1e-3
-"""Relative error of a label from which it is reported."""
+FEWEST_LEVELS = 5
+"""Steady recordings that show a mistake: two of a line, two that may be exchanged, and one more."""
 
-LEAST_DARK = 0.02
-"""The same of a dark recording, against the extrapolation of the flats: of few spikes a pixel, the rate between first
-and last is biased by their number squared."""
-
-PIXEL_SPREAD = 0.5
-"""Spread over pixels of a recording's residual, over its mean, from which the label is not at fault: a label is one
-number, and an effect that begins at that level differs from pixel to pixel."""
-
-IRREGULAR = 0.1
-"""Share of irregular intervals in a recording, over its mean residual, from which the label is not at fault: spikes are
-missing or too many, and light of another level makes no irregular interval."""
-
-MENDED = 0.2
-"""Share of the worst disagreement that may be left when a mistake is undone, for it to have been the mistake."""
-
-OUTSTANDING = 4.0
-"""Times the distance of all others from their line that one recording has to be off it."""
-
-RELABEL_TWINS = 6
-"""Twins that a recording is compared with under another label."""
+BELOW_SATURATION = 0.9
+"""Mean rate [spikes/frame] of a steady recording up to which hardly a pixel fires in every frame."""
 
 
 def audit(case: Case) -> list[Contradiction]:
@@ -62,11 +44,12 @@ def audit(case: Case) -> list[Contradiction]:
 def silent(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Lit recordings without spikes, and any that never stop."""
     found = []
+    all_frames, usual = 1 - case.settings.baseline.least_error, case.settings.unit.usual
     for c, o in zip(case.conditions, case.observations, strict=True):
         mean = float(o.times.count.mean()) / o.frames
         if c.light is not None and c.level > 0 and mean == 0:
             found.append(Contradiction("silent", (c.name,), f"{c.name}: labelled radiance {c.level:g}, but no spikes"))
-        if c.light is not None and c.level < 0.5 and mean > 0.999:
+        if c.light is not None and c.level * usual < 1 and mean > all_frames:
             text = f"{c.name}: labelled radiance {c.level:g}, but every pixel fires in every frame"
             found.append(Contradiction("silent", (c.name,), text))
     return found
@@ -79,7 +62,7 @@ def _steady_levels(case: Case, suspect: set[str]) -> tuple[list[str], Array, Arr
         for c, o in zip(case.conditions, case.observations, strict=True)
         if c.kind in ("dark", "flat") and c.name not in suspect
     ]
-    rows = [r for r in rows if r[2] < 0.9]
+    rows = [r for r in rows if r[2] < BELOW_SATURATION]
     return [r[0] for r in rows], np.array([r[1] for r in rows]), np.array([r[2] for r in rows])
 
 
@@ -95,10 +78,10 @@ def _bend(light: Array, rate: Array) -> tuple[float, Array]:
 def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Two steady recordings whose labels, exchanged, make the rates a straight line."""
     names, light, rate = _steady_levels(case, suspect)
-    if len(names) < 5:
+    if len(names) < FEWEST_LEVELS:
         return []
     before = _bend(light, rate)[0]
-    if before < 0.01:
+    if before < case.settings.baseline.least_gross:
         return []
     best: tuple[float, int, int] = (np.inf, 0, 0)
     for i, j in combinations(range(len(names)), 2):
@@ -106,7 +89,7 @@ def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
         other[[i, j]] = other[[j, i]]
         best = min(best, (_bend(other, rate)[0], i, j))
     left, i, j = best
-    if left > MENDED * before:
+    if left > case.settings.searching.least_share * before:
         return []
     a, b = names[i], names[j]
     return [Contradiction("swapped", (a, b), f"{a} and {b} seem to be swapped: exchanged, their rates follow the light "
@@ -116,29 +99,34 @@ def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
 def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
     """One recording off the straight line that all others lie on."""
     names, light, rate = _steady_levels(case, suspect)
-    if len(names) < 5:
+    if len(names) < FEWEST_LEVELS:
         return []
     best: tuple[float, int] = (np.inf, 0)
     for i in range(len(names)):
         keep = np.arange(len(names)) != i
         best = min(best, (_bend(light[keep], rate[keep])[0], i))
     left, i = best
-    if left > MENDED * _bend(light, rate)[0]:
+    if left > case.settings.searching.least_share * _bend(light, rate)[0]:
         return []
     keep = np.arange(len(names)) != i
     slope, dark = np.polyfit(light[keep], rate[keep], 1, w=1.0 / np.maximum(rate[keep], 1e-6))
     if light[i] == 0:
-        return _wrong_dark(names[i], rate[i], dark, left, rate[keep].min())
+        return _wrong_dark(case, names[i], rate[i], dark, left * rate[keep].min())
     off = float((rate[i] - dark) / max(slope * light[i], 1e-9) - 1.0)
     return _wrong_flat(case, names[i], names, off, left)
 
 
 def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: float) -> list[Contradiction]:
-    """A flat whose rate is `off` the line of the others, relative; left: how far these are off it at most."""
-    if abs(off) < max(LEAST_LABEL, OUTSTANDING * left):
+    """A flat whose rate is `off` the line of the others, relative; left: how far these are off it at most.
+
+    A label is one number and makes no interval irregular; an effect that begins at that level differs from pixel to
+    pixel.
+    """
+    settings = case.settings
+    if abs(off) < settings.baseline.least_error:
         return []
-    differs = pixel_spread(case, name, names) > PIXEL_SPREAD * abs(off)
-    if differs or irregular_share(case, name) > IRREGULAR * abs(off):
+    differs = pixel_spread(case, name, names) > settings.searching.worth * abs(off)
+    if differs or irregular_share(case, name) > settings.baseline.irregular * abs(off):
         return []
     text = (
         f"{name}: its rate fits {100 * off:+.2g} % more light than its label says; all others agree to "
@@ -147,13 +135,15 @@ def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: f
     return [Contradiction("label", (name,), text, 1.0 + off)]
 
 
-def _wrong_dark(name: str, rate: float, dark: float, left: float, lowest: float) -> list[Contradiction]:
+def _wrong_dark(case: Case, name: str, rate: float, dark: float, left: float) -> list[Contradiction]:
     """A recording labelled dark whose rate is above `dark`, the extrapolation of the others; none is darker than dark.
 
-    left: how far the others are off their line at most, relative; lowest: their lowest rate.
+    left: how far the others are off their line at most, of their lowest rate.
     """
     off = float(rate / max(dark, 1e-9) - 1)
-    if off < LEAST_DARK or rate - dark < OUTSTANDING * left * lowest:
+    searching = case.settings.searching
+    outstanding = searching.same_share / searching.least_share
+    if off < case.settings.baseline.least_gross or rate - dark < outstanding * left:
         return []
     text = f"{name}: labelled dark, but its rate is {100 * off:+.2g} % off the extrapolation of the flats"
     return [Contradiction("label", (name,), text)]
@@ -174,7 +164,7 @@ def agrees_when_relabelled(case: Case, model: SensorModel, label: Contradiction)
     [name] = label.recordings
     conditions = [relabelled(c, label.factor) if c.name == name else c for c in case.conditions]
     again = case.of(conditions, case.observations)
-    null = model_null(again, model, RELABEL_TWINS)
+    null = model_null(again, model, case.settings.twins.of_random_course)
     of = np.array([k.recording == name and k.group != "rates" for k in null.keys])
     return not adjusted(deviates(null, values_of(again.bank, null.keys))[of]).min() < null.settings.judging.gate
 

@@ -16,14 +16,6 @@ Array = NDArray[np.float64]
 MOST_BINS = 25
 """Largest shift of a moving recording against its light that is looked for [bins of the film]."""
 
-OFTEN, PASSES = 0.9, 0.4
-"""Frames are missing only where the lateness elsewhere, its quantile OFTEN, is below PASSES times the largest: two gaps
-are in few frames of a recording, a flicker in many."""
-
-LEAST_TIMED = 20
-"""Pixels with regular intervals alone that a steady recording needs to be timed by: fewer are late together by chance,
-where spikes are lost and a mean interval of 2 frames makes one of 4 regular."""
-
 SEGMENTS = 8
 """Parts of a moving recording whose timing is compared."""
 
@@ -34,7 +26,7 @@ def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
     for c, o in zip(case.conditions, case.observations, strict=True):
         if c.name in suspect or c.light is None:
             continue
-        jump = _jump_moving(case, c, o) if c.moves and o.film is not None else _jump_steady(o) if not c.moves else None
+        jump = (_jump_moving(case, c, o) if o.film is not None else None) if c.moves else _jump_steady(case, o)
         if jump is not None:
             at, frames = jump
             what = "missing" if frames > 0 else "doubled"
@@ -45,13 +37,18 @@ def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
     return found
 
 
-def _jump_steady(o: Observation) -> tuple[int, float] | None:
+def _jump_steady(case: Case, o: Observation) -> tuple[int, float] | None:
     """(frame, missing): intervals that span a gap are short by it; they end within an interval after it.
 
     A gap of half an interval makes some of them irregular, which are not timed, and lengthens the others.  Where more
     than two intervals on either side are late, light or the dark level changes; nearer to an end than that, it may.
+
+    Two gaps are in few frames, a flicker in many.  Few pixels are late together by chance, where spikes are lost and a
+    mean interval of 2 frames makes one of 4 regular.
     """
-    if int(np.count_nonzero(o.short + o.long == 0)) < LEAST_TIMED:
+    settings = case.settings
+    limits, share = settings.baseline, settings.concluding.large_share
+    if int(np.count_nonzero(o.short + o.long == 0)) < limits.least_counts:
         return None
     interval = o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9)
     window = int(np.clip(round(interval), 4, o.frames // 8))
@@ -60,9 +57,9 @@ def _jump_steady(o: Observation) -> tuple[int, float] | None:
     at = int(np.argmax(np.abs(total)))
     mean = float(total[at] / max(timed[at], 1))
     elsewhere = np.delete(np.abs(total), slice(max(at - 2 * window, 0), at + 2 * window))
-    passes = float(np.quantile(elsewhere, OFTEN)) < PASSES * abs(total[at])
+    passes = float(np.quantile(elsewhere, 1 - limits.irregular)) < share * abs(total[at])
     inside = 2 * window <= at < total.size - 2 * window
-    if abs(total[at]) > 12 * spread and abs(mean) > 0.3 and passes and inside:
+    if abs(total[at]) > 2 * settings.judging.shows * spread and abs(mean) > share and passes and inside:
         return at, -mean
     return None
 
@@ -72,7 +69,8 @@ def _jump_moving(case: Case, condition: Condition, o: Observation) -> tuple[int,
     assert o.film is not None
     expected = refitted_film(condition, case.base)
     parts = np.array_split(np.arange(1, len(expected) - 1), SEGMENTS)  # the ends have a change on one side only
-    coarse = [_bins_late(o.film, expected, part) for part in parts]
+    settings = case.settings
+    coarse = [_bins_late(o.film, expected, part, settings.searching.same_share) for part in parts]
     if len(set(coarse)) > 1 and coarse[0] == 0:
         k = next(i for i, s in enumerate(coarse) if s != 0)
         return k * condition.frames // SEGMENTS, float(coarse[k] * BIN)
@@ -89,19 +87,20 @@ def _jump_moving(case: Case, condition: Condition, o: Observation) -> tuple[int,
     steps = [times[k:].mean() - times[:k].mean() for k in range(1, SEGMENTS)]
     k = int(np.argmax(np.abs(steps))) + 1
     rest = max(float(np.std(times[:k] - times[:k].mean())), float(np.std(times[k:] - times[k:].mean())))
-    if abs(steps[k - 1]) < max(0.7, 6 * rest):
+    if abs(steps[k - 1]) < max(1 - settings.concluding.large_share, settings.judging.shows * rest):
         return None
     return k * condition.frames // SEGMENTS, -steps[k - 1]
 
 
-def _bins_late(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64]) -> int:
-    """Bins by which the light has to be moved on to agree best with a part of the film; 0 unless clearly better."""
+def _bins_late(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64], same_share: float) -> int:
+    """Bins by which the light has to be moved on to agree best with a part of the film, the fewest that do as well; 0
+    unless clearly better.  same_share: of what the best shift removes, what one removes that does as well."""
     seen = film[part].astype(np.float64)
     scores = {}
     for shift in range(-MOST_BINS, MOST_BINS + 1):
         if part[0] + shift >= 0 and part[-1] + shift < len(expected):
             scores[shift] = float(((seen - expected[part + shift]) ** 2).sum())
     least = min(scores.values())
-    if least > 0.8 * scores[0]:
+    if least > same_share * scores[0]:
         return 0
-    return min((s for s in scores if scores[s] < least + 0.1 * (scores[0] - least)), key=abs)
+    return min((s for s in scores if scores[s] < scores[0] - same_share * (scores[0] - least)), key=abs)

@@ -21,23 +21,6 @@ from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
 
-LEAST_WIDTH = 5e-4
-"""Relative spread of pixels' gain beyond the refit's own error."""
-
-LEAST_DARK_ERRORS = 5.0
-"""Errors of the mean dark level of all pixels, over the root of 2, above which there is a dark current."""
-
-COMPARABLE_ERROR = 2.0
-"""Times the median error of a dark level up to which a pixel counts for their spread: of equal pixels with a spike or
-two in the dark some have a rate there, and others thirty times the error."""
-
-LEAST_JITTER = 1e-7
-"""s^2 above which a refit has noise at all: that of a pixel of 10 million electrons."""
-
-NOISELESS_TWINS, NOISE_EXCESS = 4, 5.0
-"""Twins without noise, whose refits show the s^2 of equal pixels that beat with the read-out's clock; and the number of
-their standard deviations that a measured s^2 has to be above it."""
-
 
 @dataclass(frozen=True)
 class Missing:
@@ -71,22 +54,27 @@ def _response(case: Case, model: SensorModel) -> Iterator[_Size]:
     """The spread of pixels' gain, where the model has none."""
     live = case.base.live
     spread = width(case.base.gain[live])
-    if not _has(model, RESPONSE) and spread > LEAST_WIDTH:
+    if not _has(model, RESPONSE) and spread > case.settings.baseline.least_spread:
         sd = spread / _root_of_twice(live)
         yield _Size("conversion_gain_spread", spread, sd, ("bias_voltage_spread", "capacitor_spread"))
 
 
 def _dark_level(case: Case, model: SensorModel) -> Iterator[_Size]:
-    """The dark level of all pixels, and its spread, where the model has none."""
+    """The dark level of all pixels, and its spread, where the model has none.
+
+    Of equal pixels with a spike or two in the dark some have a rate there, and others thirty times the error: for the
+    spread only those of the usual error count.
+    """
+    judging, usual = case.settings.judging, case.settings.unit.usual
     live = case.base.live
     gain, dark, sd = case.base.gain[live], case.base.dark[live], case.base.dark_sd[live]
     count = _root_of_twice(live)
     to_pA = model.circuit.capacitance_fF * model.circuit.swing_V * model.frame_rate_hz * 1e-3
     level, error = common_level(dark, sd), float(np.median(sd))
-    if not _has(model, DARK) and level > LEAST_DARK_ERRORS * error / count and fires_in_the_dark(case, level):
+    if not _has(model, DARK) and level > judging.clear * error / count and fires_in_the_dark(case, level):
         yield _Size("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
     if not _has(model, DARK_PATTERN) and level > 0:
-        known = sd <= COMPARABLE_ERROR * np.median(sd)
+        known = sd <= usual * np.median(sd)
         own = float(np.sqrt(max(scatter(dark[known]) ** 2 - (level * width(gain)) ** 2 - error**2, 0.0)))
         if own > error:
             yield _Size("dark_current_spread", own * to_pA, own * to_pA / count)
@@ -94,8 +82,8 @@ def _dark_level(case: Case, model: SensorModel) -> Iterator[_Size]:
 
 def _noise(case: Case, model: SensorModel) -> Iterator[_Size]:
     """The noise of a spike, where the model has none."""
-    white = case.base.white
-    if not _has(model, NOISE) and white > LEAST_JITTER and is_noise(case, model):
+    white, least = case.base.white, case.settings.baseline.least_spread**2
+    if not _has(model, NOISE) and white > least and is_noise(case, model):
         yield _Size("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
 
 
@@ -118,16 +106,16 @@ def with_missing(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
 def is_noise(case: Case, model: SensorModel) -> bool:
     """Whether the refit's s^2 is above that of twins of a model without noise: of equal pixels 3e-7, at some lights."""
     base = constrained_refit(model, case.base)
-    made = twins(case, model, base, range(NOISELESS_TWINS), sorted(refit_recordings(case)))
+    made = twins(case, model, base, range(case.settings.twins.in_the_end), sorted(refit_recordings(case)))
     white = np.array([t.base.white for t in made if t.base is not None])
-    return bool(case.base.white > white.mean() + NOISE_EXCESS * white.std(ddof=1))
+    return bool(case.base.white > white.mean() + case.settings.judging.clear * white.std(ddof=1))
 
 
 def fires_in_the_dark(case: Case, level: float) -> bool:
-    """Whether the dark recordings hold a third of the spikes that a dark level [thresholds/frame] would give.
+    """Whether the dark recordings hold a large share of the spikes that a dark level [thresholds/frame] would give.
 
     Phases are uniform, so `level` a frame is to be expected of every pixel; without a dark recording: True.
     """
     dark = [o for c, o in zip(case.conditions, case.observations, strict=True) if c.kind == "dark"]
     expected = sum(level * o.frames * o.times.count.size for o in dark)
-    return not dark or sum(int(o.times.count.sum()) for o in dark) > expected / 3
+    return not dark or sum(int(o.times.count.sum()) for o in dark) > case.settings.concluding.large_share * expected

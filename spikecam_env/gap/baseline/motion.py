@@ -11,7 +11,7 @@ most, so a hot pixel is none either.  k is by how much neighbours of a level sca
 share.  Rows are no regions: windows are as high as wide, and even, in which what alternates from row to row cancels.
 
 Blind to: what changes in all pixels of a level by the same share, regions smaller than the least of SIDES, and contrast
-below LEAST_CONTRAST, which local effects of a camera reach; slow noise of single pixels (1/f) is below it in the mean
+below `least_contrast`, which local effects of a camera reach; slow noise of single pixels (1/f) is below it in the mean
 of a window.
 """
 
@@ -28,26 +28,16 @@ from scipy.special import ndtri
 
 from spikecam_env.gap.observe.conditions import STEADY, Condition
 from spikecam_env.gap.observe.observation import TIME_BLOCKS, Observation
+from spikecam_env.gap.settings import Baseline, DiagnosisSettings, checked_settings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-FALSE_ALARM = 1e-3
-"""Chance of calling a static recording moving, over all windows of it together (Bonferroni); measured:
-`python -m benchmarks.motion_limits`."""
-
-LEAST_CONTRAST = 0.05
-"""Relative change of a region's rate from which it is motion: local effects of a camera in the blind trial, at forty
-times their limit, change the rate of a corner by 1 %."""
 
 SIDES = (4, 8, 16)
 """Sides of the windows [pixels]: what is smaller is not found, what is larger in several."""
 
 SPANS = (1, 4, 8)
 """Lengths of the windows [sixteenths of a recording]."""
-
-LEAST_SPIKES = 20.0
-"""Spikes expected in a window from which it is looked at: below, counts are no normal deviates."""
 
 MOST_OF_A_PIXEL = 3.0
 """Standard deviations that a single pixel counts at most in a deviate; a contrast is of all that it changes."""
@@ -111,18 +101,19 @@ class Motion:
         return {**{key: getattr(self, key) for key in shown}, "share": self.share}
 
 
-def find_motion(condition: Condition, seen: Observation) -> Motion | None:
+def find_motion(condition: Condition, seen: Observation, settings: DiagnosisSettings | None = None) -> Motion | None:
     """What moves in a recording of steady light; None where nothing does, or the light is known to change.
 
     In the dark nothing is shown that could move; what changes there is the camera.
     """
     if condition.kind not in STEADY or condition.kind == "dark":
         return None
+    limits = checked_settings(settings).baseline
     counts, frames = whole_blocks(seen)
     kept = np.ones(seen.shape, bool) if condition.static is None else condition.static
     found: list[_Window] = []
     for _ in range(_ROUNDS):
-        more = list(_moving_windows(counts, seen.shape, kept))
+        more = list(_moving_windows(counts, seen.shape, kept, limits))
         if not more:
             break
         found += more
@@ -208,7 +199,7 @@ class _Window:
     contrast: float
 
 
-def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask) -> Iterator[_Window]:
+def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask, limits: Baseline) -> Iterator[_Window]:
     """Windows in space and time whose pixels, of those `kept`, are off together beyond chance."""
     use = kept.reshape(-1)
     if len(counts) < 2 or not use.any():
@@ -221,7 +212,7 @@ def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask) -> Iterat
     spans = [s for s in SPANS if s <= len(counts) // 2]
     tests = sum((len(counts) // span) * len(_starts(shape[0], h)) * len(_starts(shape[1], w))
                 for span in spans for h, w in sizes)  # fmt: skip
-    limit = -float(ndtri(FALSE_ALARM / (2 * max(tests, 1))))
+    least_z = least_deviate(tests, limits)
     for span in spans:
         firsts = range(0, len(counts) - span + 1, span)
         hoped = np.stack([expected[first : first + span].sum(axis=0) for first in firsts])
@@ -233,18 +224,25 @@ def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask) -> Iterat
             parts = (off[i], deviates[i] * sd[i], scatter * sd[i] ** 2, hoped[i])
             planes = [np.where(kept, a.reshape(shape), 0.0) for a in parts]
             for size in sizes:
-                yield from _beyond(planes, size, (first, first + span), limit)
+                yield from beyond(planes, size, (first, first + span), least_z, limits)
 
 
-def _beyond(planes: list[Array], size: tuple[int, int], blocks: tuple[int, int], limit: float) -> Iterator[_Window]:
+def least_deviate(tests: int, limits: Baseline) -> float:
+    """Deviate, of either sign, that one of so many windows exceeds by chance of `false_alarm` (Bonferroni)."""
+    return -float(ndtri(limits.false_alarm / (2 * max(tests, 1))))
+
+
+def beyond(
+    planes: list[Array], size: tuple[int, int], blocks: tuple[int, int], least_z: float, limits: Baseline
+) -> Iterator[_Window]:
     """Windows of one size in one part of the time.  planes: (H, W) off, off as far as a pixel counts, variance,
     expected."""
     rows, columns = (_starts(n, s) for n, s in zip(planes[0].shape, size, strict=True))
     off, capped, variance, expected = (_window_sums(plane, rows, columns, size) for plane in planes)
     z = capped / np.sqrt(np.maximum(variance, 1e-9))
     contrast = off / np.maximum(expected, 1e-9)
-    enough = np.maximum(expected, expected + off) >= LEAST_SPIKES
-    for i, j in np.argwhere(enough & (np.abs(z) > limit) & (np.abs(contrast) > LEAST_CONTRAST)):
+    enough = np.maximum(expected, expected + off) >= limits.least_counts
+    for i, j in np.argwhere(enough & (np.abs(z) > least_z) & (np.abs(contrast) > limits.least_contrast)):
         yield _Window(int(rows[i]), int(columns[j]), *size, blocks, float(z[i, j]), float(contrast[i, j]))
 
 

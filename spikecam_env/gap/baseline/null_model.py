@@ -25,7 +25,7 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
     """The prediction of `count` twins, and of twice as many for recordings in motion: each of their statistics is of
     one recording alone, so that no other one pools its variance (`pooled_variance`)."""
     base, units = unit_under(case, model), case.settings.twins.drawn_units
-    limits = case.settings.twins.spread_limits
+    limits = case.settings.unit.spread_limits
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, units, case.seed, limits)
     made = twins(case, model, base, range(count))
     banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]

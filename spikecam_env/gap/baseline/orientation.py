@@ -6,17 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.contradiction import Contradiction
+from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics.film import refitted_film
 from spikecam_env.gap.twins.case import Case
 
 Array = NDArray[np.float64]
-
-LEAST_SPIKES = 1000
-"""Spikes, at least, of a recording whose orientation is looked at."""
-
-TURNED, CLOSER = 0.2, 0.5
-"""Correlation with the expected picture that a turned recording has to have; and how much closer to 1 than as it is, as
-a share of the distance that is left."""
 
 _BACK, _ALL = slice(None, None, -1), slice(None)
 ORIENTATIONS = {
@@ -31,7 +25,7 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
     found = []
     for i, c in enumerate(case.conditions):
         pictures = _seen_and_expected(case, i)
-        turn = _better_turn(*pictures) if pictures else None
+        turn = _better_turn(*pictures, case.settings.searching) if pictures else None
         if turn:
             name, turned, right = turn
             text = f"{c.name}: {name} (correlation with its light {right:.2f}, once corrected {turned:.2f})"
@@ -41,8 +35,8 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
 
 def _seen_and_expected(case: Case, i: int) -> tuple[Array, Array] | None:
     """(n, H, W) of recording i: its film and that of the refitted unit, or its rates and those of the other flats."""
-    c, o = case.conditions[i], case.observations[i]
-    if c.light is None or o.times.count.sum() < LEAST_SPIKES:
+    c, o, least = case.conditions[i], case.observations[i], case.settings.searching.least_spikes
+    if c.light is None or o.times.count.sum() < least:
         return None
     if o.film is not None:
         seen = o.film.reshape(-1, *case.shape).astype(np.float64)
@@ -50,7 +44,7 @@ def _seen_and_expected(case: Case, i: int) -> tuple[Array, Array] | None:
     others = [
         p.rate
         for j, p in enumerate(case.observations)
-        if j != i and case.conditions[j].kind == "flat" and p.times.count.sum() >= LEAST_SPIKES
+        if j != i and case.conditions[j].kind == "flat" and p.times.count.sum() >= least
     ]
     if c.kind == "dark" or not others:
         return None
@@ -58,13 +52,14 @@ def _seen_and_expected(case: Case, i: int) -> tuple[Array, Array] | None:
     return o.rate.reshape(1, *case.shape), expected.reshape(1, *case.shape)
 
 
-def _better_turn(seen: Array, expected: Array) -> tuple[str, float, float] | None:
-    """(turn, correlation turned, correlation as it is) of the first turn that agrees better, in time or summed."""
+def _better_turn(seen: Array, expected: Array, settings: Searching) -> tuple[str, float, float] | None:
+    """(turn, correlation turned, correlation as it is) of the first turn that agrees better, in time or summed: by no
+    little correlation, and with more than half of the way to 1."""
     whole = (seen, expected), (seen.sum(axis=0)[None], expected.sum(axis=0)[None])
     for name, (rows, columns) in ORIENTATIONS.items():
         agree = [(_correlation(s[:, rows, columns], e), _correlation(s, e)) for s, e in whole]
         turned, right = max(agree, key=lambda a: a[0] - a[1])
-        if turned > TURNED and turned > right + CLOSER * (1.0 - max(right, 0.0)):
+        if turned > settings.least_share and turned > right + settings.worth * (1.0 - max(right, 0.0)):
             return name, turned, right
     return None
 

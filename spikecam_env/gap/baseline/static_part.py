@@ -11,9 +11,7 @@ from spikecam_env.campaign.reading import CampaignRecording
 from spikecam_env.gap.baseline.motion import Motion, find_motion
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation, observe
-
-LEAST_STATIC = 0.25
-"""Share of pixels that has to be static for these alone to be diagnosed: a choice."""
+from spikecam_env.gap.settings import DiagnosisSettings
 
 
 @dataclass(frozen=True)
@@ -25,18 +23,21 @@ class Observed:
     seen: tuple[Observation, ...]
 
 
-def without_motion(observed: Observed, *, static_only: bool) -> tuple[Observed, tuple[Motion, ...]]:
+def without_motion(
+    observed: Observed, *, static_only: bool, settings: DiagnosisSettings
+) -> tuple[Observed, tuple[Motion, ...]]:
     """What was observed without what moves, and what moves.
 
     Without recordings where that cannot be left out: it is not to be (`static_only`), light said to be known changes,
     or too few pixels are static.  All unknown scenes keep the same pixels.
     """
-    motion = tuple(m for c, o in zip(observed.conditions, observed.seen, strict=True) if (m := find_motion(c, o)))
+    both = zip(observed.conditions, observed.seen, strict=True)
+    motion = tuple(m for c, o in both if (m := find_motion(c, o, settings)))
     if not motion:
         return observed, ()
     static, moving = static_pixels(motion), {m.recording for m in motion}
     known = any(c.light is not None for c in observed.conditions if c.name in moving)
-    if not static_only or known or static.mean() < LEAST_STATIC:
+    if not static_only or known or static.mean() < settings.concluding.large_share:
         return Observed((), (), ()), motion
     conditions = [replace(c, static=static) if c.kind == "unknown" else c for c in observed.conditions]
     seen = [

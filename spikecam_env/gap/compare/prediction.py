@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.pooled_variance import moderated
-from spikecam_env.gap.settings import DiagnosisSettings
+from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
 from spikecam_env.gap.statistics import Key, floor_of
 from spikecam_env.gap.unit.refit import BaseFit
 
@@ -104,7 +104,7 @@ def null_of(
         len(banks),
         freedom,
         draws=draws,
-        settings=settings or DiagnosisSettings(),
+        settings=checked_settings(settings),
     )
 
 

@@ -134,7 +134,9 @@ def change_of(
         apart = there.units - here.units
         own2 = np.where(np.isfinite(apart).all(axis=0), apart.var(axis=0, ddof=1) / len(apart), own2)
     own2 = np.maximum(own2, 1e-300)
-    clear = is_clear(np.where(known, change, 0.0), own2) | is_clear(np.where(known, 0.0, change), own2)
+    judging = null.settings.judging
+    here_known, elsewhere = np.where(known, change, 0.0), np.where(known, 0.0, change)
+    clear = is_clear(here_known, own2, judging) | is_clear(elsewhere, own2, judging)
     return change, np.sqrt(own2), clear
 
 
@@ -148,7 +150,7 @@ def scale_of(gap: Array, effect: Array, of_gap: Array, of_effect: Array, judging
     every ratio that many statistics agree on.
     """
     heavy, tolerance = judging.heavy, judging.tolerance
-    clear = is_clear(effect, of_gap + of_effect)
+    clear = is_clear(effect, of_gap + of_effect, judging)
     if not clear.any():
         return 0.0, np.inf
     gap, effect, of_gap, of_effect = gap[clear], effect[clear], of_gap[clear], of_effect[clear]
@@ -174,10 +176,10 @@ def scale_to(null: Null, measured: Array, predicted: Prediction) -> tuple[float,
     return scale_of(gap, effect, null.noise**2, own_variance(null, predicted), null.settings.judging)
 
 
-def is_clear(effect: Array, variance: Array) -> NDArray[np.bool_]:
-    """(S,) whether an effect stands clear of noise on a statistic, or, where it does on none, half as well as on its
-    best."""
+def is_clear(effect: Array, variance: Array, judging: Judging) -> NDArray[np.bool_]:
+    """(S,) whether an effect stands clear of noise on a statistic, or, where it does on none, nearly as well as on its
+    best: of 600 statistics a few are 4 noises off by chance."""
     size = np.abs(effect) / np.sqrt(variance)
     most = float(size.max())
-    least = max(min(3.0, 0.5 * most), min(6.0, 0.25 * most))  # of 600 statistics a few are 4 noises off by chance
+    least = max(min(judging.apart, judging.as_well * most), min(judging.shows, judging.as_well**2 * most))
     return np.asarray((size > least) & (effect != 0))

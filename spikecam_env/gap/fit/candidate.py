@@ -175,14 +175,14 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
     Statistics of one recording are of one course in time: its strength is known no better than from one number each.
     """
     strength, power = candidate(name).strength, candidate(name).power
-    only = problem.affected([name])
+    only, most = problem.affected([name]), problem.settings.fitting.largest_factor
     for _ in range(2):
         there = with_effect(problem.model, name, bounded(name, parameters))
         base = constrained_refit(there, problem.case.base)
         predicted = problem.predict(there, base, problem.settings.twins.of_random_course, only)
         factor, sd = likeliest(problem.null, problem.seen, predicted)
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
-        if 0.5 < factor < 2.0:
+        if 1 / most < factor < most:
             break
     predicted = with_change_scaled(problem.null, predicted, factor)
     rho, left = problem.residual_and_misfit(predicted)

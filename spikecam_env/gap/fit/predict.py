@@ -42,7 +42,7 @@ def with_drawn_pattern(
     """A prediction with its pattern statistics replaced by those of `count` units of the model; where None, of as many
     as the null model has."""
     count = null.settings.twins.drawn_units if count is None else count
-    limits = null.settings.twins.spread_limits
+    limits = null.settings.unit.spread_limits
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, count, case.seed, limits)
     values = np.array([values_of(b, null.keys) for b in drawn])
     known = np.isfinite(values).all(axis=0)

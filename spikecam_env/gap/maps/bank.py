@@ -46,7 +46,7 @@ class MapCase:
         return map_bank(self.maps)
 
 
-def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: DiagnosisSettings | None = None) -> MapCase:
+def read_maps(campaign: Campaign, seed: int, jobs: int, settings: DiagnosisSettings) -> MapCase:
     """The rates of a campaign in known, steady light."""
     maps = []
     for r in campaign.recordings:
@@ -60,7 +60,7 @@ def read_maps(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: Diagno
     dark = dark_of(maps)
     level = float(np.median(dark)) if dark is not None else 0.0
     response = {m.shown.name: float(np.median(m.rate)) - level for m in maps if m.shown.kind != "dark"}
-    return MapCase(campaign.shape, tuple(maps), response, level, seed, jobs, settings or DiagnosisSettings())
+    return MapCase(campaign.shape, tuple(maps), response, level, seed, jobs, settings)
 
 
 def spread_evenly(rate: Array, frames: int) -> Array:

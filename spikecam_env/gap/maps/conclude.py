@@ -32,7 +32,6 @@ from spikecam_env.gap.result import (
     Statistic,
     why_rejected,
 )
-from spikecam_env.gap.settings import MapSettings
 from spikecam_env.gap.unit.usual import unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
 
@@ -84,7 +83,9 @@ def conclude_maps(
         gap=gap_of_maps(case, null, values, predicted),
         statistics=map_statistics(case, null, values, predicted, rho),
         ranking=tuple(
-            ranked_fit(fit, was[0].misfit, r[0].name, fit is r[0] and r is not rejected, case.settings.maps)
+            ranked_fit(
+                fit, was[0].misfit, r[0].name, fit is r[0] and r is not rejected, case.settings.deviance.accept_map
+            )
             for was, r in itertools.pairwise([*rounds, rejected])
             for fit in r
         ),
@@ -99,7 +100,7 @@ def significant_effects(
     """The best of each round after the first, where its strength is significant in the end."""
     found = []
     for fits in rounds[1:]:
-        if has_clear_strength(rounds[-1][0], fits[0].name, case.settings.maps.largest_sd):
+        if has_clear_strength(rounds[-1][0], fits[0].name, case.settings.searching.largest_sd):
             instead = {f.name: gap_of_maps(case, null, values, f.predicted).removed for f in fits[1:]}
             found.append(named_effect(fits, rounds[-1][0], instead))
     return tuple(found)
@@ -122,7 +123,7 @@ def patched_model(case: MapCase, tested: SensorModel, last: MapFit | None) -> Se
     if last is None:
         return tested
     patched = at_measured_dark(last.state, case)
-    for name in (n for n in last.state.added if not has_clear_strength(last, n, case.settings.maps.largest_sd)):
+    for name in (n for n in last.state.added if not has_clear_strength(last, n, case.settings.searching.largest_sd)):
         patched = patched.without(name)
     return patched
 
@@ -180,10 +181,10 @@ def _estimate(name: str, key: str, value: float, sd: float) -> Estimate:
     return Estimate(value, own, interval_of(name, key, value, own, by_steps=linear))
 
 
-def ranked_fit(t: MapFit, before: float, best: str, accepted: bool, settings: MapSettings) -> Ranked:
-    """A row of the ranking.  best: the candidate of its round that leaves least."""
+def ranked_fit(t: MapFit, before: float, best: str, accepted: bool, accept: float) -> Ranked:
+    """A row of the ranking.  best: the candidate of its round that leaves least.  accept: reduction that is asked."""
     worst = float(np.abs(t.rho).max())
-    against = why_rejected(t.misfit, before, best, settings.least_improvement)
+    against = why_rejected(t.misfit, before, best, accept)
     reason = f"leaves {worst:.1f} noises at worst" if accepted else against
     return Ranked(t.name, candidate(t.name).family, before, t.misfit, fit_estimates(t, t.name), accepted, reason)
 

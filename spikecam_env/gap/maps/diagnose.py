@@ -16,7 +16,7 @@ from spikecam_env.gap.maps.conclude import conclude_maps
 from spikecam_env.gap.maps.evidence import evidence_of_maps
 from spikecam_env.gap.maps.search import PatternModel, search_maps, spreads_matched
 from spikecam_env.gap.result import Conclusion, Evidence
-from spikecam_env.gap.settings import DiagnosisSettings
+from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
 from spikecam_env.sensor import SensorModel
 
 
@@ -31,9 +31,9 @@ def diagnose_maps(
     """Find what fixed pattern a model lacks, from rates alone.
 
     names: of candidates.  seed, jobs, settings: as in `diagnose.diagnose`.  Raises InputError where no rates are in
-    known light.
+    known light, and for settings of another type.
     """
-    case = read_maps(campaign, seed, jobs, settings)
+    case = read_maps(campaign, seed, jobs, checked_settings(settings))
     tested = [n for n in names if candidate(n).is_pattern and shows_in_maps(n, case)]
     measured = case.statistics
     given = spreads_matched(PatternModel(model, {}), case, measured)

@@ -95,7 +95,7 @@ def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Key, floa
             off = [measured[k] - simulated[k] for k in keys if k in measured and k in simulated]
             if off and any(e.name in FITTED_SPREADS[what] for e in state.model.effects):
                 factors[what] = float(
-                    np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *case.settings.twins.spread_limits)
+                    np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *case.settings.unit.spread_limits)
                 )
         state = replace(state, factors=factors)
     return state
@@ -115,7 +115,7 @@ def search_maps(
         with ThreadPoolExecutor(case.jobs) as pool:
             tried = list(pool.map(lambda n, start=now.state: fit_candidate(case, start, null, values, n), left))
         tried.sort(key=lambda t: t.misfit)
-        if tried[0].misfit > now.misfit - case.settings.maps.least_improvement:
+        if tried[0].misfit > now.misfit - case.settings.deviance.accept_map:
             return rounds, tried
         rounds.append(tried)
         left = [t.name for t in tried[1:] if t.misfit < now.misfit]

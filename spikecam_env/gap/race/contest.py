@@ -19,10 +19,6 @@ from spikecam_env.gap.race.hypothesis import Fidelity, Hypothesis, added_to, bes
 from spikecam_env.gap.race.neighbours import Start
 from spikecam_env.gap.search.choice import chosen_of
 from spikecam_env.gap.search.neighbours import try_more_draws
-from spikecam_env.gap.settings import Deviance
-
-TIE = Deviance().keep
-"""Score by which a hypothesis has to be worse than the best to go no further: by chance, two twins differ by ten."""
 
 
 @dataclass(frozen=True)
@@ -56,19 +52,19 @@ def may_beat(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
     where the other leaves something, and by no more than chance where it leaves nothing, or `one` does."""
     if one.fit.prediction is other.fit.prediction:
         return False
-    something = leaves_something(problem, other)
-    tied = one.score < other.score + TIE and not (something and leaves_something(problem, one))
+    something, tie = leaves_something(problem, other), problem.settings.deviance.keep
+    tied = one.score < other.score + tie and not (something and leaves_something(problem, one))
     return tied or (something and one.hope < other.score)
 
 
 def shaped_while_open(problem: Problem, one: Hypothesis, waiting: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The hypotheses; of those that may beat `one`, and are no more than a tie behind the best, all parameters are
     fitted."""
-    done = [h for h in waiting if h.fidelity >= Fidelity.SHAPED]
+    tie, done = problem.settings.deviance.keep, [h for h in waiting if h.fidelity >= Fidelity.SHAPED]
     left = sorted((h for h in waiting if h.fidelity < Fidelity.SHAPED), key=lambda h: h.score)
     while left:
         best = min(done, key=lambda h: h.score, default=one)
-        near = replace(best, misfit=best.misfit + TIE) if leaves_something(problem, best) else best
+        near = replace(best, misfit=best.misfit + tie) if leaves_something(problem, best) else best
         open_ = [h for h in left if may_beat(problem, h, one) and (best is one or may_beat(problem, h, near))]
         if not open_ or not problem.allows(f"{open_[0].newest[-1]} of finer shape", needed=True):
             break

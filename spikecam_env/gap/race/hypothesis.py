@@ -1,6 +1,6 @@
 """A hypothesis: a set of effects with parameters on the null model, what it leaves, and what its parameters cost.
 
-score = deviance + PRICE parameters          least is best
+score = deviance + tie parameters          least is best
 """
 
 from __future__ import annotations
@@ -16,12 +16,8 @@ from spikecam_env.gap.compare.distance import is_significant, residual
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.joint import Errors
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.settings import Deviance
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.unit.refit import constrained_refit
-
-PRICE = Deviance().tie
-"""Deviance that a parameter costs.  By Schwarz's criterion, the logarithm of the number of observations, it is 6.5 for
-the 660 statistics of the standard design."""
 
 
 class Fidelity(IntEnum):
@@ -35,10 +31,6 @@ class Fidelity(IntEnum):
     """All parameters of all its effects are fitted together."""
 
 
-OPEN = {Fidelity.STRENGTH: 1.0, Fidelity.SHAPED: 0.25, Fidelity.JOINT: 0.0}
-"""Share of what a hypothesis removes that fitting its other parameters may remove besides."""
-
-
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """fit: of all its effects, under the name of the newest.  effects: their names, in the order they were added in.
@@ -46,7 +38,7 @@ class Hypothesis:
     newest: those that its parent has not.  parent: what they were added to; None of the null model.
     misfit: deviance under the null model.  errors: of parameters, where they were fitted together.  off: parameters of
     the null model that its unit has in another amount, by effect.  used_held_out: whether the recordings held out were
-    fitted too.
+    fitted too.  settings: by which it is scored.
     """
 
     fit: Fit
@@ -58,6 +50,7 @@ class Hypothesis:
     errors: Errors = field(default_factory=dict)
     off: tuple[str, ...] = ()
     used_held_out: bool = False
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
     def parameters(self) -> int:
@@ -66,15 +59,19 @@ class Hypothesis:
 
     @property
     def score(self) -> float:
-        """Deviance, and the price of its parameters."""
-        return self.misfit + PRICE * self.parameters
+        """Deviance, and a tie for each of its parameters.  By Schwarz's criterion, the logarithm of the number of
+        observations, it were 6.5 for the 660 statistics of the standard design."""
+        return self.misfit + self.settings.deviance.tie * self.parameters
 
     @property
     def hope(self) -> float:
-        """Score that it may come down to when all of its parameters are fitted."""
+        """Score that it may come down to when all of its parameters are fitted: those of its newest effects may remove
+        as much as its strength does, those of all others together little of it."""
         if self.parent is None or not self.has_open_parameters:
             return self.score
-        return self.score - OPEN[self.fidelity] * max(self.parent.misfit - self.misfit, 0.0)
+        little = self.settings.searching.least_share
+        share = {Fidelity.STRENGTH: 1.0, Fidelity.SHAPED: little, Fidelity.JOINT: 0.0}[self.fidelity]
+        return self.score - share * max(self.parent.misfit - self.misfit, 0.0)
 
     @property
     def has_open_parameters(self) -> bool:
@@ -97,7 +94,8 @@ def nothing_added(problem: Problem) -> Hypothesis:
     """The null model itself."""
     base = constrained_refit(problem.model, problem.case.base)
     rho, misfit = problem.residual_and_misfit(problem.null.prediction)
-    return Hypothesis(Fit("", {}, {}, problem.null.prediction, base, rho, misfit, problem.model), misfit)
+    nothing = Fit("", {}, {}, problem.null.prediction, base, rho, misfit, problem.model)
+    return Hypothesis(nothing, misfit, settings=problem.settings)
 
 
 def beside(problem: Problem, parent: Hypothesis) -> Problem:
@@ -111,7 +109,8 @@ def added_to(problem: Problem, parent: Hypothesis, found: Fit, newest: tuple[str
     """A fit beside a hypothesis as one of its own: it removes as much from the parent's deviance."""
     misfit = parent.misfit - (beside(problem, parent).misfit() - found.misfit)
     effects = (*parent.effects, *newest)
-    return Hypothesis(found, misfit, effects, newest, parent, Fidelity.STRENGTH, off=parent.off)
+    made = Hypothesis(found, misfit, effects, newest, parent, Fidelity.STRENGTH, off=parent.off)
+    return replace(made, settings=problem.settings)
 
 
 def leaves_something(problem: Problem, one: Hypothesis) -> bool:

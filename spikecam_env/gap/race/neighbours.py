@@ -15,21 +15,10 @@ from spikecam_env.gap.compare.distance import in_noise, loss
 from spikecam_env.gap.fit.confirm import confirmed, resettled
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.race.hypothesis import Fidelity, Hypothesis, added_to, beside, nothing_added
-from spikecam_env.gap.race.pairs import MOST_TWINS, PAIRS, Pair, fit_pair
+from spikecam_env.gap.race.pairs import PAIRS, Pair, fit_pair
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.shortlist import fit_from, groups_that_stand_out, screened_beside, starts_to_fit
-
-MOST_EFFECTS = 3
-"""Effects of a hypothesis at most."""
-
-TWINS_OF_A_START = 3
-"""Twins that the fit of a strength takes, by and large: what a start is begun for."""
-
-
-SHARE = 0.5
-"""Share of what an effect removes that another, or another of its shapes, has to remove by its template to be tried in
-its place."""
 
 
 @dataclass(frozen=True)
@@ -80,20 +69,21 @@ class Field:
         return [*dropped, *swapped]
 
     def swapped(self, problem: Problem, one: Hypothesis, name: str, rest: Hypothesis) -> list[Start]:
-        """Another effect in the place of one, whose template removes SHARE of what that does beside the rest; and that
+        """Another effect in the place of one, whose template removes enough of what that does beside the rest; and that
         one, to run against them."""
-        least = SHARE * (rest.misfit - one.misfit)
+        least = problem.settings.searching.worth * (rest.misfit - one.misfit)
         others = [s for s in self.added(problem, rest) if s.removed >= least and s.what != name]
         return [Start(name, 0, partial(incumbent, one, name, rest)), *others] if others else []
 
     def reshaped(self, problem: Problem, one: Hypothesis) -> list[Start]:
-        """The newest effect from others of its shapes, which remove SHARE of what its best does."""
+        """The newest effect from others of its shapes, which remove enough of what its best does."""
         if one.parent is None or len(one.newest) > 1 or not fits_its_shape(one.newest[0]):
             return []
         found = self.screened(problem, one.parent, one.newest)
         before = deviance(beside(problem, one.parent))
         most = max((before - s.misfit for s in found), default=0.0)
-        other = [s for s in found[1:] if before - s.misfit >= SHARE * most]
+        least = problem.settings.searching.worth * most
+        other = [s for s in found[1:] if before - s.misfit >= least]
         return [self.start(problem, one.parent, s, before) for s in other]
 
     def screened(self, problem: Problem, one: Hypothesis, names: Collection[str]) -> list[Screened]:
@@ -103,7 +93,7 @@ class Field:
 
     def added(self, problem: Problem, one: Hypothesis) -> list[Start]:
         """One effect more, the best by their templates."""
-        if len(one.effects) >= MOST_EFFECTS:
+        if len(one.effects) >= problem.settings.searching.most_effects:
             return []
         before = deviance(beside(problem, one))
         chosen = starts_to_fit(self.screened(problem, one, self.names), before, problem.settings.searching)
@@ -111,7 +101,7 @@ class Field:
 
     def standing_out(self, problem: Problem, one: Hypothesis) -> list[Start]:
         """One effect more, of those that change the pattern or show by motion alone, where that stands out."""
-        if len(one.effects) >= MOST_EFFECTS:
+        if len(one.effects) >= problem.settings.searching.most_effects:
             return []
         here = beside(problem, one)
         before, groups = deviance(here), groups_that_stand_out(here.null, in_noise(here.null, here.seen))
@@ -127,7 +117,8 @@ class Field:
             here = beside(problem, one)
             return added_to(problem, one, fit_from(here, screened), (screened.name,))
 
-        cost = TWINS_OF_A_START * len(problem.case.conditions)
+        usual_tries = (1 + problem.settings.fitting.most_tries) // 2
+        cost = usual_tries * len(problem.case.conditions)
         return Start(screened.name, cost, make, before - screened.misfit)
 
     def added_in_pairs(self, problem: Problem, one: Hypothesis) -> list[Start]:
@@ -141,7 +132,7 @@ class Field:
         def make() -> Hypothesis:
             return added_to(problem, nothing_added(problem), fit_pair(problem, pair), pair.names)
 
-        twins = len(pair.starts(problem)) + MOST_TWINS
+        twins = len(pair.starts(problem)) + problem.settings.fitting.most_steps
         return Start(" with ".join(pair.names), twins * len(problem.case.conditions), make)
 
 
@@ -178,4 +169,6 @@ def without(problem: Problem, one: Hypothesis, name: str) -> Hypothesis:
     rest = tuple(n for n in one.effects if n != name)
     fewer = confirmed(problem, resettled(problem, one.fit, one.fit.model.without(name)))
     fewer = replace(fewer, name=rest[-1] if rest else "")
-    return Hypothesis(fewer, problem.misfit(fewer.prediction), rest, rest[-1:], None, Fidelity.SHAPED)
+    return Hypothesis(
+        fewer, problem.misfit(fewer.prediction), rest, rest[-1:], None, Fidelity.SHAPED, settings=problem.settings
+    )

@@ -27,12 +27,6 @@ Parameters = dict[str, float]
 Both = tuple[Parameters, Parameters]
 """Parameters of the first effect and of the second."""
 
-LARGEST_FACTOR = 4.0
-"""Factor by which strengths are scaled at once by what one twin shows."""
-
-MOST_TWINS = 4
-"""Twins of the best start of a grid at most, until its strengths are right to a third."""
-
 
 @dataclass(frozen=True)
 class Pair:
@@ -86,7 +80,7 @@ def fit_pair(here: Problem, pair: Pair) -> Fit:
     unit = constrained_refit(here.model, here.case.base)
     best, factor = min((scaled_once(here, pair, s, unit) for s in pair.starts(here)), key=lambda t: t[0].misfit)
     round_off = here.settings.fitting.round_off
-    for _ in range(MOST_TWINS - 1):
+    for _ in range(here.settings.fitting.most_steps - 1):
         if round_off[0] < factor < round_off[1]:
             break
         again, factor = scaled_once(here, pair, parameters_in(best.model, pair), best.base)
@@ -98,8 +92,9 @@ def scaled_once(here: Problem, pair: Pair, start: Both, base: BaseFit) -> tuple[
     """(fit of both scaled to what is seen by one twin, the factor); of a wrong sign hardly anything is left."""
     there = with_both(here.model, pair, start)
     predicted = here.predict(there, constrained_refit(there, base), 1, here.affected(pair.names))
-    scale = max(scale_to(here.null, here.seen, predicted)[0], LARGEST_FACTOR**-pair.power)
-    factor = float(np.clip(scale ** (1 / pair.power), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
+    most = here.settings.twins.most_extrapolated
+    scale = max(scale_to(here.null, here.seen, predicted)[0], most**-pair.power)
+    factor = float(np.clip(scale ** (1 / pair.power), 1 / most, most))
     parameters = tuple(
         stronger(n, p, factor) if n in pair.scaled else p for n, p in zip(pair.names, start, strict=True)
     )

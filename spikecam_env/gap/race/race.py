@@ -22,10 +22,6 @@ from spikecam_env.gap.race.rounds import rounds_of
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.forward import ANOTHER
 from spikecam_env.gap.search.round import Round
-from spikecam_env.gap.settings import Deviance
-
-TO_ACCEPT = Deviance().tie
-"""Score by which a neighbour has to be better: a likelihood ratio of 20, and the price of its parameters."""
 
 
 def race(problem: Problem, names: Sequence[str], templates: Templates) -> list[Round]:
@@ -72,10 +68,10 @@ def may_go_on(problem: Problem, best: Hypothesis) -> bool:
 
 
 def is_better(problem: Problem, found: Hypothesis, best: Hypothesis) -> bool:
-    """Whether a neighbour takes another's place: better by TO_ACCEPT, or by anything where it alone leaves nothing, or
+    """Whether a neighbour takes another's place: better by a tie, or by anything where it alone leaves nothing, or
     has fewer parameters.  None that leaves something takes the place of one that leaves nothing."""
     left, before = leaves_something(problem, found), leaves_something(problem, best)
     if left and not before:
         return False
     by_anything = left < before or found.parameters < best.parameters
-    return found.score < best.score - (0.0 if by_anything else TO_ACCEPT)
+    return found.score < best.score - (0.0 if by_anything else problem.settings.deviance.tie)

@@ -63,6 +63,8 @@ def command_of(d: Diagnosis) -> str:
         words.append("--static-only")
     if d.search != "forward":
         words.append(f"--search {d.search}")
+    if d.settings:
+        words.append("--settings FILE")
     return " ".join(words)
 
 

@@ -41,7 +41,7 @@ def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
     if not set(PAIR) <= set(names):
         return None
     frame_rate_hz, settings = problem.case.frame_rate_hz, problem.settings
-    most, close = settings.twins.most_extrapolated, settings.searching.close_factor
+    most, round_off = settings.twins.most_extrapolated, settings.fitting.round_off
     only = problem.affected(PAIR)
     tau_us = START_US
     bare = base = constrained_refit(
@@ -56,7 +56,7 @@ def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
             return None
         factor = float(np.clip(np.sqrt(square), 1 / most, most))
         base, tau_us = extrapolated_unit(bare, base, factor**2, most), tau_us * factor
-        if 1 / close < factor < close:
+        if round_off[0] < factor < round_off[1]:
             break
     predicted = with_change_scaled(problem.null, predicted, factor**2)
     rho, left = problem.residual_and_misfit(predicted)

@@ -59,7 +59,7 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
     grid = [dict(zip(starts, values, strict=True)) for values in product(*starts.values())]
     only = here.affected(pair.names)
     free = [(name, key) for name in pair.names for key in candidate(name).fitted]
-    descents, most = here.settings.searching.descents, here.settings.searching.grid_factor
+    descents, most = here.settings.searching.descents, here.settings.fitting.largest_factor
     cost = len(only) * (len(grid) + descents * (1 + len(free)))
     if not here.allows(f"{pair.first} with {pair.second}", cost, needed=True):
         return None

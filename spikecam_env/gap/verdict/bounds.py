@@ -105,7 +105,7 @@ class ScoredShape:
         settings = self.probe.settings
         if self.score is None or self.score.effect_size < 0.5 * settings.judging.shows:
             return np.inf
-        beyond = self.excess + settings.bounding.likely_sds * self.score.sd
+        beyond = self.excess + self.score.likely_sds * self.score.sd
         factor = (beyond / self.score.rise) ** (1 / power_of(self.probe.name))
         return float(abs(self.score.parameters[strength_of(self.probe.name)]) * factor)
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from spikecam_env.gap.baseline.motion import Motion
-from spikecam_env.gap.baseline.static_part import LEAST_STATIC, static_pixels
+from spikecam_env.gap.baseline.static_part import static_pixels
 from spikecam_env.gap.result import Conclusion
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.sensor import SensorModel
 
 TO_DO = (
@@ -15,7 +16,9 @@ TO_DO = (
 TO_DO_IN_KNOWN_LIGHT = "In known light, give the light over time (an .npz) as the label, or leave the recording out."
 
 
-def moves(model: SensorModel, motion: tuple[Motion, ...], *, static_only: bool) -> Conclusion:
+def moves(
+    model: SensorModel, motion: tuple[Motion, ...], settings: DiagnosisSettings, *, static_only: bool
+) -> Conclusion:
     """The verdict `data`: nothing was compared."""
     return Conclusion(
         verdict="data",
@@ -23,7 +26,7 @@ def moves(model: SensorModel, motion: tuple[Motion, ...], *, static_only: bool) 
         unknown=None,
         class_=None,
         parameters={},
-        notes=(*(m.text for m in motion), *what_to_do(motion, static_only)),
+        notes=(*(m.text for m in motion), *what_to_do(motion, static_only, settings.concluding.large_share)),
         gap=None,
         statistics=(),
         ranking=(),
@@ -32,14 +35,14 @@ def moves(model: SensorModel, motion: tuple[Motion, ...], *, static_only: bool) 
     )
 
 
-def what_to_do(motion: tuple[Motion, ...], static_only: bool) -> list[str]:
-    """Steps that make the campaign usable."""
+def what_to_do(motion: tuple[Motion, ...], static_only: bool, least: float) -> list[str]:
+    """Steps that make the campaign usable.  least: share of pixels that has to be static."""
     share = float(static_pixels(motion).mean())
     advice = [TO_DO] if any(not m.light_known for m in motion) else []
     if any(m.light_known for m in motion):
         advice.append(TO_DO_IN_KNOWN_LIGHT)
-    if static_only and share < LEAST_STATIC:
-        advice.insert(0, f"{100 * share:.3g} % of pixels are static; --static-only needs {100 * LEAST_STATIC:g} %.")
+    if static_only and share < least:
+        advice.insert(0, f"{100 * share:.3g} % of pixels are static; --static-only needs {100 * least:g} %.")
     return advice
 
 

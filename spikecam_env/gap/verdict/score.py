@@ -68,6 +68,12 @@ class Score:
         return float(np.sqrt(np.var(self.without, ddof=1) * (1 + 1 / n) + self.error**2))
 
     @property
+    def likely_sds(self) -> float:
+        """Standard deviations by which a refuted strength is likely to lie above what is seen: Student's quantile of
+        CONFIDENCE for so many campaigns without the effect, 1.8 of eleven."""
+        return float(stats.t.ppf(CONFIDENCE, len(self.without) - 1))
+
+    @property
     def effect_size(self) -> float:
         """Noises by which the effect shows at `parameters`."""
         return self.rise / self.sd
@@ -145,7 +151,7 @@ class TwinProbe(EffectProbe):
         null, count = self.null, len(made.draws)
         change = np.where(self.usable, np.nan_to_num(made.mean - null.mean), 0.0)
         own2 = (pair_noise_share(null.keys) * null.noise) ** 2 / count
-        change = np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0)
+        change = np.where(is_clear(change, np.maximum(own2, 1e-300), null.settings.judging), change, 0.0)
         without = {d.number: d.values for d in null.draws}
         each = np.nan_to_num([d.values - without[d.number] for d in made.draws])
         scatter = each.std(axis=0, ddof=1) if count > 1 else 0.0

@@ -31,7 +31,7 @@ def where(case: Case) -> str:
     known = np.isfinite(case.base.residual)
     off = np.where(known, case.base.residual, 0.0)[brightest_flats(case)].mean(axis=0) if len(known) else off
     fields, limits = fields_of(case.shape), case.settings.concluding
-    out = outlying_counts(irregular, fields, limits) | outlying_means(off, fields, limits)
+    out = outlying_counts(irregular, fields, limits) | outlying_means(off, fields, case.settings)
     if not 0 < out.sum() <= FIELDS_PER_SIDE:
         return ""
     names = [rows_and_columns(int(f), case.shape) for f in np.flatnonzero(out)]
@@ -63,17 +63,17 @@ def outlying_counts(irregular: Array, fields: NDArray[np.int64], limits: Conclud
     return (count > limits.times_expected * expected) & more
 
 
-def outlying_means(values: Array, fields: NDArray[np.int64], limits: Concluding) -> NDArray[np.bool_]:
+def outlying_means(values: Array, fields: NDArray[np.int64], settings: DiagnosisSettings) -> NDArray[np.bool_]:
     """(9,) fields whose median of (P,) values, relative rates, stands out from its error, sqrt(pi / 2) sd / sqrt(n),
-    from the scatter of the others, and by five times what labels can be known to."""
+    from the scatter of the others, and by what is clear of what labels can be known to."""
     mean = np.array([np.median(values[fields == f]) for f in range(FIELDS_PER_SIDE**2)])
     off = np.abs(mean - np.median(mean))
     inside = np.sort(off)[: FIELDS_PER_SIDE**2 - FIELDS_PER_SIDE]
     error = 1.2533 * np.array(
         [values[fields == f].std() / np.sqrt((fields == f).sum()) for f in range(FIELDS_PER_SIDE**2)]
     )
-    chance = limits.local_noises * np.maximum(np.sqrt(np.mean(inside**2)), error)
-    outlying: NDArray[np.bool_] = off > np.maximum(chance, 5 * LABEL_ERROR)
+    chance = settings.concluding.local_noises * np.maximum(np.sqrt(np.mean(inside**2)), error)
+    outlying: NDArray[np.bool_] = off > np.maximum(chance, settings.judging.clear * LABEL_ERROR)
     return outlying
 
 

@@ -32,7 +32,7 @@ def searched(removed: dict[str, float], monkeypatch) -> tuple[list[list[MapFit]]
 
 
 @pytest.mark.parametrize("removed, added", [(20.0, False), (30.0, True)])
-def test_an_effect_has_to_remove_twenty_five_to_be_added(removed: float, added: bool, monkeypatch) -> None:
+def test_an_effect_has_to_remove_twenty_four_to_be_added(removed: float, added: bool, monkeypatch) -> None:
     rounds, rejected = searched({"vignetting": removed}, monkeypatch)
     assert [r[0].name for r in rounds] == (["", "vignetting"] if added else [""])
     assert [f.name for f in rejected] == ([] if added else ["vignetting"])

@@ -18,7 +18,6 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.race import contest, neighbours, race
 from spikecam_env.gap.race.contest import Heat, heats_of, shaped_while_open
 from spikecam_env.gap.race.hypothesis import (
-    PRICE,
     Fidelity,
     Hypothesis,
     added_to,
@@ -159,7 +158,7 @@ def test_parameters_cost_and_open_ones_may_remove_as_much_again():
     shaped = replace(with_time, fidelity=Fidelity.SHAPED)
     assert shaped.hope == shaped.score
     beside = replace(shaped, effects=("crosstalk", "photodiode_lag"))
-    assert beside.hope == pytest.approx(beside.score - 25.0), "the other effect may have its share"
+    assert beside.hope == pytest.approx(beside.score - 20.0), "the other effect may have its share"
     assert replace(beside, fidelity=Fidelity.JOINT).hope == beside.score
 
 
@@ -202,8 +201,11 @@ def test_a_neighbour_is_better_by_more_than_its_price_unless_it_alone_leaves_not
     assert leaves_something(problem, best) and not leaves_something(problem, silent)
     loud = of(problem, "dead_time", 0.0)
     for margin, better in ((7.0, True), (5.0, False)):
-        assert is_better(problem, replace(loud, misfit=best.score - PRICE - margin), best) is better
-    assert is_better(problem, replace(silent, misfit=best.score - PRICE - 1.0), best)
+        assert (
+            is_better(problem, replace(loud, misfit=best.score - problem.settings.deviance.tie - margin), best)
+            is better
+        )
+    assert is_better(problem, replace(silent, misfit=best.score - problem.settings.deviance.tie - 1.0), best)
     assert not is_better(problem, best, best)
     assert not is_better(problem, replace(loud, misfit=0.0), silent), "it leaves something, and the other does not"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, effect, recorded, unit
 
-from spikecam_env.gap.settings import Twins
+from spikecam_env.gap.settings import UnitSettings
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.twins.fresh_units import drawn_banks
@@ -18,7 +18,7 @@ from spikecam_env.sensor import SpikeSensor
 SEVERE = effect("random_telegraph_noise", amplitude_pA=2.0, fraction=0.04, dwell_ms=5.0)
 TRAPPED = MODEL.with_effect(SEVERE)
 FRAMES = 4000
-LIMITS = Twins().spread_limits
+LIMITS = UnitSettings().spread_limits
 
 
 @pytest.mark.parametrize("dwell_ms", [1.0, 20.0, 1000.0])

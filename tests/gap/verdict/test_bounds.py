@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 from small import MODEL, effect
 
 from spikecam_env.gap import Bars, Dark, Flat
@@ -121,6 +122,12 @@ def test_what_is_counted_is_first_tried_where_some_are_expected():
     assert first_strength(look)["probability"] == pytest.approx(1.2e-3)
 
 
+WITHOUT = np.linspace(-1.0, 1.0, 11)
+"""Scores of eleven campaigns without an effect."""
+LIKELY = float(stats.t.ppf(0.95, 10))
+"""Student's quantile of 95 % for these."""
+
+
 class Linear:
     """A probe whose effect shows by `per` noises a unit of strength, whatever else; its tests are exact."""
 
@@ -135,13 +142,11 @@ class Linear:
 
     def score(self, parameters) -> Score:
         self.scored.append(parameters["tau_us"])
-        return Score(
-            lambda v: float(v[0]), np.array([-1.0, 1.0, 0.0]), 0.0, parameters, self.sd * self.per * self.scored[-1]
-        )
+        return Score(lambda v: float(v[0]), WITHOUT, 0.0, parameters, self.sd * self.per * self.scored[-1])
 
     @property
     def sd(self) -> float:
-        return Score(None, np.array([-1.0, 1.0, 0.0]), 0.0, {}, 1.0).sd
+        return Score(None, WITHOUT, 0.0, {}, 1.0).sd
 
     def refined(self, score: Score) -> Score:
         return score
@@ -162,7 +167,7 @@ def test_a_score_is_taken_where_the_effect_size_is_six_to_twenty_five(start: flo
     look = scored_shape(probe, NOTHING, {"tau_us": start})
     print(probe.scored)
     assert look.score.parameters["tau_us"] == pytest.approx(at, rel=1e-6)
-    assert look.expected == pytest.approx(1.8 / 100)
+    assert look.expected == pytest.approx(LIKELY / 100)
 
 
 @pytest.mark.parametrize("per, known", [(0.4, False), (0.9, True)])
@@ -177,7 +182,7 @@ def test_the_least_refuted_strength_is_bracketed() -> None:
     probe = Linear(100.0)
     found = bound_of(NOTHING, ScoredShape(probe, probe.score({"tau_us": 0.12}), 0.0))
     print(found, probe.tests)
-    assert probe.tests[0] == pytest.approx(1.2 * 1.8 / 100) and found.below == probe.tests[0]
+    assert probe.tests[0] == pytest.approx(1.2 * LIKELY / 100) and found.below == probe.tests[0]
     assert 0.02 < found.below < 0.02 / 0.6
     far = Linear(100.0)
     misled = replace(far.score({"tau_us": 0.12}), rise=far.sd * 12.0 / 2)

@@ -102,7 +102,7 @@ def test_a_field_of_few_irregular_intervals_has_to_stand_out_of_their_noise(nois
 
 @pytest.mark.parametrize("off, stands_out", [(0.7e-4, False), (1.4e-4, True)])
 def test_a_field_has_to_be_off_by_more_than_labels_can_be(off: float, stands_out: bool) -> None:
-    assert outlying_means(np.where(NINE == 4, off, 0.0), NINE, LIMITS)[4] == stands_out
+    assert outlying_means(np.where(NINE == 4, off, 0.0), NINE, DiagnosisSettings())[4] == stands_out
 
 
 @pytest.mark.parametrize("off, stands_out", [(6e-3, False), (14e-3, True)])
@@ -110,7 +110,7 @@ def test_a_field_has_to_be_off_by_eight_times_the_scatter_of_the_others(off: flo
     """The others are at plus and minus 1e-3; of the six nearest to the median, 1e-3, the scatter is 1.15e-3."""
     values = np.array([1, -1, 1, -1, 0, 1, -1, 1, -1], float)[NINE] * 1e-3
     values[NINE == 4] = off
-    assert outlying_means(values, NINE, LIMITS)[4] == stands_out
+    assert outlying_means(values, NINE, DiagnosisSettings())[4] == stands_out
 
 
 def test_halves_have_to_differ_by_noise_and_by_a_share() -> None:
