@@ -101,7 +101,7 @@ def loop_table(scene: Scene, seconds: float, engine: str = "torch") -> Rows:
 
 
 def _timed(scene: Scene, seconds: float, engine: str) -> list[Seconds]:
-    """Blocks through the loop and through the first way, in turn."""
+    """Blocks through the loop and through the plain denoiser, in turn."""
     height, width = scene.shape
     sensor = SpikeSensor("scsim", (height, width), seed=0)
     recipe, network, _ = load_weights(pretrained_path("best"))
@@ -128,7 +128,7 @@ def _clocked(block: Seconds, stage: str, work: Callable[..., Any], *arguments: A
 
 
 def _gain(blocks: list[Seconds], stage: str) -> float | None:
-    """Processor's time of the first way over today's; None for stages that were never another way."""
+    """Processor's time of the plain denoiser over that of the loop; None for other stages."""
     if stage == "denoiser":
         return float(np.median([block[FIRST_WAY][1] / block["denoiser"][1] for block in blocks]))
     if stage == WHOLE:

@@ -1,9 +1,7 @@
-"""Where model and measurement disagree: campaigns, and what is made of them.
+"""Campaigns and their diagnosis: where a model and measurements disagree, and which effect is missing."""
 
-`diagnose` and `ladder` are functions of the modules of these names.  They are imported here, after their modules, so
-that the package's attribute is the function whichever is imported first.
-"""
-
+# `diagnose` and `ladder` are functions of the modules of these names.  They are imported after their modules, so that
+# the package's attribute is the function whichever is imported first.
 from spikecam_env.campaign import Campaign, CampaignRecording, read_campaign
 from spikecam_env.gap.acquisition.design import second_voltage, standard_design, write_campaign
 from spikecam_env.gap.acquisition.labels import Label, label_from_text, labels_from_table

@@ -20,7 +20,7 @@ def test_stages_make_up_the_whole():
     assert sum(rows[stage]["of the whole, %"] for stage in STAGES) == pytest.approx(100)
     assert sum(1 / rows[stage]["frames/s"] for stage in STAGES) == pytest.approx(1 / rows[WHOLE]["frames/s"])
     assert all(row["x real time"] == pytest.approx(row["frames/s"] / 40_000) for row in rows.values())
-    assert rows[FIRST_WAY]["x plain float32"] == 1 and rows["light"]["x the first way"] is None
+    assert rows[FIRST_WAY]["x plain float32"] == 1 and rows["light"]["x plain float32"] is None
 
 
 def test_the_first_way_gives_the_rates_of_today():
