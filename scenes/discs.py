@@ -49,8 +49,8 @@ class Path:
 
     def at(self, frame: float) -> tuple[float, float]:
         """(x, y) at a frame [pixels]."""
-        x, y = self.along(np.array([frame], np.float64))[:, 0].tolist()
-        return x, y
+        when = float(frame)
+        return _at(when, self.frame, self.place, 0), _at(when, self.frame, self.place, 1)
 
     def along(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
         """x, y (2, K) at frames (K,) [pixels]."""
@@ -160,15 +160,20 @@ class Discs(PlanarScene):
 
 @njit(cache=True, nogil=True)
 def _along(frames: NDArray[np.float64], knots: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """As `np.interp` of both columns of places (n, 2) given at knots (n,)."""
+    """`_at` of both axes at each of frames (K,)."""
     found = np.empty((2, len(frames)))
     for k in range(len(frames)):
-        after = np.searchsorted(knots, frames[k], side="right")
         for axis in range(2):
-            if after == 0 or after == len(knots):
-                found[axis, k] = places[max(after - 1, 0), axis]
-            else:
-                rise = places[after, axis] - places[after - 1, axis]
-                slope = rise / (knots[after] - knots[after - 1])
-                found[axis, k] = slope * (frames[k] - knots[after - 1]) + places[after - 1, axis]
+            found[axis, k] = _at(frames[k], knots, places, axis)
     return found
+
+
+@njit(cache=True, nogil=True)
+def _at(frame: float, knots: NDArray[np.float64], places: NDArray[np.float64], axis: int) -> float:
+    """As `np.interp` of a column of places (n, 2) given at knots (n,)."""
+    after = np.searchsorted(knots, frame, side="right")
+    if after == 0 or after == len(knots):
+        return places[max(after - 1, 0), axis]  # type: ignore[no-any-return]
+    rise = places[after, axis] - places[after - 1, axis]
+    slope = rise / (knots[after] - knots[after - 1])
+    return slope * (frame - knots[after - 1]) + places[after - 1, axis]  # type: ignore[no-any-return]

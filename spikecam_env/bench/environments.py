@@ -32,6 +32,8 @@ COUNTS = (1, 16, 64)
 MODES = {"sync": "sync", "async": "async", "native": "vector_entry_point"}
 CASES = (("RotatingDisk-v0", "spikes"), ("Track-v1", "tfp"), ("RotatingDisk-v0", "rate"))
 """(id, observation): without the denoiser, a task, and with the denoiser."""
+PARTS = ("light, %", "camera, %", "beside both, %")
+"""Of the processor's time of a step."""
 ROUNDS = 7
 WARM_UP = 3
 """Steps before the first round: they compile and fill pipelines."""
@@ -102,7 +104,7 @@ def _group(
         if place == 0 and not with_single:
             continue
         rate = 1.0 / float(np.median(clock[:, place]))
-        light, camera = shares(one, seconds, rounds) if one.envs else ("", "")
+        parts: dict[str, Any] = shares(one, seconds, rounds) if one.envs else dict.fromkeys(PARTS, "")
         rows.append(
             {
                 "id": name,
@@ -115,10 +117,8 @@ def _group(
                 "x real time": rate * OPTIONS["frames_per_step"] / 40_000 / one.environments,
                 "processor ms": 1e3 * float(np.median(processor[:, place])),
                 "x async, processor": _times(processor, asynchronous, place),
-                "light, %": light,
-                "camera, %": camera,
-                "beside both, %": 100.0 - light - camera if one.envs else "",
             }
+            | parts
         )
     return rows
 
@@ -128,8 +128,8 @@ def _times(seconds: NDArray[np.float64], other: int, place: int) -> float:
     return float(np.median(seconds[:, other] / seconds[:, place]))
 
 
-def shares(one: Contestant, seconds: float, rounds: int) -> tuple[float, float]:
-    """Of the processor's time of a step [%]: the scenes', and the cameras'."""
+def shares(one: Contestant, seconds: float, rounds: int) -> dict[str, float]:
+    """Of the processor's time of a step [%]: the scenes', the cameras', and what is left."""
     threads = as_many(None, len(one.envs)) if one.how == "native" else 1
     calls = max(1, round(seconds / one.seconds_a_step(seconds)[0] / one.environments))
     light: list[Keyframes] = []
@@ -147,8 +147,8 @@ def shares(one: Contestant, seconds: float, rounds: int) -> tuple[float, float]:
         alone = [cpu_of(part, calls) for part in (paint, expose)]
         of_step = cpu_of(one.step, calls)
         found.append([100.0 * part / of_step for part in alone])
-    of_light, of_camera = np.median(found, axis=0)
-    return float(of_light), float(of_camera)
+    of_light, of_camera = np.median(found, axis=0).tolist()
+    return dict(zip(PARTS, (of_light, of_camera, 100.0 - of_light - of_camera), strict=True))
 
 
 def cpu_of(call: Callable[[], Any], calls: int) -> float:

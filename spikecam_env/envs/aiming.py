@@ -135,8 +135,7 @@ class AimingEnv(SpikeCameraEnv):
         """See the class."""
         observation, info = self._shown()
         now = self.course
-        worth = (course.episode.worth(course.standing) for course in (self._before, now))
-        reward = REWARDS[self.reward](*worth) + OUTCOME * (now.end is True)
+        reward = REWARDS[self.reward](self._before.worth, now.worth) + OUTCOME * (now.end is True)
         return observation, reward, now.terminated, now.truncated, info | self._of_standing()
 
     def close(self) -> None:

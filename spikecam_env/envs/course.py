@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,10 +73,15 @@ class Course:
         gaze = turned(self.gaze.stop, (pan / top, tilt / top), top / drive.frame_rate_hz, (first, stop))
         return Course(drive, episode, gaze, (pan, tilt), _standing(episode, gaze, self.standing))
 
-    @property
+    @cached_property
     def end(self) -> bool | None:
         """See `Episode.end`."""
         return self.episode.end(self.standing)
+
+    @cached_property
+    def worth(self) -> float:
+        """See `Episode.worth`."""
+        return self.episode.worth(self.standing)
 
     @property
     def terminated(self) -> bool:
