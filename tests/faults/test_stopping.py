@@ -129,10 +129,10 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_command_stops_at_any_moment_within_two_seconds_and_leaves_nothing(tmp_path: Path, recording: Path) -> None:
     size = ["--size", "64", "96"]
     commands = {  # longer than any moment, and a few GB at most: the disk is asked for all of it beforehand
-        "record": (20, ["record", "--out", "x.h5", "--frames", "4000000", *size]),
+        "record": (10, ["record", "--out", "x.h5", "--frames", "4000000", *size]),
         "film": (2, ["scenes", "fan", "--film", "x.mp4", "--frames", "2800000", *size]),
-        "dataset": (4, ["dataset", "phm-n", "--out", "x", "--jobs", "2", "--frames", "400000", *size]),
-        "live": (4, ["live", "disk", "--film", "x.mp4", *size]),
+        "dataset": (2, ["dataset", "phm-n", "--out", "x", "--jobs", "2", "--frames", "400000", *size]),
+        "live": (2, ["live", "disk", "--film", "x.mp4", *size]),
         "denoise": (2, ["denoise", str(recording), "--mode", "paper", "--out", "x"]),
     }
     rng = np.random.default_rng(41)

@@ -64,4 +64,4 @@ def test_labels_in_another_unit_are_said_as_a_diagnosis_says_them(tmp_path: Path
     said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note: ")]
     case = read_case(read_campaign(folder))
     assert said == [f"note: {note}" for note in label_unit_note(case.nominal_per_label, case.base)] and len(said) == 1
-    assert "labelled in another unit" in said[0]
+    assert "labels are in another unit" in said[0]

@@ -40,7 +40,7 @@ def test_strengths_refined_alone_are_known_no_better_than_with_their_shapes(monk
     open_ = {"fraction": 0.025, "tau_us": 200.0}
     monkeypatch.setattr(Problem, "is_explained", lambda *_: False)
     best, errors, _ = refined_together(Problem(case, MODEL, null(), seen, values), replace(first, sd=open_), [name])
-    assert errors[name] == best.sd == open_ and case.budget.left_out == ["finer shapes of what was found"]
+    assert errors[name] == best.sd == open_ and case.budget.left_out == ["finer shapes of the effects found"]
 
 
 @pytest.mark.parametrize("then, same", [(0.0076, True), (0.0019 / 4, True), (0.02, False), (-0.0019, False)])
