@@ -108,7 +108,7 @@ def test_patterns_cannot_be_tested_in_a_scene_and_it_is_said_what_would():
     )
     assert names == ["threshold_flicker_noise"]
     needs = dict(lacking)
-    assert "unknown scene" in needs["vignetting"] and "flats" in needs["dead_time"]
+    assert "unknown light" in needs["vignetting"] and "flats" in needs["dead_time"]
     assert off_nominal(scene(), MODEL, scene().base).parameters == {}
 
 
