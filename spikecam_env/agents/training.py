@@ -118,7 +118,10 @@ that PPO takes 4; an oracle's action stays right."""
 def learner(steps: int | None = None, *, imitate: bool = False, plain: bool = False) -> PPO:
     """PPO of so many steps, by default those of the shipped agents.
 
-    imitate: the oracle, instead of what rewards teach; plain: without the loss that asks for the target's place
+    imitate: the oracle, instead of what rewards teach.  plain: without the loss that asks for the target's place.
+
+    >>> learner(2048, imitate=True).imitate
+    True
     """
     given: dict[str, Any] = {} if steps is None else {"steps": steps}
     given |= {"imitate": True, "epochs": IMITATED} if imitate else {}
