@@ -350,7 +350,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--tasks": ("", "Cath-v1", "\x00"),
             "--observations": ("", "tpf", "\x00"),
             "--intervals": FLOATS,
-            "--trained": (("2", "nan"), ("20", "10"), "1"),
+            "--trained": (("2", "nan"), ("20", "10")),
             "--size": SIZES,
             "--seeds": COUNTS,
             "--first-seed": SEEDS,
