@@ -43,9 +43,8 @@ class Agents:
         "tracker",
     )
     """What agents see: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), frame30,
-    frame1000; without
-    training: tracker (classical, sees tfp), tracker-rate, tracker-clean; shipped (the task's shipped agent, trained on
-    tfp, sees it), shipped-rate, shipped-clean."""
+    frame1000.  Without training: tracker (classical, sees tfp), tracker-rate, tracker-clean; shipped (the task's
+    shipped agent, trained on tfp, sees it), shipped-rate, shipped-clean."""
     intervals: tuple[float, ...] = ()
     """Mean intervals [frames] at which LowLight-v1 is played, each a row, and learned."""
     trained: tuple[float, float] | None = None
