@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from denoiser.network import pad_to_multiple
+from denoiser.number_type import computing_in
 from denoiser.side_by_side import side_by_side
 from denoiser.stream_network import CARRY, MULTIPLE
 from denoiser.threads import where_torch_can
@@ -64,7 +65,7 @@ def _rates(
     carried: Sequence[Carried],
 ) -> list[tuple[NDArray[np.float32], Carried]]:
     device = next(network.parameters()).device if isinstance(network, nn.Module) else torch.device("cpu")
-    with torch.inference_mode(), torch.autocast(device.type, number_type, enabled=number_type != torch.float32):
+    with torch.inference_mode(), computing_in(number_type, device):
         if isinstance(network, StreamPasses):
             rate, kept = _side_by_side(network, windows, number_type, carried, device)
         else:
@@ -124,13 +125,3 @@ def _stacked(carried: Sequence[Carried]) -> Carried:
     """What each stream carries, (N, n, h, w); zeros, which is what a network begins with, where one carries nothing."""
     some = next((c for c in carried if c), ())
     return tuple(np.stack([c[i] if c else np.zeros_like(like) for c in carried]) for i, like in enumerate(some))
-
-
-def number_type(precision: str, device: torch.device | None = None) -> torch.dtype:
-    """ "auto" is bfloat16 where the processor, or the GPU, multiplies in it, else float32."""
-    if precision == "auto" and device is not None and device.type == "cuda":
-        return torch.bfloat16 if torch.cuda.is_bf16_supported() else torch.float32
-    if precision == "auto":
-        fast = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)()
-        return torch.bfloat16 if fast else torch.float32
-    return torch.bfloat16 if precision == "bfloat16" else torch.float32

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from denoiser.number_type import computing_in, number_type
 from denoiser.pairs import WARM_UP
 from denoiser.simulated import Bank, SimulatedStreams, in_turn
 from denoiser.window import WindowLayout
@@ -94,6 +95,7 @@ class IntervalWindows:
     def _windows(self, network: nn.Module, passes: int) -> Iterator[Taught]:
         """The next windows of the streams whose turn it is, and of those after them."""
         device, middle, span = self.streams.device, self.layout.past, self.layout.span
+        kind = number_type("auto", device)
         for _ in range(passes):
             rows = in_turn(self._next, self.taken, self.streams.count)
             part = self.streams.advance(ADVANCE, rows)
@@ -101,8 +103,8 @@ class IntervalWindows:
             noisy, clean = self._noisy[rows], self._clean[rows]
             interval = inverse_interval(noisy[:, :span], self._last[rows, 0], middle)
             target = inverse_interval(clean, self._last[rows, 1], middle)
-            with torch.autocast(device.type, torch.bfloat16):
-                predicted, _ = network(noisy[:, :span].to(torch.bfloat16), interval)
+            with computing_in(kind, device):
+                predicted, _ = network(noisy[:, :span].to(kind), interval)
             valid = (self._age[rows] >= noisy.shape[1] + WARM_UP).float()
             yield Taught(predicted.float(), target, self._light[rows, middle, None], interval, valid)
 

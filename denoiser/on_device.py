@@ -19,6 +19,7 @@ from torch import Tensor, nn
 from denoiser import infer
 from denoiser.captured import captured
 from denoiser.chain import Chain, Rates
+from denoiser.number_type import computing_in
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
 from denoiser.threads import where_torch_can
@@ -109,7 +110,7 @@ class DeviceStreams:
         goes_on = (windows.start > 0)[:, None, None, None]
         carried = tuple(torch.where(goes_on, before[rows], 0.0) for before in self._carried)
         spikes = windows.frames.to(self._type).contiguous(memory_format=torch.channels_last)
-        with torch.autocast(self.device.type, self._type, enabled=self._type != torch.float32):
+        with computing_in(self._type, self.device):
             found, left = self._network(spikes, planes, carried)
         rates: Tensor = found.float().clamp(0.0, 1.0)
         self._windows.put(rows, learned(self.layout, windows, rates))

@@ -22,6 +22,7 @@ from torch import nn
 
 from denoiser import accumulate, infer, mus
 from denoiser.chain import Chain, Crossfade, Rates
+from denoiser.number_type import PRECISIONS, number_type
 from denoiser.on_device import DeviceChain, DeviceStreams, kept, spikes_on, unpacked_on
 from denoiser.openvino_passes import OpenvinoPasses
 from denoiser.pixel_map import PixelMap
@@ -35,7 +36,6 @@ from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.streams.packing import as_spikes, unpack_frames
 
 OUTPUTS = ("spikes", "rate", "both")
-PRECISIONS = ("auto", "bfloat16", "float32")
 ENGINES: dict[str, Callable[[nn.Module, torch.dtype], nn.Module | infer.StreamPasses]] = {
     "torch": infer.prepared,
     "captured": infer.prepared,
@@ -112,7 +112,7 @@ class OnlineDnSS:
         self._device = None if device is None else checked_device(device, "leave device out")
         if engine == "captured" and device is None:
             raise InputError("engine 'captured' replays passes on a device; give one, device='cuda', or take 'torch'")
-        self._type = infer.number_type(precision, self._device)
+        self._type = number_type(precision, self._device)
         self._engine = engine
         self._network = ENGINES[engine](network, self._type)
         if self._device is not None:

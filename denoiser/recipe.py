@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any, Literal
 
@@ -9,27 +10,30 @@ from pydantic import AfterValidator, Field
 from torch import nn
 
 from denoiser.network import DnSS
-from denoiser.stream_network import CARRY, StreamDnSS
+from denoiser.stream_network import CARRY, CHANNELS, MOST_CHANNELS, StreamDnSS
 from denoiser.window import WindowLayout
-from spikecam_env.errors import unknown_name
+from spikecam_env.checked import checked_whole
+from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.untrusted import Declared, declared
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """target: what the network is taught.  decoder: `denoiser.mus` or `denoiser.accumulate`."""
+    """target: what the network is taught.  decoder: `denoiser.mus` or `denoiser.accumulate`.  refine: of `paper`.
+    channels: of a network of many planes (`stream_network.StreamDnSS`)."""
 
     layout: WindowLayout
     target: str
     decoder: str
     refine: bool = True
+    channels: tuple[int, int, int] = CHANNELS
 
     def network(self) -> nn.Module:
         """The untrained network: (N, span, H, W) spikes, (N, layers, H, W) planes -> (N, planes, H, W) rates."""
         if self.layout.planes == 1:
             return DnSS(window=self.layout.span, refine=self.refine)
         layout = self.layout
-        return StreamDnSS(layout.span, layout.layers, layout.planes, layout.means)
+        return StreamDnSS(layout.span, layout.layers, layout.planes, layout.means, self.channels)
 
     def carries(self, shape: tuple[int, int]) -> tuple[tuple[int, int, int], ...]:
         """Shapes of what a pass leaves for the next, for frames of `shape`."""
@@ -39,14 +43,17 @@ class Recipe:
         return (1, *shape), (CARRY, height // 2, width // 2)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, for a checkpoint."""
-        return asdict(self)
+        """Plain values, for a checkpoint.  `channels` are left out if they are `CHANNELS`: older files have none, and
+        their digests stay valid."""
+        plain = asdict(self)
+        return plain if self.channels != CHANNELS else {name: plain[name] for name in plain if name != "channels"}
 
     @classmethod
     def from_dict(cls, data: Any, where: str = "recipe") -> Recipe:
         """The inverse of `to_dict`; raises InputError for anything else.  where: begins the error's text."""
         found = declared(_DeclaredRecipe, data, where)
-        return cls(WindowLayout(**found.layout.model_dump()), found.target, found.decoder, found.refine)
+        layout = WindowLayout(**found.layout.model_dump())
+        return cls(layout, found.target, found.decoder, found.refine, found.channels)
 
 
 def _none_or_some(memory: float) -> float:
@@ -57,10 +64,11 @@ def _none_or_some(memory: float) -> float:
 
 _Frames = Annotated[int, Field(ge=0, le=1000)]
 _Memory = Annotated[float, Field(ge=1, le=1e6)]
+_Channels = Annotated[int, Field(ge=1, le=MOST_CHANNELS)]
 
 
 class _DeclaredLayout(Declared):
-    """Ranges: a network of any such layout has fewer than two million weights."""
+    """Ranges: with `CHANNELS`, a network of any such layout has fewer than two million weights."""
 
     past: _Frames
     planes: Annotated[int, Field(ge=1, le=64)]
@@ -75,6 +83,7 @@ class _DeclaredRecipe(Declared):
     target: Literal["clean_inverse_interval", "light"]
     decoder: Literal["mus", "accumulate"]
     refine: bool
+    channels: Annotated[tuple[_Channels, _Channels, _Channels], Field(strict=False)] = CHANNELS
 
 
 RECIPES = {
@@ -94,3 +103,11 @@ def recipe_of(mode: str) -> Recipe:
     if not isinstance(mode, str) or mode not in RECIPES:
         raise unknown_name("denoiser mode", mode, RECIPES)
     return RECIPES[mode]
+
+
+def checked_channels(channels: Sequence[int]) -> tuple[int, int, int]:
+    """Channels of a network of many planes; raises InputError unless they are three whole numbers in range."""
+    if isinstance(channels, str) or not isinstance(channels, Sequence) or len(channels) != 3:
+        raise InputError(f"channels is {shown(channels)}; it must be three numbers, as (64, 128, 24)")
+    half, quarter, head = (checked_whole(count, "channels", 1, MOST_CHANNELS) for count in channels)
+    return half, quarter, head

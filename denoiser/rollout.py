@@ -21,6 +21,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from denoiser.number_type import computing_in, number_type
 from denoiser.simulated import Bank, SimulatedStreams, in_turn
 from denoiser.stream_network import CARRY, Carried
 from denoiser.window import WindowLayout
@@ -100,6 +101,7 @@ class Rollouts:
         self.layout, self.taken = layout, taken
         count = pool * taken
         self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled)
+        self._type = number_type("auto", device)
         self._next = torch.zeros((), dtype=torch.int64, device=device)
         self._windows = Windows.begin(layout, count, (patch, patch), device)
         self._past = _Past.begin(layout, count, patch, device)
@@ -140,8 +142,8 @@ class Rollouts:
             windows, planes = pushed(layout, windows, part.noisy, part.begins)
             alive = (~part.begins).float()[:, None, None, None] * (windows.start > 0).float()[:, None, None, None]
             carried: Carried = (past.last * alive, past.hidden * alive)
-            with torch.autocast(device.type, torch.bfloat16):
-                rate, kept = network(windows.frames.to(torch.bfloat16), planes, carried)
+            with computing_in(self._type, device):
+                rate, kept = network(windows.frames.to(self._type), planes, carried)
             rate = rate.float()
             valid = (windows.start >= 0).float()
             before = torch.where(alive > 0, past.final, torch.cat([rate[:, :1], past.light[:, :1]], dim=1))

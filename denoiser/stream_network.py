@@ -29,6 +29,10 @@ MEANS_BEGIN = -2.0
 MULTIPLE = 4
 """Frames are extended to a multiple of so many rows and columns."""
 
+CHANNELS = (64, 128, 24)
+"""At half and at quarter resolution, and of the head, of `best`."""
+MOST_CHANNELS = 256
+
 Carried = tuple[Tensor, Tensor] | None
 """(last, hidden), float32."""
 
@@ -48,6 +52,7 @@ class StreamDnSS(nn.Module):
     """(N, span, H, W) spikes, (N, layers, H, W) planes, carried -> (N, planes, H, W) rates [spikes/frame], carried.
 
     means: which of the layers are running means (first, last + 1).  The last layer is 1 where the unit is calibrated.
+    channels: channels at half and at quarter resolution, and of the head.
     """
 
     def __init__(
@@ -56,10 +61,10 @@ class StreamDnSS(nn.Module):
         layers: int,
         planes: int,
         means: tuple[int, int],
-        widths: tuple[int, int] = (64, 128),
+        channels: tuple[int, int, int] = CHANNELS,
     ) -> None:
         super().__init__()
-        fine, coarse = widths
+        fine, coarse, head = channels
         self.means = means
         self.stem = nn.Sequential(nn.Conv2d(span + layers + 1, fine, 2, 2), nn.ReLU(inplace=True))
         self.mix = conv_relu(fine + CARRY, fine)
@@ -70,7 +75,7 @@ class StreamDnSS(nn.Module):
         self.keep = conv(fine, CARRY)
         self.out = conv(fine, 4 * planes)
         self.unfold = nn.PixelShuffle(2)
-        self.head = nn.Sequential(conv_relu(planes + layers + 1, 24), conv(24, planes + means[1] - means[0]))
+        self.head = nn.Sequential(conv_relu(planes + layers + 1, head), conv(head, planes + means[1] - means[0]))
 
     def forward(self, spikes: Tensor, planes: Tensor, carried: Carried = None) -> tuple[Tensor, tuple[Tensor, Tensor]]:
         height, width = spikes.shape[-2:]

@@ -25,10 +25,11 @@ from torch import Tensor, nn
 
 from denoiser.captured import captured
 from denoiser.interval_training import IntervalWindows
-from denoiser.recipe import RECIPES, Recipe, recipe_of
+from denoiser.recipe import RECIPES, Recipe, checked_channels, recipe_of
 from denoiser.rollout import Rollouts
 from denoiser.run import Run
 from denoiser.simulated import Bank, SimulatedStreams
+from denoiser.stream_network import CHANNELS
 from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, pretrained_path, save_weights
@@ -64,6 +65,7 @@ class TrainConfig:
     validate_every: steps between validations.  validate_passes: passes of each validation along its streams.
     threads: of the processor.  device: where streams and network are; a GPU wants larger batches.
     refine: `paper` with its refine module or, for the ablation, without.
+    channels: of `best`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.
     start: weights of the same mode to begin from, a file of this training or a mode's name for those that ship.
     resume: go on from out/last.pt.
     """
@@ -79,6 +81,7 @@ class TrainConfig:
     patch: int = 64
     lr: float = 1e-3
     refine: bool = True
+    channels: tuple[int, int, int] = CHANNELS
     save_every_s: float = 60.0
     validate_every: int = 1000
     validate_passes: int = 24
@@ -102,6 +105,7 @@ class TrainConfig:
                 raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
         if self.patch % 16:
             raise InputError(f"patch is {self.patch}; it must be a multiple of 16")
+        object.__setattr__(self, "channels", checked_channels(self.channels))
         if not isinstance(self.out, str | os.PathLike):
             raise InputError(f"out is {self.out!r}; it must be the path of a folder")
         object.__setattr__(self, "out", Path(self.out))
@@ -122,7 +126,7 @@ def train(config: TrainConfig, *, progress: bool = True) -> Path:
 
 def _trained(config: TrainConfig, progress: bool) -> Path:
     config.out.mkdir(parents=True, exist_ok=True)
-    recipe = replace(recipe_of(config.mode), refine=config.refine)
+    recipe = replace(recipe_of(config.mode), refine=config.refine, channels=config.channels)
     device = torch.device(config.device)
     network = recipe.network() if config.start is None else _started(recipe, config.start)
     run = Run.begin(network.to(device, memory_format=torch.channels_last))  # type: ignore[call-overload]

@@ -37,4 +37,4 @@ def _option(name: str, value: Any) -> str:
     option = name.replace("_", "-")
     if isinstance(value, bool):
         return f"--{option}" if value else f"--no-{option}"
-    return f"--{option} {value}"
+    return " ".join([f"--{option}", *map(str, value if isinstance(value, tuple) else (value,))])

@@ -22,7 +22,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
-from denoiser.infer import number_type
+from denoiser.number_type import PRECISIONS, computing_in, number_type
 from denoiser.reconstruct.recipe import LEARNED
 from denoiser.reconstruct.spk2imgnet import WINDOW
 from denoiser.reconstruct.weights import load_reconstructor, shipped_path
@@ -41,8 +41,6 @@ PLAIN: dict[str, Callable[[NDArray[np.uint8], int], NDArray[np.float32]]] = {
 """Methods without weights."""
 RECONSTRUCTORS = (*PLAIN, *LEARNED)
 """Every method by name."""
-PRECISIONS = ("auto", "float32", "bfloat16")
-"""Of the learned ones, as `denoiser.infer.number_type` has them."""
 
 
 def reconstruct(
@@ -118,7 +116,7 @@ def light(network: nn.Module, window: NDArray[np.uint8], precision: str = "float
 def _light(network: nn.Module, window: NDArray[np.uint8], kind: torch.dtype) -> NDArray[np.float32]:
     device = next(network.parameters()).device
     spikes = torch.from_numpy(np.ascontiguousarray(window))[None].to(device, kind)
-    with torch.inference_mode(), torch.autocast(device.type, kind, enabled=kind != torch.float32):
+    with torch.inference_mode(), computing_in(kind, device):
         found = network(spikes.contiguous(memory_format=torch.channels_last))
     return np.ascontiguousarray(found[0, 0].float().clamp(0.0, 1.0).cpu().numpy())
 

@@ -21,6 +21,7 @@ import torch
 from torch import Tensor, nn
 
 from denoiser.captured import captured
+from denoiser.number_type import computing_in, number_type
 from denoiser.reconstruct import ssml
 from denoiser.reconstruct.lessons import Lesson, Windows, lesson_of
 from denoiser.reconstruct.recipe import ReconstructorRecipe, reconstructor_recipe
@@ -138,8 +139,9 @@ def _step(config: ReconstructorConfig, lesson: Lesson, run: Run, rolling: Rollin
     """One step; its loss, which a GPU need not have worked out yet."""
     run.optimiser.zero_grad(set_to_none=True)
     windows = rolling.advance(config.frames_a_step)
-    with torch.autocast(windows.spikes.device.type, torch.bfloat16):
-        losses = lesson.losses(windows, torch.bfloat16)
+    kind = number_type("auto", windows.spikes.device)
+    with computing_in(kind, windows.spikes.device):
+        losses = lesson.losses(windows, kind)
     loss = (losses * windows.old).sum() / windows.old.sum().clamp(min=1)
     loss.backward()
     nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
@@ -171,8 +173,9 @@ def validate(network: nn.Module, held_out: list[Windows]) -> dict[str, float]:
     sums: dict[str, float] = {}
     for windows in held_out:
         spikes, middle = windows.spikes, WINDOW // 2
-        with torch.inference_mode(), torch.autocast(spikes.device.type, torch.bfloat16):
-            found = network(spikes.to(torch.bfloat16).contiguous(memory_format=torch.channels_last))
+        kind = number_type("auto", spikes.device)
+        with torch.inference_mode(), computing_in(kind, spikes.device):
+            found = network(spikes.to(kind).contiguous(memory_format=torch.channels_last))
         guesses: Mapping[str, Tensor] = {
             "network": found.clamp(0, 1),
             "tfp21": spikes[:, middle - 10 : middle + 11].float().mean(1, keepdim=True),

@@ -110,21 +110,18 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
     )
 
 
-IMITATED = 16
-"""Times that a sample is learned from by who imitates.  A policy must not go far from where its rewards were paid, so
-that PPO takes 4; an oracle's action stays right."""
-
-
 def learner(steps: int | None = None, *, imitate: bool = False, plain: bool = False) -> PPO:
     """PPO of so many steps, by default those of the shipped agents.
 
-    imitate: the oracle, instead of what rewards teach.  plain: without the loss that asks for the target's place.
+    imitate: the oracle, instead of what rewards teach.  A policy must not go far from where its rewards were paid; an
+    oracle's action stays right.  So each update learns from as many samples as a whole leg has.
+    plain: without the loss that asks for the target's place.
 
     >>> learner(2048, imitate=True).imitate
     True
     """
     given: dict[str, Any] = {} if steps is None else {"steps": steps}
-    given |= {"imitate": True, "epochs": IMITATED} if imitate else {}
+    given |= {"imitate": True, "epochs": PPO.leg} if imitate else {}
     return PPO(**given, place=0.0 if plain else PPO.place)
 
 

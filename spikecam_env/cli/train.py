@@ -14,6 +14,7 @@ RECONSTRUCTORS = ("spk2img-clean", "spk2img-noisy", "ssml")
 DENOISERS = ("best", "paper")
 ONLY_OF = {
     "refine": ("paper",),
+    "channels": ("best",),
     "start": DENOISERS,
     "validate_passes": DENOISERS,
     "width": RECONSTRUCTORS,
@@ -53,6 +54,9 @@ class Train:
     """Device of streams and network: cpu, cuda, cuda:1."""
     refine: bool = True
     """Give `paper` its refine module; without it for the ablation."""
+    channels: tuple[Count, Count, Count] | None = None
+    """Channels of `best` at half and at quarter resolution, and of its head: fewer are faster, and less accurate.
+    Default: 64 128 24."""
     start: str | None = None
     """Weights to begin from: a file of this command, or `best` or `paper` for those that ship.  Default: none."""
     width: Count | None = None

@@ -11,6 +11,7 @@ import torch
 
 from denoiser import infer
 from denoiser.chain import Chain
+from denoiser.number_type import number_type
 from denoiser.online import OnlineDnSS, denoise
 from denoiser.recipe import RECIPES
 from denoiser.window import RollingWindow
@@ -195,9 +196,9 @@ def test_weights_converted_once_give_the_bits_of_converting_them_at_every_pass(m
     """Against autocast over the float32 network, at sizes that four divides and does not, with both types."""
     torch.manual_seed(1)
     network = RECIPES[mode].network().to(memory_format=torch.channels_last)
-    for number_type in (torch.bfloat16, torch.float32):
-        once = infer.prepared(network, number_type)
-        assert {p.dtype for p in once.parameters()} == {number_type}
+    for kind in (torch.bfloat16, torch.float32):
+        once = infer.prepared(network, kind)
+        assert {p.dtype for p in once.parameters()} == {kind}
         for shape in (SHAPE, (16, 32)):
             spikes = (np.random.default_rng(0).random((60, *shape)) < 0.3).astype(np.uint8)
             for window in RollingWindow(RECIPES[mode].layout, shape).push(spikes):
@@ -356,11 +357,11 @@ def test_overlapping_passes_are_the_mean_of_two_chains():
     alone = run(denoiser("best"), [spikes])[1]
     recipe = RECIPES["best"]
     torch.manual_seed(1)
-    network = infer.prepared(recipe.network(), infer.number_type("auto"))
+    network = infer.prepared(recipe.network(), number_type("auto"))
     later = np.concatenate(
         [
             alone[:8],
-            *(rates for _, rates in _passes(Chain(recipe, network, infer.number_type("auto"), SHAPE, first=8), spikes)),
+            *(rates for _, rates in _passes(Chain(recipe, network, number_type("auto"), SHAPE, first=8), spikes)),
         ]
     )
     place = np.arange(90) % 16 + 0.5

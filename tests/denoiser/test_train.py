@@ -11,6 +11,7 @@ import torch
 
 from denoiser import train as training
 from denoiser import training_loop
+from denoiser.online import OnlineDnSS
 from denoiser.recipe import RECIPES
 from denoiser.run import Run
 from denoiser.simulated import Bank
@@ -92,6 +93,19 @@ def test_the_ablation_has_no_refine_module(small, tmp_path):
     assert "--no-refine" in record["command"].split()
 
 
+def test_a_narrow_network_is_trained_and_denoises(small, tmp_path):
+    """Its file says its channels; those of the shipped one do not, so that older files keep their digests."""
+    weights_after(tmp_path, 1, channels=(4, 8, 3))
+    recipe, network, record = load_weights(tmp_path / "best.pt")
+    assert recipe == replace(RECIPES["best"], channels=(4, 8, 3)) and "--channels 4 8 3" in record["command"]
+    counts = [sum(p.numel() for p in n.parameters()) for n in (network, RECIPES["best"].network())]
+    print(f"{counts[0]} weights of {counts[1]}")
+    assert counts[0] < counts[1] / 20
+    assert "channels" in recipe.to_dict() and "channels" not in RECIPES["best"].to_dict()
+    rates = OnlineDnSS.from_file(tmp_path / "best.pt", output="rate").push(np.zeros((64, 8, 12), np.uint8))
+    assert rates.shape[1:] == (8, 12) and np.isfinite(rates).all()
+
+
 def test_a_run_begins_from_the_weights_that_are_given(small, tmp_path):
     """Its first step hardly moves them; without them it begins elsewhere."""
     given = weights_after(tmp_path / "given", 2)
@@ -133,6 +147,7 @@ def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
             {"mode": "paper", "refine": False, "batch": 48, "minutes": 7.5, "resume": False},
             "spikecam train --mode paper --out OUT --batch 48 --minutes 7.5 --no-refine",
         ),
+        ({"channels": (32, 64, 12)}, "spikecam train --mode best --out OUT --channels 32 64 12"),
     ],
 )
 def test_a_record_says_what_to_type(options, expected, monkeypatch):
@@ -190,7 +205,19 @@ def test_an_amount_out_of_range_is_named(name, value):
         TrainConfig(**{name: value})
 
 
-@pytest.mark.parametrize("bad", [{"mode": None}, {"mode": "worst"}, {"out": 3}, {"resume": "no"}, {"device": 0}])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"mode": None},
+        {"mode": "worst"},
+        {"out": 3},
+        {"resume": "no"},
+        {"device": 0},
+        {"channels": (8, 8)},
+        {"channels": (8, 8, 0)},
+        {"channels": "8 8 8"},
+    ],
+)
 def test_other_options_are_checked(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
         TrainConfig(**bad)
