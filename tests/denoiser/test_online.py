@@ -202,8 +202,8 @@ def test_weights_converted_once_give_the_bits_of_converting_them_at_every_pass(m
         for shape in (SHAPE, (16, 32)):
             spikes = (np.random.default_rng(0).random((60, *shape)) < 0.3).astype(np.uint8)
             for window in RollingWindow(RECIPES[mode].layout, shape).push(spikes):
-                every, kept = infer.rates(network, window, number_type)
-                found, left = infer.rates(once, window, number_type)
+                every, kept = infer.rates(network, window, kind)
+                found, left = infer.rates(once, window, kind)
                 assert every.any() and np.array_equal(found, every)
                 assert all(np.array_equal(a, b) for a, b in zip(left, kept, strict=True))
 
