@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -131,17 +132,30 @@ def _law(parameters: Array) -> Array:
 
 
 def _residual(steps: Steps, disturbance: Array, noise: float, span: float, off: float) -> Array:
-    return _left(steps, walk(disturbance, noise, float(steps.interval), steps.offsets + off), 0.0, span)
+    return _left(steps, _walk(steps, disturbance, noise, off))(0.0, span)
 
 
-def _left(steps: Steps, foretold: Walk, moment: float, span: float) -> Array:
-    """Measured less foretold by a walk whose edge is at 0 and should be at `moment`; in standard errors of counts."""
-    start = row_phase(steps.intervals.shape[0], span)[:, None] - moment
-    share = _over_cells(np.add(*foretold.at(np.arange(steps.offsets.size), start)))
+def _walk(steps: Steps, disturbance: Array, noise: float, off: float) -> Walk:
+    return walk(disturbance, noise, float(steps.interval), steps.offsets + off)
+
+
+def _left(steps: Steps, foretold: Walk) -> Callable[[Array | float, float], Array]:
+    """Measured less foretold by a walk whose edge is at 0, in standard errors of counts: a function of the moment at
+    which the edge should be, or of several (...,), and of the span.  The drift depends on neither."""
     drift = _over_cells((foretold.up - foretold.down).mean(axis=1))
     off_centre = (steps.drift_at - steps.offsets) * np.gradient(drift, steps.offsets)
-    shifts = (steps.shifts - steps.intervals * share) / np.sqrt(steps.intervals * share + 4.0) / steps.spread
-    return np.concatenate([shifts.ravel(), (steps.drift - drift - off_centre) / np.hypot(steps.drift_sd, _UNEVEN)])
+    drift_left = (steps.drift - drift - off_centre) / np.hypot(steps.drift_sd, _UNEVEN)
+    rows, cells = steps.intervals.shape[0], np.arange(steps.offsets.size)
+
+    def left(moment: Array | float, span: float) -> Array:
+        moments = np.asarray(moment)
+        share = _over_cells(np.add(*foretold.at(cells, row_phase(rows, span)[:, None] - moments[..., None, None])))
+        expected = steps.intervals * share
+        shifts = (steps.shifts - expected) / np.sqrt(expected + 4.0) / steps.spread
+        beside = np.broadcast_to(drift_left, (*moments.shape, drift_left.size))
+        return np.concatenate([shifts.reshape(*moments.shape, -1), beside], axis=-1)
+
+    return left
 
 
 def _over_cells(at_centres: Array) -> Array:
@@ -155,12 +169,11 @@ def _scanned(steps: Steps) -> list[Array]:
     """The best places of edge and rows for the _STARTS best pairs of amplitude and tau."""
     found = []
     for amplitude, tau in product(_AMPLITUDES, _TAUS):
-        foretold = walk(sampled(edge, amplitude, 0.0, tau), _NOISE, float(steps.interval), steps.offsets)
-        sizes = {
-            (moment, span): _size(_left(steps, foretold, moment, span)) for moment, span in product(_MOMENTS, _SPANS)
-        }
-        moment, span = min(sizes, key=lambda place: sizes[place])
-        found.append((sizes[moment, span], np.array([amplitude, moment, tau, _NOISE, span, 0.0])))
+        left = _left(steps, _walk(steps, sampled(edge, amplitude, 0.0, tau), _NOISE, 0.0))
+        sizes = np.stack([_size(left(_MOMENTS, span)) for span in _SPANS], axis=1)
+        moment, span = np.unravel_index(sizes.argmin(), sizes.shape)
+        start = np.array([amplitude, _MOMENTS[moment], tau, _NOISE, _SPANS[span], 0.0])
+        found.append((float(sizes[moment, span]), start))
     return [start for _, start in sorted(found, key=lambda pair: pair[0])[:_STARTS]]
 
 
@@ -174,10 +187,10 @@ def _along(steps: Steps, law: Array) -> list[Array]:
     turn = law[1] % 1.0 - 1.0
     for scale in _SCALES:
         trial = law * (1.0, 0.0, scale, 1.0, scale, 1.0)
-        foretold = walk(_law(trial), law[3], float(steps.interval), steps.offsets + law[5])
-        for moment in scale * turn + np.linspace(-2.0, 2.0, 17) * abs(trial[4]) / (steps.shifts.shape[0] - 1):
-            size = _size(_left(steps, foretold, moment, trial[4]))
-            found.append((size, trial + moment % 1.0 * np.eye(6)[1]))
+        left = _left(steps, _walk(steps, _law(trial), law[3], law[5]))
+        moments = scale * turn + np.linspace(-2.0, 2.0, 17) * abs(trial[4]) / (steps.shifts.shape[0] - 1)
+        for moment, size in zip(moments, _size(left(moments, trial[4])), strict=True):
+            found.append((float(size), trial + moment % 1.0 * np.eye(6)[1]))
     found.sort(key=lambda pair: pair[0])
     spans: dict[float, Array] = {}
     for _, start in found:
@@ -187,18 +200,24 @@ def _along(steps: Steps, law: Array) -> list[Array]:
 
 
 def _best(steps: Steps, starts: list[Array]) -> tuple[Array, Array]:
-    return min((_fitted(steps, start, "soft_l1") for start in starts), key=lambda fit: _size(fit[1]))
+    return min((_fitted(steps, start, "soft_l1") for start in starts), key=lambda fit: float(_size(fit[1])))
 
 
-def _size(left: Array) -> float:
-    return float(np.sqrt(1.0 + left**2).sum())
+def _size(left: Array) -> Array:
+    """(...,) of what is left (..., N)."""
+    return np.asarray(np.sqrt(1.0 + left**2).sum(axis=-1))
 
 
 def _fitted(steps: Steps, start: Array, loss: str) -> tuple[Array, Array]:
     """Parameters of the edge and what they leave; a coarse start wants a robust loss, as `least_squares` has them."""
 
+    @lru_cache(maxsize=8)  # of a derivative's steps, that of the span needs no other walk
+    def left(amplitude: float, moment: float, tau: float, noise: float, off: float) -> Callable[..., Array]:
+        return _left(steps, _walk(steps, sampled(edge, amplitude, moment, tau), noise, off))
+
     def residual(p: Array) -> Array:
-        return _residual(steps, _law(p), *p[3:])
+        amplitude, moment, tau, noise, span, off = p
+        return left(amplitude, moment, tau, noise, off)(0.0, span)
 
     def slopes(p: Array) -> Array:
         return _slopes(residual, p, residual(p), _STEPS)

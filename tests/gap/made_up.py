@@ -67,14 +67,27 @@ def recorded(effect: str | None, take: int) -> tuple[Observation, ...]:
     return tuple(out)
 
 
-def evidence(effect: str | None, *, named: bool = True) -> Evidence:
-    """Measured with the effect, model before without; model after with it, unless nothing was named."""
-    shown = conditions()
-    streams = [recorded(effect, 0), recorded(None, 1), recorded(effect, 2) if named and effect else None]
+FEW = ("dark", "flat-050", "flat-300", "flat-200")
+"""Of the recordings, for pages whose pictures are as those of others."""
+
+
+@lru_cache
+def evidence(effect: str | None, *, named: bool = True, only: tuple[str, ...] = ()) -> Evidence:
+    """Measured with the effect, model before without; model after with it, unless nothing was named.
+
+    only: of the recordings; else all.
+    """
+    kept = [i for i, c in enumerate(conditions()) if not only or c.name in only]
+    shown = tuple(conditions()[i] for i in kept)
+
+    def take(effect: str | None, number: int) -> tuple[Observation, ...]:
+        return tuple(recorded(effect, number)[i] for i in kept)
+
+    streams = [take(effect, 0), take(None, 1), take(effect, 2) if named and effect else None]
     bases = [free_refit(list(s), list(shown)) if s else None for s in streams]
     fresh = drawn_response(MODEL, bases[0], SHAPE, seed=11)  # type: ignore[arg-type]
     return Evidence(
-        shown, *streams, *bases, again=recorded(None, 3), drawn_before=fresh, drawn_after=fresh if streams[2] else None
+        shown, *streams, *bases, again=take(None, 3), drawn_before=fresh, drawn_after=fresh if streams[2] else None
     )  # type: ignore[arg-type]
 
 
@@ -130,8 +143,8 @@ def _ranking(best: str, parameters: dict[str, Estimate]) -> tuple[Ranked, ...]:
     )  # fmt: skip
 
 
-def named(effect: str = "photodiode_lag") -> Diagnosis:
-    """One effect found, at its true value."""
+def named(effect: str = "photodiode_lag", only: tuple[str, ...] = ()) -> Diagnosis:
+    """One effect found, at its true value; `only` as of `evidence`."""
     values = {k: 1.02 * v for k, v in EFFECTS[effect].items()}
     found = estimates(effect, values, {k: 0.02 * abs(v) for k, v in EFFECTS[effect].items()})
     e = NamedEffect(effect, "light", 0.97, found, (("incomplete_reset", 0.02), ("optical_blur", 0.003)))
@@ -150,7 +163,7 @@ def named(effect: str = "photodiode_lag") -> Diagnosis:
     )
     return _plain(
         "named", words[effect], effects=(e,), gap=gap(41.0, 2.2), statistics=statistics(loud),
-        ranking=_ranking(effect, found), patched=model, evidence=evidence(effect),
+        ranking=_ranking(effect, found), patched=model, evidence=evidence(effect, only=only),
     )  # fmt: skip
 
 
@@ -178,7 +191,7 @@ def none() -> Diagnosis:
 
 def class_() -> Diagnosis:
     """Two names that these data cannot separate."""
-    base = named("dead_time")
+    base = named("dead_time", FEW)
     members = ["photo_response_nonlinearity", "ir_drop"]
     return replace(
         base, verdict="class", effects=(),
@@ -210,7 +223,7 @@ def parameter() -> Diagnosis:
     return _plain(
         "parameter", "No effect is missing, but shot noise is off: 31000 electrons fit, the model has 50000.",
         parameters={"shot_noise": {"measured": 31000.0, "nominal": 50000.0, "ratio": 0.62}},
-        gap=gap(9.0, 1.2), statistics=statistics({"noise": 17.0}), evidence=evidence("dead_time"),
+        gap=gap(9.0, 1.2), statistics=statistics({"noise": 17.0}), evidence=evidence("dead_time", only=FEW),
     )  # fmt: skip
 
 
@@ -220,7 +233,8 @@ def data() -> Diagnosis:
         "data", "The data contradict their own labels: flat-300 is 2.1 % brighter than its label says.",
         data=("flat-300: rates are 2.1 % (31 sd) above the line through the other flats; its label fits 0.3063",
               "flat-050 and flat-120: consistent with their labels"),
-        statistics=statistics({"rates": 31.0}), evidence=evidence("dead_time", named=False),
+        statistics=statistics({"rates": 31.0}),
+        evidence=evidence("dead_time", named=False, only=FEW),
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from spikecam_env.gap.compare.distance import deviates
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.observe.conditions import Condition, planned_conditions
-from spikecam_env.gap.observe.observation import observe
+from spikecam_env.gap.observe.observation import Observation, observe
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.case import Case, case_of
@@ -86,8 +86,14 @@ def _packed(effects: tuple[Effect, ...], seed: int, model: SensorModel) -> dict[
 def case_from(spikes: dict[str, Spikes], seed: int = 1, shown: Sequence[Condition] | None = None) -> Case:
     """A case of spikes that a test may have changed; lengths are those of the spikes."""
     there = [replace(c, frames=len(spikes[c.name])) for c in shown or conditions() if c.name in spikes]
-    seen_by = [observe(pack_frames(spikes[c.name]), SHAPE, film=c.moves) for c in there]
+    seen_by = [_observed(pack_frames(spikes[c.name]).tobytes(), c.frames, c.moves) for c in there]
     return case_of(SHAPE, there, seen_by, seed)
+
+
+@lru_cache(maxsize=32)
+def _observed(packed: bytes, frames: int, film: bool) -> Observation:
+    """Of a recording of these bits; of most a test changes one and the others were observed before."""
+    return observe(np.frombuffer(packed, np.uint8).reshape(frames, -1), SHAPE, film=film)
 
 
 @lru_cache(maxsize=1)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small import DESIGN, FRAMES, MODEL, SHAPE, effect
+from small import DESIGN, MODEL, SHAPE, effect
 
 from spikecam_env.cli.diagnose import summary
 from spikecam_env.errors import InputError
@@ -27,8 +27,10 @@ pytestmark = pytest.mark.slow
 LAG = effect("photodiode_lag", fraction=0.08, tau_us=1000.0)
 ONLY = ("photodiode_lag", "incomplete_reset")
 MOVED = ("photodiode_lag", "readout_skew", "optical_blur", "blooming")
-BOUNDED = ("dead_time", "vignetting", "readout_skew", "spurious_spikes")
-"""Candidates where nothing is found, and each is simulated for its bound; the alarm asks for none."""
+BOUNDED = ("vignetting", "spurious_spikes")
+"""Candidates where nothing is found, and each is simulated for its bound; the alarm asks for none.  One acts on the
+light, one has no light in it; other bounds are found in the same way (`verdict/test_bounds.py`)."""
+FRAMES = 1000
 FEW = 6
 """Twins, to be quick."""
 KEYS = {
@@ -136,7 +138,7 @@ def test_what_shows_in_nothing_but_motion_held_out_is_found_and_not_called_a_che
 def test_so_it_is_beside_an_effect_that_the_others_have_shown(tmp_path):
     design = [r for r in DESIGN if not isinstance(r, (Step, Bars))] + [Bars(high=1.4, period=16.0, use="holdout")]
     both = MODEL.with_effect(LAG).with_effect(effect("dead_time", tau_us=0.5))
-    found = asked(written(tmp_path / "held", both, design), candidates=("dead_time", *ONLY))
+    found = asked(written(tmp_path / "held", both, design), candidates=("dead_time", ONLY[0]))
     assert found.verdict == "named" and [e.name for e in found.effects] == ["dead_time", "photodiode_lag"]
     assert found.effects[1].parameters["fraction"].value == pytest.approx(0.08, rel=0.15)
     assert Note.ONLY_HELD_OUT_DISAGREE in found.data
@@ -144,8 +146,8 @@ def test_so_it_is_beside_an_effect_that_the_others_have_shown(tmp_path):
 
 def test_a_parameter_that_is_off_is_set_and_shrinks_the_gap(tmp_path):
     noisy = written(tmp_path / "noisy", MODEL.with_effect(effect("reset_noise", sigma_mV=19.1)))
-    found = asked(noisy, candidates=BOUNDED[:2])
-    assert {b.name for b in found.bounds} == set(BOUNDED[:2])
+    found = asked(noisy, candidates=BOUNDED[:1])
+    assert {b.name for b in found.bounds} == set(BOUNDED[:1])
     assert found.verdict == "parameter" and list(found.parameters) == ["reset_noise"]
     row = found.parameters["reset_noise"]
     assert row["measured"] == pytest.approx(19.1, rel=0.1) and row["nominal"] == 6.36
@@ -206,7 +208,11 @@ def test_labels_in_another_unit_change_no_bound_and_the_page_says_so(clean, noth
     (said,) = [note for note in found.data if "labels are in another unit" in note]
     factor = float(re.search(r"gain is (\S+) of nominal", said)[1])
     assert factor == pytest.approx(1e-3, rel=0.2)
-    assert "gain is" in report(found) and "gain is" in summary(found) and "gain is" not in summary(nothing)
+    assert (
+        "gain is" in report(replace(found, evidence=None))
+        and "gain is" in summary(found)
+        and "gain is" not in summary(nothing)
+    )
 
 
 def test_no_effort_is_refused(clean):
@@ -215,7 +221,7 @@ def test_no_effort_is_refused(clean):
 
 
 def test_a_name_that_is_excluded_is_not_named(lagging):
-    found = asked(lagging, candidates=(*ONLY, "readout_skew"), exclude=["photodiode_lag"])
+    found = asked(lagging, candidates=ONLY, exclude=["photodiode_lag"])
     names = {e.name for e in found.effects} | {r.name for r in found.ranking}
     names |= {n for n, _ in found.not_testable} | set((found.class_ or {}).get("members", ()))
     print(names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -18,11 +19,11 @@ def campaign(tmp_path: Path, monkeypatch) -> Path:
     folder = tmp_path / "camera-17"
     folder.mkdir()
     (folder / "campaign.json").write_text("{}")
-    asked = {}
+    asked, answer = {}, replace(made_up.named(), evidence=None)  # a page without its pictures
 
     def diagnose(campaign, model, **options):
         asked.update(campaign=campaign, model=model, **options)
-        return made_up.named()
+        return answer
 
     monkeypatch.setattr(import_module("spikecam_env.gap.diagnose"), "diagnose", diagnose)
     monkeypatch.setattr(made_up, "ASKED", asked, raising=False)

@@ -275,7 +275,7 @@ class Windows:
         even = np.broadcast_to(np.arange(self.pieces + 1) / self.pieces, (*start.shape, self.pieces + 1))
         clock = self.physics.clock
         if clock is None:
-            return np.ascontiguousarray(even)
+            return np.array(even, order="C")  # as the others, neither read-only nor strided: else all is compiled again
         edge = np.minimum(_moment(clock.phase, start, length), 1.0)[..., None]
         tail = (edge + clock.nodes()[1:]) % 1.0
         return np.sort(np.concatenate([even, edge, tail], axis=-1), axis=-1)

@@ -17,12 +17,25 @@ from tests.hidden_world.tricky import TRICKS
 from tests.hidden_world.world import MECHANISMS, Recipe, stream, write_campaign
 
 SMALL = Recipe(5, "scsim", shape=(24, 24), frames=800)
+TINY = replace(SMALL, shape=(16, 16), frames=200)
 ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory) -> Path:
+    """The small campaign's folder."""
+    folder = tmp_path_factory.mktemp("small")
+    write_campaign(SMALL, folder)
+    return folder
+
+
+def spikes_in(folder: Path) -> dict[str, np.ndarray]:
+    return {r.name: r.load() for r in read_campaign(folder).recordings}
 
 
 def loaded(recipe: Recipe, folder: Path) -> dict[str, np.ndarray]:
     write_campaign(recipe, folder)
-    return {r.name: r.load() for r in read_campaign(folder).recordings}
+    return spikes_in(folder)
 
 
 def digest(folder: Path) -> str:
@@ -43,25 +56,24 @@ def test_nothing_of_the_package_is_imported():
             assert "import spikecam_env" not in text and "from spikecam_env" not in text, path.name
 
 
-def test_reader_accepts_a_campaign_and_finds_its_recordings(tmp_path):
-    write_campaign(SMALL, tmp_path)
-    campaign = read_campaign(tmp_path)
+def test_reader_accepts_a_campaign_and_finds_its_recordings(small):
+    campaign = read_campaign(small)
     assert campaign.shape == (24, 24) and campaign.frame_rate_hz == 40000.0
     fit = [r.name for r in campaign.recordings if r.use == "fit"]
     held = [r.name for r in campaign.recordings if r.use == "holdout"]
     assert len(fit) == 9 and fit[0] == "dark" and fit[-2:] == ["step", "bars"]
     assert len(held) == 4 and held[-1] == "disk"
-    assert {p.suffix for p in tmp_path.iterdir()} == {".dat", ".npz", ".json"}
+    assert {p.suffix for p in small.iterdir()} == {".dat", ".npz", ".json"}
     for recording in campaign.recordings:
         light = recording.light()
         assert light is not None
         assert np.all(light.frame == np.round(light.frame)) == (recording.name != "step")
 
 
-def test_spikes_follow_the_light_that_the_files_state(tmp_path):
+def test_spikes_follow_the_light_that_the_files_state(small):
     """Counts of every pixel of every recording: gain times the stated light, gain from one flat."""
-    spikes = loaded(SMALL, tmp_path)
-    light = {r.name: r.light() for r in read_campaign(tmp_path).recordings}
+    spikes = spikes_in(small)
+    light = {r.name: r.light() for r in read_campaign(small).recordings}
     flat = next(name for name in spikes if name.startswith("flat-6") or name.startswith("flat-7"))
     dark = spikes["dark"].mean()
     gain = (spikes[flat].mean(axis=0) - dark) / light[flat].radiance[0, 0, 0]
@@ -80,14 +92,13 @@ def test_spikes_follow_the_light_that_the_files_state(tmp_path):
 
 def test_the_same_recipe_gives_the_same_bytes(tmp_path):
     hidden = draw(MECHANISMS["random_telegraph_noise"], 5.0, stream(1, "x"))
-    recipe = replace(SMALL, hidden=(hidden,))
+    recipe = replace(TINY, hidden=(hidden,))
     for name in ("a", "b"):
         write_campaign(recipe, tmp_path / name)
     write_campaign(replace(recipe, seed=6), tmp_path / "c")
     assert digest(tmp_path / "a") == digest(tmp_path / "b") != digest(tmp_path / "c")
 
 
-TINY = replace(SMALL, shape=(16, 16), frames=400)
 RARE = ("missed_spikes", "spurious_spikes", "afterpulsing", "spike_bursts", "repeated_frames", "cosmic_streaks")
 
 
@@ -108,9 +119,9 @@ def test_every_law_makes_a_readable_campaign_that_differs(name, law, tmp_path, n
 
 
 @pytest.mark.parametrize("trick", sorted(TRICKS))
-def test_tricks_do_what_they_say(trick, tmp_path):
-    plain, tricked = loaded(SMALL, tmp_path / "plain"), loaded(replace(SMALL, trick=trick), tmp_path / "tricked")
-    light = [{r.name: r.light() for r in read_campaign(tmp_path / d).recordings} for d in ("plain", "tricked")]
+def test_tricks_do_what_they_say(trick, tmp_path, small):
+    plain, tricked = spikes_in(small), loaded(replace(SMALL, trick=trick), tmp_path)
+    light = [{r.name: r.light() for r in read_campaign(d).recordings} for d in (small, tmp_path)]
     if trick == "no_motion":
         assert set(plain) - set(tricked) == {"step", "bars", "disk"}
         return
@@ -128,9 +139,9 @@ def test_tricks_do_what_they_say(trick, tmp_path):
         assert changed == ["bars"] and np.array_equal(plain["bars"], tricked["bars"][:, ::-1])
 
 
-def test_an_effect_can_be_in_one_place_or_from_a_time_on(tmp_path):
+def test_an_effect_can_be_in_one_place_or_from_a_time_on(tmp_path, small):
     strong = {"probability": 0.02}
-    plain = loaded(SMALL, tmp_path / "plain")["dark"]
+    plain = spikes_in(small)["dark"]
     corner = replace(SMALL, hidden=(Hidden("spurious_spikes", strong, 1.0, rows=(0, 8), columns=(16, 24)),))
     bits = loaded(corner, tmp_path / "corner")["dark"]
     where = (bits != plain).any(axis=0)

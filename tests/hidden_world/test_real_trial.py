@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
+from importlib import import_module
 
 import pytest
 
@@ -12,6 +14,8 @@ from tests.hidden_world import trial
 from tests.hidden_world.trial import chosen
 
 SHAPE, FRAMES = (16, 16), 1000
+CANDIDATES, TWINS = ("dead_time", "vignetting"), 6
+"""Of the diagnosis, so that it is quick: it has a bound to find of each where nothing is hidden."""
 
 
 @pytest.mark.slow
@@ -21,6 +25,8 @@ def test_trial_runs_the_real_diagnosis_and_scores_it(tmp_path, monkeypatch, caps
     def tiny(*options):
         return [replace(c, recipe=replace(c.recipe, shape=SHAPE, frames=FRAMES)) for c in chosen(*options)]
 
+    real = import_module("spikecam_env.gap.diagnose")
+    monkeypatch.setattr(real, "diagnose", partial(real.diagnose, candidates=CANDIDATES, twin_count=TWINS))
     monkeypatch.setattr(trial, "chosen", tiny)
     BlindTrial(tmp_path, set="quick", part="tune", only=["none", "tricky"], limit=1).run()
     printed = capsys.readouterr().out

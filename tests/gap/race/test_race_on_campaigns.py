@@ -26,7 +26,7 @@ def found_by_race(*hidden, names):
 def test_of_a_strong_pair_both_are_found_and_nothing_else():
     """155 noises and 20."""
     hidden = effect("missed_spikes", probability=0.01), effect("row_temporal_noise", sigma_mV=20.0)
-    names = ["missed_spikes", "row_temporal_noise", "dead_time", "random_telegraph_noise"]
+    names = ["missed_spikes", "row_temporal_noise", "dead_time"]
     found = found_by_race(*hidden, names=names)
     assert set(found) == {"missed_spikes", "row_temporal_noise"}
     for there in hidden:

@@ -8,7 +8,7 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from small import MODEL, TWINS, effect, recorded
+from small import MODEL, effect, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET
@@ -98,7 +98,7 @@ def test_what_stands_out_most_is_loud_however_quiet_it_is():
 def test_screening_starts_near_the_truth_weak_or_severe(hidden):
     """In another array, for a quarter of the frames: the strength within a factor of 1.6, and one of those fitted."""
     case = recorded(hidden)
-    null = model_null(case, MODEL, TWINS)
+    null = model_null(case, MODEL, 6)
     values = values_of(case.bank, null.keys)
     found = screen(shipped_templates(), case.conditions, null, values, list(CATALOGUE))
     distance = np.nan_to_num((values - null.mean) / null.noise)

@@ -11,15 +11,25 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.search.cancelling_pair import PAIR, fit_pair
 from spikecam_env.gap.search.forward import forward_selection
+from spikecam_env.sensor import Effect
 
 TAU_US = 2.0
 CANCELLING = (effect("dead_time", tau_us=TAU_US), effect("photo_response_nonlinearity", beta=-TAU_US / 25.0))
 
 
-def test_one_twin_of_both_says_how_strong_they_are():
-    case = recorded(*CANCELLING)
+def problem_of(*effects: Effect) -> Problem:
+    case = recorded(*effects)
     null = model_null(case, MODEL, TWINS)
-    problem = Problem.of(case, MODEL, null, values_of(case.bank, null.keys))
+    return Problem.of(case, MODEL, null, values_of(case.bank, null.keys))
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    """Both are there."""
+    return problem_of(*CANCELLING)
+
+
+def test_one_twin_of_both_says_how_strong_they_are(problem):
     found = fit_pair(problem, PAIR)
     assert found is not None and {e.name for e in found.model.effects} >= set(PAIR)
     there = {e.name: e.parameters() for e in found.model.effects}
@@ -31,13 +41,8 @@ def test_one_twin_of_both_says_how_strong_they_are():
     assert fit_pair(problem, PAIR[:1]) is None
 
 
-def test_search_finds_them_together():
-    case = recorded(*CANCELLING)
-    null = model_null(case, MODEL, TWINS)
-    values = values_of(case.bank, null.keys)
-    rounds = forward_selection(
-        Problem.of(case, MODEL, null, values), [*PAIR, "comparator_delay", "ir_drop"], shipped_templates()
-    )
+def test_search_finds_them_together(problem):
+    rounds = forward_selection(problem, [*PAIR, "comparator_delay"], shipped_templates())
     print([r.fits[0].name for r in rounds if r.fits], rounds[-1].model.effects[-2:])
     assert [r.fits[0].name for r in rounds[:-1]] == list(PAIR)
     there = {e.name: e.parameters() for e in rounds[-1].model.effects}
@@ -46,8 +51,7 @@ def test_search_finds_them_together():
 
 
 def test_one_bend_alone_is_found_alone():
-    case = recorded(effect("photo_response_nonlinearity", beta=0.02))
-    null = model_null(case, MODEL, TWINS)
-    values = values_of(case.bank, null.keys)
-    rounds = forward_selection(Problem.of(case, MODEL, null, values), [*PAIR], shipped_templates())
+    rounds = forward_selection(
+        problem_of(effect("photo_response_nonlinearity", beta=0.02)), [*PAIR], shipped_templates()
+    )
     assert len([r for r in rounds if r.fits]) == 1 and rounds[0].fits[0].name in PAIR
