@@ -22,6 +22,10 @@ SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20}
 STEPS = 2
 """The denoiser's frames come 31 late: they are seen from the first step on."""
 
+MANY = 18
+WARM = 8
+"""Environments made one after another, and after how many of them a process has all that it keeps."""
+
 Maker = Callable[[], gymnasium.Env]
 
 
@@ -142,15 +146,15 @@ def held() -> tuple[int, int, int]:
 def many() -> None:
     """Environments one after another: a rendered scene, and another with the denoiser."""
     figures = []
-    for number in range(50):
+    for number in range(MANY):
         env = plain("spikecam_env/Poker-v0")() if number % 2 else denoised("spikecam_env/Disk-v0")()
         env.reset(seed=number)
         env.step(np.zeros(2, np.float32))
         env.close()
         figures.append(held())
-    (kilobytes, files, threads), last = figures[9], figures[-1]
-    print(f"after 10: {figures[9]}, after 50: {last} (kB, files, threads)")
-    assert last[0] - kilobytes < 40_000, "memory grows by a megabyte an environment"
+    (kilobytes, files, threads), last = figures[WARM - 1], figures[-1]
+    print(f"after {WARM}: {figures[WARM - 1]}, after {MANY}: {last} (kB, files, threads)")
+    assert last[0] - kilobytes < 1000 * (MANY - WARM), "memory grows by a megabyte an environment"
     assert last[1] <= files, "files grow"
     assert last[2] <= threads + 4, "threads grow"  # a pool starts its threads as it finds the others at work
 
