@@ -12,11 +12,15 @@ from spikecam_env.threads import as_many, limit_threads
 
 PAINTED = """
 import torch
-from scenes.catalogue import make_scene
+from scenes.meshes import assemble, sphere
+from scenes.renderers.embree import Embree
+from scenes.trajectories import Spinning
+from scenes.world import Body, World
 
 torch.set_num_threads(1)
 torch.get_num_threads()  # torch sets what it remembers at its first use
-make_scene("dice", (24, 40)).radiance(0, 8)
+ball = Body("ball", assemble(sphere(0.5)), Spinning((0, 1, 0), rpm=900))
+World((24, 40), (ball,), renderer=Embree()).radiance(0, 8)
 print(torch.get_num_threads())
 """
 

@@ -14,8 +14,8 @@ from spikecam_env.envs.course import Course, steps_of
 from spikecam_env.envs.oracle import oracle
 from spikecam_env.envs.registration import ENVIRONMENTS, SMALL_TASKS, TASK_NAMES
 
-SEEDS = range(2)
-"""Of the episodes that are played at every scene id."""
+SEEDS = (0,)
+"""Of the episodes that are played at every scene id: what differs is the motion of the scene."""
 
 
 def nothing(course: Course) -> Any:

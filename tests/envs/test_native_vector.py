@@ -15,13 +15,13 @@ from gymnasium.vector import AutoresetMode
 
 from spikecam_env.bench.environments import bench_environments
 from spikecam_env.envs.observations import OBSERVATIONS
-from spikecam_env.envs.registration import ENVIRONMENTS, register
+from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS, register
 from spikecam_env.envs.rotating_disk import RotatingDiskEnv
 from spikecam_env.envs.vector import SpikeCameraVectorEnv, batched
 from spikecam_env.errors import InputError, NotReadyError
+from tests.envs.kinds import DISK, KINDS
 
 register()
-DISK = "spikecam_env/RotatingDisk-v0"
 SMALL: dict[str, Any] = {"shape": (16, 24), "frames_per_step": 20}
 STEPS = 14
 FAST = 20_000.0
@@ -76,11 +76,19 @@ def test_the_number_of_workers_changes_no_bit() -> None:
     same(few, many)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
-def test_every_id_has_a_vector(name: str) -> None:
+@pytest.mark.parametrize("name", KINDS)
+def test_a_vector_of_every_kind_of_scene_has_the_bits_of_single_environments(name: str) -> None:
     ours, theirs = (rollout(vector(mode, name, 2), 2) for mode in ("vector_entry_point", "sync"))
     same(ours, theirs)
+
+
+def test_every_id_has_a_vector() -> None:
+    """Of the class of its single environment; what the kinds show of it holds for all that are made with that class."""
+    for name in (*ENVIRONMENTS, *TASK_ENVIRONMENTS):
+        spec = gymnasium.spec(name)
+        assert spec.vector_entry_point == f"spikecam_env.envs.vector_of:{str(spec.entry_point).replace(':', '.')}"
+    classes = {gymnasium.spec(name).entry_point for name in ENVIRONMENTS}
+    assert classes == {gymnasium.spec(name).entry_point for name in KINDS}
 
 
 def test_models_are_each_environment_s_own() -> None:

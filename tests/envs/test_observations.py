@@ -23,7 +23,7 @@ from spikecam_env.envs.observations import (
     restarted,
 )
 from spikecam_env.envs.observations.frame_camera import mean_light, shutter_open
-from spikecam_env.envs.registration import ENVIRONMENTS, register
+from spikecam_env.envs.registration import register
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import isi_plane, unpack_frames
@@ -33,8 +33,6 @@ DISK = "spikecam_env/RotatingDisk-v0"
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 8}
 VIEW = View((5, 7), 8)
 FRAMES = 48
-OF_IDS = dict(zip(sorted(ENVIRONMENTS), sorted(OBSERVATIONS) * len(ENVIRONMENTS), strict=False))
-"""Every id with one of the observations; the disk has them all."""
 
 
 def stream(seed: int = 0) -> np.ndarray:
@@ -52,24 +50,15 @@ def shown(law: Observation, spikes: np.ndarray, cut: int) -> list[np.ndarray]:
     return seen
 
 
-def checked(name: str, **options: Any) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        env = gymnasium.make(name, **{**SMALL, **options}).unwrapped
-        check_env(env, skip_render_check=True)
-        env.close()
-
-
 @pytest.mark.parametrize("obs_state", [False, True])
 @pytest.mark.parametrize("obs", OBSERVATIONS)
 def test_check_env_is_clean_for_every_observation(obs: str, obs_state: bool) -> None:
-    checked(DISK, obs=obs, obs_state=obs_state)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(OF_IDS))
-def test_check_env_is_clean_for_every_id(name: str) -> None:
-    checked(name, obs=OF_IDS[name])
+    """Of the disk; every id has one of them in `test_scene_environment`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make(DISK, **SMALL, obs=obs, obs_state=obs_state).unwrapped
+        check_env(env, skip_render_check=True)
+        env.close()
 
 
 def test_names_give_the_same_stream() -> None:

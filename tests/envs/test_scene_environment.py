@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import warnings
+from itertools import cycle
 from typing import Any
 
 import gymnasium
@@ -9,16 +10,23 @@ import pytest
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
 from scenes.catalogue import SCENES
+from scenes.collage import Collage
+from scenes.world import World
+from spikecam_env.envs.observations import OBSERVATIONS
 from spikecam_env.envs.registration import ENVIRONMENTS, register
 from spikecam_env.envs.scene import SceneEnv
 from spikecam_env.errors import InputError
+from tests.envs.kinds import BY_SCENE, RANDOM
 
 register()
 SMALL: dict[str, Any] = {"shape": (24, 32), "frames_per_step": 8}
 NAMED = sorted(name for name, (_, options) in ENVIRONMENTS.items() if options)
+OF_IDS = dict(zip((RANDOM, *NAMED), cycle(OBSERVATIONS), strict=False))
+"""Every id with one of the observations, in turn; the disk has them all in `test_observations`."""
+WITH_TRUTH = (BY_SCENE[Collage], BY_SCENE[World])
 
 
-def make(name: str = "spikecam_env/Scene-v0", **options: Any) -> SceneEnv:
+def make(name: str = RANDOM, **options: Any) -> SceneEnv:
     env = gymnasium.make(name, **{**SMALL, **options}).unwrapped
     assert isinstance(env, SceneEnv)
     return env
@@ -28,22 +36,20 @@ def test_every_scene_of_the_catalogue_has_an_id() -> None:
     assert {ENVIRONMENTS[name][1]["scene"] for name in NAMED} | {"random"} == set(SCENES)
 
 
-@pytest.mark.parametrize("scene", ["collage", "dice"])
-def test_check_env_is_clean(scene: str) -> None:
-    """Without its render check, which `test_rotating_disk` has: it makes the environment anew again and again."""
+@pytest.mark.parametrize("name", OF_IDS)
+def test_every_id_passes_check_env_starts_with_its_target_in_view_and_steps(name: str) -> None:
+    """Without the render check, which `test_rotating_disk` has: it makes the environment anew again and again."""
+    env = make(name, obs=OF_IDS[name], ground_truth=name in WITH_TRUTH)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(make(scene=scene, ground_truth=True), skip_render_check=True)
-
-
-@pytest.mark.parametrize("name", NAMED)
-def test_every_id_starts_with_its_target_in_view_and_steps(name: str) -> None:
-    env = make(name)
+        check_env(env, skip_render_check=True)
     observation, info = env.reset(seed=3)
-    assert observation in env.observation_space and 0.01 < observation.mean() < 0.6
+    assert observation in env.observation_space and 0.01 < env.blocks.spikes.mean() < 0.6
     assert -1 <= info["target"][0] <= 33 and -1 <= info["target"][1] <= 25
     observation, reward, *_ = env.step(np.array([0.3, -0.2], np.float32))
     assert observation in env.observation_space and -1 < reward <= 1
+    assert name == RANDOM or type(env._unexposed) in BY_SCENE
+    env.close()
 
 
 @pytest.mark.parametrize("name", ["spikecam_env/Collage-v0", "spikecam_env/Fan-v0"])
@@ -108,7 +114,7 @@ def test_episode_ends_when_the_target_leaves() -> None:
 
 
 def test_make_vec_gives_each_camera_its_own_world() -> None:
-    vector = gymnasium.make_vec("spikecam_env/Scene-v0", num_envs=2, vectorization_mode="sync", **SMALL)
+    vector = gymnasium.make_vec(RANDOM, num_envs=2, vectorization_mode="sync", **SMALL)
     observation, _ = vector.reset(seed=5)
     assert observation.shape == (2, 8, 24, 32)
     np.testing.assert_array_equal(observation[1], make().reset(seed=6)[0])

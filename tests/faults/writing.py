@@ -103,7 +103,7 @@ DEMO: Work = {
     "spikecam_env.cli.showcase:last_picture": lambda _: _film()[0],
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
-TRAINING: Work = {"denoiser.simulated:Bank.drawn": _bank}
+TRAINING: Work = {"denoiser.simulated:Bank.drawn": _bank, "denoiser.reconstruct.train:_held_out": lambda _: []}
 EVALUATION: Work = {
     "denoiser.evaluate:evaluate_quick": _evaluation,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,
@@ -147,8 +147,8 @@ WRITINGS: dict[str, Writing] = {
     "play": Writing("play Catch-v1 --film {out}", "catch.mp4", PLAYED),
     "view": Writing("view Catch-v1 --frames 80 --save {out}", "catch.rrd", VIEWED),
     "dataset": Writing(f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}),
-    "train": Writing("train --out {out} --steps 2 --batch 2 --patch 16", "run", TRAINING),
-    "train ssml": Writing("train --mode ssml --out {out} --steps 2 --batch 2 --patch 16 --width 12", "run", TRAINING),
+    "train": Writing("train --out {out} --steps 1 --batch 1 --patch 16", "run", TRAINING),
+    "train ssml": Writing("train --mode ssml --out {out} --steps 1 --batch 1 --patch 16 --width 12", "run", TRAINING),
     "evaluate": Writing("evaluate quick --out {out}", "evaluation", EVALUATION),
     "evaluate table": Writing(
         f"evaluate table1 --out {{out}} --rows noisy --scenes disk --seeds 1 --frames 200 {' '.join(SMALL)}",
