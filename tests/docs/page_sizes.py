@@ -22,10 +22,10 @@ SMALL = {
     "dataset spift-n": f"{SIZE} --train 1 --test 1 --frames 320",
     "dataset phm-n": f"{SIZE} --scenes disk --frames 320",
     "campaign simulate": "--shape 16 16 --frames 400",
-    "train": "--steps 2 --batch 2 --patch 32 --validate-every 2 --validate-passes 1 --minutes 1",
+    "train": "--steps 2 --batch 2 --patch 32 --validate-every 2 --validate-passes 1",
     "train-agent": "--steps 2 --environments 2",
     "evaluate tasks": "--tasks Catch-v1 --episodes 1",
-    "evaluate agents": "--tasks Catch-v1 --observations tracker --seeds 1 --episodes 1 --steps 2",
+    "evaluate agents": "--tasks Catch-v1 --observations tracker --seeds 1 --episodes 1 --steps 2 --size 32 32",
 }
 """Options that are added to a command, where the line does not give them."""
 

@@ -36,12 +36,18 @@ def test_a_public_name_says_what_it_is(module: str, name: str) -> None:
     assert docstring_of(module, name) or kind_of(value) == "module"
 
 
+@pytest.fixture(scope="module")
+def command_line() -> str:
+    """The page of the command line, for which every command's parser is made."""
+    return filled_in("<!-- generated: commands -->", "reference/command_line.md")
+
+
 @pytest.mark.parametrize(
     "words, kind", [*commands.every_command()], ids=lambda value: " ".join(value) if isinstance(value, tuple) else ""
 )
-def test_every_option_of_a_command_is_in_the_reference(words: tuple[str, ...], kind: Any) -> None:
-    page = filled_in("<!-- generated: commands -->", "reference/command_line.md")
-    [section] = re.findall(rf"^#+ spikecam {' '.join(words)}\n(.*?)(?=^## |^### |\Z)", page, re.MULTILINE | re.DOTALL)
+def test_every_option_of_a_command_is_in_the_reference(words: tuple[str, ...], kind: Any, command_line: str) -> None:
+    title = f"spikecam {' '.join(words)}"
+    [section] = re.findall(rf"^#+ {title}\n(.*?)(?=^## |^### |\Z)", command_line, re.MULTILINE | re.DOTALL)
     written = set(re.findall(r"--([a-z][a-z0-9-]*)", " ".join(re.findall(r"^`(-.*?)`", section, re.MULTILINE))))
     assert written == (set() if commands_of(kind) else options_of(kind))
 
