@@ -62,7 +62,7 @@ def test_the_same_seed_records_the_same_bits(tmp_path: Path) -> None:
 
 
 def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys) -> None:
-    assert spikecam("demo", "--frames", 500, "--out", tmp_path, *SMALL) == 0
+    assert spikecam("demo", "--frames", 500, "--out", tmp_path, "--size", 32, 48) == 0
     printed = capsys.readouterr().out
     assert "clean twin" in printed and "x real time" in printed
     figures = json.loads((tmp_path / "demo.json").read_text())
