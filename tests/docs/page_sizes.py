@@ -16,7 +16,7 @@ SMALL = {
     "record": f"{SIZE} --frames 400",
     "film": SIZE,
     "scenes": f"{SIZE} --frames 320",
-    "live": "--frames 128",
+    "live": "--frames 128 --size 48 80",
     "play": "--film played.mp4 --episodes 1",
     "view": f"{SIZE} --frames 80 --save viewed.rrd",
     "dataset spift-n": f"{SIZE} --train 1 --test 1 --frames 320",
