@@ -34,9 +34,10 @@ test: install-dev
 # The oldest releases that pyproject.toml allows (constraints-oldest.txt), in an environment of their own, without the
 # slow tests; numba's compiled code of one release is no use to another, so it goes to a folder of its own too.
 OLDEST := $(VENV)-oldest
-OLDEST_TESTS := tests/test_requirements.py tests/test_untrusted.py tests/streams tests/scenes tests/cli tests/envs \
-	$(addprefix --ignore=tests/,envs/test_task_numbers.py envs/test_course.py envs/test_tasks.py scenes/test_world.py \
-	scenes/test_world_cache.py scenes/test_disk.py scenes/test_textures.py)  # arithmetic alone: what they import, others do
+# Every dependency by what uses most of it: files, options, scenes with their renderers, environments with their wrappers.
+OLDEST_TESTS := $(addprefix tests/,test_requirements.py test_untrusted.py streams cli scenes/test_catalogue.py \
+	scenes/test_film.py scenes/test_mesh_files.py scenes/renderers envs/test_rotating_disk.py envs/test_observations.py \
+	envs/test_wrappers.py)
 
 $(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv $(OLDEST)
