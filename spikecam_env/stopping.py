@@ -2,6 +2,7 @@
 
     signal ──▶ handler raises `Stopped` in the main thread ──▶ everything unwinds and cleans up behind itself ──▶ leave
           │                                               └──▶ it is swallowed, and so deleted ─────────────────▶ leave
+          ├──▶ a module is being imported: no exception may pass it ─────────────────────────────────────────────▶ leave
           └──▶ a thread, woken through a pipe, waits GRACE_S, for a call that does not come back ────────────────▶ leave
 
 Callbacks of compiled code, finalisers and a bare `except` swallow what a signal handler raises.  So `leave` needs
@@ -22,12 +23,15 @@ import time
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from types import FrameType
 from typing import Any, NoReturn
 
 GRACE_S = 1.0
 """Time to unwind in [s]; what is left of the two seconds is for `leave`."""
 SAME_S = 0.2
 """Signals that follow the first within this time [s] are the same request: `timeout` sends to process and group."""
+IMPORTING = "<frozen importlib._bootstrap>"
+"""Where Python's own code is that imports a module."""
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 """Signals that stop the command, where the system has them; SIGHUP unless it is ignored, as under `nohup`."""
 
@@ -166,14 +170,24 @@ def _is_bar_open() -> bool:
     return bool(getattr(bars, "_instances", ()))
 
 
-def _on_signal(signum: int, frame: object) -> None:
+def _on_signal(signum: int, frame: FrameType | None) -> None:
     if _State.leaving.locked():
         return
-    if _State.done:
+    if _State.done or _is_importing(frame):
         leave(128 + signum)
     if _State.code is None:
         _State.code = 128 + signum
         raise _noticed(Stopped(signum))  # no variable here: its traceback would keep it alive
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Whether a module is being imported.  C++ that begins itself there ends the process where an exception passes it,
+    as torch does with `terminate`."""
+    while frame is not None:
+        if frame.f_code.co_filename == IMPORTING:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _noticed(stopped: Stopped) -> Stopped:

@@ -258,6 +258,22 @@ def test_a_second_signal_leaves_at_once(tmp_path: Path) -> None:
     assert time.monotonic() - began < 0.9
 
 
+def test_no_exception_passes_an_import(tmp_path: Path) -> None:
+    """C++ that begins itself in one, as torch's does, ends the process where an exception comes to it."""
+    (tmp_path / "begins.py").write_text(
+        "import os, time\nprint('ready', flush=True)\ntry: time.sleep(9)\nexcept BaseException: os._exit(7)\n"
+    )
+    code = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\nfrom spikecam_env.stopping import watched\n"
+    code += "with watched():\n    import begins"
+    process = subprocess.Popen(python(code), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout and process.stdout.readline() == "ready\n"
+    began = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    _, error = process.communicate(timeout=HARD_S)
+    assert (process.returncode, error) == (143, "spikecam: stopped\n")
+    assert time.monotonic() - began < 0.9
+
+
 def test_in_a_library_an_interrupt_is_what_it_always_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = [signal.getsignal(getattr(signal, name)) for name in NAMES]
     assert not is_command()
