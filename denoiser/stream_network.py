@@ -30,8 +30,9 @@ MULTIPLE = 4
 """Frames are extended to a multiple of so many rows and columns."""
 
 CHANNELS = (64, 128, 24)
-"""At half and at quarter resolution, and of the head, of `best`."""
+"""Of `best`: at half and at quarter resolution, and of the head."""
 MOST_CHANNELS = 256
+"""Of each of the three, so that a file cannot ask for more memory than there is."""
 
 Carried = tuple[Tensor, Tensor] | None
 """(last, hidden), float32."""
@@ -52,7 +53,7 @@ class StreamDnSS(nn.Module):
     """(N, span, H, W) spikes, (N, layers, H, W) planes, carried -> (N, planes, H, W) rates [spikes/frame], carried.
 
     means: which of the layers are running means (first, last + 1).  The last layer is 1 where the unit is calibrated.
-    channels: channels at half and at quarter resolution, and of the head.
+    channels: at half and at quarter resolution, and of the head.
     """
 
     def __init__(

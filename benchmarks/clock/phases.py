@@ -89,7 +89,7 @@ def walk(disturbance: Array, noise: float, interval: float, offsets: Array) -> W
 
 
 def _share_below(deviates: Array) -> Array:
-    """Of a normal law; shares below 1e-18 are 0: of 128 by 128 most are, and the exact ones take long."""
+    """Of a normal law; shares below 1e-19 are 0: of 128 by 128 most are, and the exact ones take long."""
     share, counts = np.zeros_like(deviates), deviates > -9.0
     share[counts] = ndtr(deviates[counts])
     return share
