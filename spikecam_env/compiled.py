@@ -1,8 +1,12 @@
-"""numba's `njit`, whose cache is where it can be.
+"""numba's `njit`, whose cache is where it can be, and which one process fills for all.
 
 numba keeps compiled code beside the source or in the user's home, and refuses to decorate a function where neither can
 be written to: a read-only package in a container without a home.  Here code is then kept in a folder of the user's own
 among temporary files, and where there is none it is compiled anew by every process.  NUMBA_CACHE_DIR names another.
+
+Processes that start together, as environments of a vector or workers of a dataset do, need the same functions at the
+same moment.  One compiles a function, and the others wait and read what it has kept: to compile the sensor's loop takes
+a processor up to a minute.
 """
 
 from __future__ import annotations
@@ -17,9 +21,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from filelock import FileLock, Timeout
 from numba import config
+from numba.core.compiler_lock import global_compiler_lock
 
 Compiled = TypeVar("Compiled", bound=Callable[..., Any])
+
+LONGEST_WAIT_S = 600.0
+"""For another process that compiles a function: one that has been suspended meanwhile holds up no other for ever."""
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[Compiled], Compiled]:
@@ -48,6 +57,7 @@ def _keep(dispatcher: Any) -> None:
         with _cache_in(folder), suppress(RuntimeError):
             dispatcher.enable_caching()
     _forgive(dispatcher)
+    _take_turns(dispatcher)
 
 
 def _forgive(dispatcher: Any) -> None:
@@ -62,6 +72,33 @@ def _forgive(dispatcher: Any) -> None:
             save(signature, data)
 
     kept.save_overload = save_if_it_can_be
+
+
+def _take_turns(dispatcher: Any) -> None:
+    """Of several processes that need a function one compiles it; numba looks for kept code after its turn has come."""
+    folder = getattr(getattr(dispatcher, "_cache", None), "cache_path", None)
+    if folder is None:
+        return
+    compile_at_once = dispatcher.compile
+    turn = Path(folder) / f"{dispatcher.__module__}.{dispatcher.__qualname__}.lock"
+
+    def compile_in_turn(signature: Any) -> Any:
+        with global_compiler_lock, _alone(turn):  # in this order: a thread that compiles a caller has the first already
+            return compile_at_once(signature)
+
+    dispatcher.compile = compile_in_turn
+
+
+@contextmanager
+def _alone(turn: Path) -> Iterator[None]:
+    """No other process is within, with this file; without a place for the file, or after a long wait, at once."""
+    lock = FileLock(turn)
+    with suppress(OSError, NotImplementedError, Timeout):
+        lock.acquire(timeout=LONGEST_WAIT_S)
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 @lru_cache(maxsize=1)

@@ -1,4 +1,6 @@
-"""Compiled code runs where the package does: read-only, without a home, on a full disk; kept where no other writes."""
+"""Compiled code runs where the package does: read-only, without a home, on a full disk; kept where no other writes.
+
+Of processes that start together one compiles."""
 
 from __future__ import annotations
 
@@ -9,6 +11,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -130,6 +133,40 @@ def test_a_full_disk_loses_the_cache_and_not_the_result(monkeypatch) -> None:
     doubled = compiled.njit(cache=True)(lambda x: 2 * x)
     assert doubled(4) == 8
     assert doubled._cache.cache_path
+
+
+def test_of_processes_that_need_a_function_at_once_one_compiles_it(tmp_path: Path) -> None:
+    turn = tmp_path / "turn"
+    code = f"""
+import sys
+from pathlib import Path
+from spikecam_env import compiled
+alone = compiled._alone
+compiled._alone = lambda path: alone(path.with_name("turn"))  # one file for all, which the test holds at first
+{USES_A_KERNEL.replace("a = np", "print('ready', flush=True); a = np", 1)}
+"""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    running = []
+    with compiled._alone(tmp_path / "turn"):
+        for _ in range(3):
+            running.append(
+                subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True)
+            )
+        for process in running:
+            assert process.stdout is not None and process.stdout.readline() == "ready\n"
+    said = sorted(process.communicate(timeout=120)[0] for process in running)
+    assert said == ["0 from the cache\n", "1 from the cache\n", "1 from the cache\n"]
+
+
+def test_a_process_that_never_ends_its_turn_delays_others_and_no_more(tmp_path: Path, monkeypatch) -> None:
+    from filelock import FileLock
+
+    monkeypatch.setattr(compiled, "LONGEST_WAIT_S", 0.2)
+    began = time.monotonic()
+    with FileLock(tmp_path / "turn"), compiled._alone(tmp_path / "turn"):
+        assert time.monotonic() - began >= 0.2
+    with compiled._alone(tmp_path / "no such folder" / "turn"):
+        pass
 
 
 def test_all_compiled_code_is_decorated_in_one_place() -> None:

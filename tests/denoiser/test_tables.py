@@ -171,7 +171,7 @@ def test_two_processes_find_what_one_does(result: dict) -> None:
 def test_rate_planes_are_judged_beside_spikes() -> None:
     if why := why_not("best", Weights()):
         pytest.skip(why)
-    found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("best", "paper-mus"), shape=(24, 32)))
+    found = evaluate_table("table1", replace(SMALL, seeds=1, rows=("best", "paper-mus"), shape=(16, 24)))
     best, mus = (found["groups"][0]["rows"][row] for row in ("best", "paper-mus"))
     assert best["pictures"]["plane"]["db"] > 10 and "plane" not in mus["pictures"]
     assert len(best["db_by_place"]) > 1 and np.isfinite(best["flicker"])
