@@ -136,7 +136,6 @@ def test_a_full_disk_loses_the_cache_and_not_the_result(monkeypatch) -> None:
 
 
 def test_of_processes_that_need_a_function_at_once_one_compiles_it(tmp_path: Path) -> None:
-    turn = tmp_path / "turn"
     code = f"""
 import sys
 from pathlib import Path
