@@ -37,8 +37,8 @@ class BlindTrial:
 
     out: Path
     """Folder for manifest, sealed keys, results, trial.json and trial.md."""
-    set: Literal["quick", "full", "laws"] = "quick"
-    """Which set of cases: effects by their near laws, few or many; or by near and far ones, strong pairs, triples."""
+    set: Literal["quick", "full", "laws", "small"] = "quick"
+    """Effects by their near laws, few or many; by near and far ones, with pairs and triples; these in small cameras."""
     part: Literal["tune", "report", "verify"] = "tune"
     """Disjoint seeds: one to work on, two to judge by, of other outside mechanisms; `verify` was looked at last."""
     jobs: Workers = 1

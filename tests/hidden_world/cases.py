@@ -4,8 +4,9 @@ Groups: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `severe` (3
 effects, told `ideal`), `outside`, `left_out` (a catalogue effect, its name withheld), `pair` (3 to 10 each), `tricky`,
 `strong_pair` and `triple` (5 to 100 each, of different families).
 
-The sets `quick` and `full` hide effects by their near laws only; `laws` by near and far ones.  No two parts or sets
-share a seed; `tune` shares no outside mechanism with the others.  Of `report` cases have been looked at since, to find
+The sets `quick` and `full` hide effects by their near laws only; `laws` by near and far ones.  `small` is as `laws`, of
+small cameras that are recorded for less long: an eighth of the data, and effects as many limits of that strong.  No two
+parts or sets share a seed; `tune` shares no outside mechanism with the others.  Of `report` cases have been looked at since, to find
 what was wrong; `verify` is as `report`, of seeds that were not.
 """
 
@@ -20,12 +21,12 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
-from tests.hidden_world.mechanism import Hidden, Mechanism, draw, limits
+from tests.hidden_world.mechanism import Hidden, Mechanism, draw, limits, with_less_data
 from tests.hidden_world.outside import OUTSIDE, REPORT, TUNE
 from tests.hidden_world.score import family_of
 from tests.hidden_world.world import MECHANISMS, Recipe, stream
 
-SETS = ("quick", "full", "laws")
+SETS = ("quick", "full", "laws", "small")
 PARTS = ("tune", "report", "verify")
 GROUPS = (
     "none", "strong", "weak", "base", "outside", "left_out", "pair", "tricky", "severe", "strong_pair", "triple",
@@ -95,6 +96,9 @@ MILLION = {
     ("laws", "tune"): 21,
     ("laws", "report"): 22,
     ("laws", "verify"): 23,
+    ("small", "tune"): 31,
+    ("small", "report"): 32,
+    ("small", "verify"): 33,
 }
 """Where the seeds of a set and part begin, in millions; `verify` goes on to others once its cases were looked at,
 or the code has changed."""
@@ -131,6 +135,9 @@ SAME_TO_THE_EYE = (
 SINGLES = {"strong": (3.0, 10.0), "weak": (1.0, 3.0), "severe": (30.0, 100.0)}
 """Groups of one effect, and its strength over the detection limit."""
 
+SMALL = {"shape": (32, 32), "frames": 4000}
+"""A recording of the set `small`: an eighth of the pixel-steps of the others, and less time to diagnose."""
+
 TOGETHER = (5.0, 100.0)
 """Strength of each effect of a strong pair or a triple, over its detection limit; see `_top`."""
 
@@ -138,6 +145,8 @@ TOGETHER = (5.0, 100.0)
 def cases(which: str, part: str) -> list[Case]:
     """All cases of a set and part, group by group."""
     seeds = itertools.count(1_000_000 * MILLION[which, part])
+    if which == "small":
+        return [_smaller(case) for case in _by_laws(part, seeds)]
     return _by_laws(part, seeds) if which == "laws" else _by_near_laws(which, part, seeds)
 
 
@@ -186,6 +195,15 @@ def _case(group: str, what: str, recipe: Recipe, **rest: object) -> Case:
     model = rest.pop("model", recipe.base)
     case = Case("", group, what, recipe, model, **rest)  # type: ignore[arg-type]
     return replace(case, id=hashlib.sha256(json.dumps(asdict(case), sort_keys=True).encode()).hexdigest()[:12])
+
+
+def _smaller(case: Case) -> Case:
+    """The same case in a small camera, its effects as many of that camera's detection limits strong."""
+    recipe = replace(case.recipe, **SMALL)
+    share = recipe.pixel_steps / case.recipe.pixel_steps
+    hidden = tuple(with_less_data(h, share) for h in recipe.hidden)
+    rest = {"model": case.model, "truth": case.truth, "exclude": case.exclude, "accept": case.accept}
+    return _case(case.group, case.what, replace(recipe, hidden=hidden), **rest)
 
 
 def _camera_kind(name: str, rng: np.random.Generator) -> str:

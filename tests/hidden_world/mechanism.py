@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TypeAlias
@@ -99,6 +99,7 @@ class Limit:
     """A mechanism's entry in limits.toml.
 
     most: as far as a camera that anybody uses would go.  poor: what a poor one has, where that is thousands of limits.
+    power: of the strength, that what shows it goes by, in noises: 2 of noise beside other noise, 0.5 of rare events.
     """
 
     parameter: str
@@ -106,10 +107,16 @@ class Limit:
     way: str = "more"
     most: float = field(default=float("inf"))
     poor: float = 0.0
+    power: float = 1.0
 
     def strength(self, times: float) -> float:
         """The parameter at so many times the limit."""
         return self.limit / times if self.way == "less" else min(self.limit * times, self.most)
+
+    def louder(self, share: float) -> float:
+        """Factor on a strength that shows as well in this share of the data: noise falls by the root of the data."""
+        factor = float(share ** (-0.5 / self.power))
+        return 1.0 / factor if self.way == "less" else factor
 
     @property
     def furthest(self) -> float:
@@ -130,6 +137,15 @@ def draw(mechanism: Mechanism, times_limit: float, rng: Rng, law: str = "") -> H
     strength = limit.strength(times_limit) * _sign(mechanism.signs, rng)
     parameters = {limit.parameter: float(strength), **mechanism.drawn(law, rng)}
     return Hidden(mechanism.name, parameters, float(times_limit), law=law)
+
+
+def with_less_data(hidden: Hidden, share: float) -> Hidden:
+    """As many detection limits strong in a share of the data, as far as the mechanism goes."""
+    limit = limits()[hidden.name]
+    strength = hidden.parameters[limit.parameter]
+    most = limit.poor or limit.most
+    louder = float(np.copysign(min(abs(strength) * limit.louder(share), max(most, abs(strength))), strength))
+    return replace(hidden, parameters={**hidden.parameters, limit.parameter: louder})
 
 
 def _sign(signs: tuple[float, ...], rng: Rng) -> float:

@@ -15,6 +15,7 @@ from tests.hidden_world import trial
 from tests.hidden_world.cases import PARTS, SAME_TO_THE_EYE, SETS, Case, _case, cases
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 from tests.hidden_world.keys import BrokenSealError, key_text, open_key, seal
+from tests.hidden_world.mechanism import Hidden, limits, with_less_data
 from tests.hidden_world.outside import REPORT, TUNE
 from tests.hidden_world.record import in_short, pack, unpack
 from tests.hidden_world.score import (
@@ -30,6 +31,7 @@ from tests.hidden_world.trial import as_text, chosen, code, is_done, run_trial, 
 
 FULL = {part: cases("full", part) for part in PARTS}
 LAWS = {part: cases("laws", part) for part in PARTS}
+SMALL = {part: cases("small", part) for part in PARTS}
 TITLE = {"set": "full", "part": "tune"}
 
 
@@ -112,6 +114,22 @@ def test_strong_effects_together_are_many_and_of_different_families(group, size,
         assert all(5 <= times <= (100 if name not in events else 1e5) for name, times in strengths.items())
         far = [bool(h.law) for c in picked for h in c.recipe.hidden]
         assert 0.25 < sum(far) / len(far) < 0.75
+
+
+def test_small_cameras_have_an_eighth_of_the_data_and_effects_as_many_of_their_limits_strong():
+    """Noise goes down by the root of the data: of rare events the limit rises eightfold, of noise by a fourth root."""
+    wanted = {"dead_time": 8**0.5, "row_temporal_noise": 8**0.25, "missed_spikes": 8.0}
+    for name, louder in wanted.items():
+        limit = limits()[name]
+        hidden = Hidden(name, {limit.parameter: limit.strength(2.0), "other": 1.0}, 2.0)
+        stronger = with_less_data(hidden, 1 / 8)
+        assert stronger.parameters[limit.parameter] == pytest.approx(louder * limit.strength(2.0))
+        assert stronger.parameters["other"] == 1.0 and stronger.times_limit == 2.0
+    worst = Hidden("vignetting", {"falloff": -limits()["vignetting"].most}, 20.0)
+    assert with_less_data(worst, 1 / 8) == worst
+    for case in SMALL["verify"]:
+        assert (case.recipe.shape, case.recipe.frames) == ((32, 32), 4000)
+    assert [c.group for c in SMALL["verify"]] == [c.group for c in LAWS["verify"]]
 
 
 def test_another_case_of_the_same_seed_has_another_id():

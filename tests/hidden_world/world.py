@@ -38,6 +38,11 @@ class Recipe:
     shape: tuple[int, int] = (64, 64)
     frames: int = 8000
 
+    @property
+    def pixel_steps(self) -> int:
+        """Pixels times frames of one recording."""
+        return self.frames * self.shape[0] * self.shape[1]
+
 
 def stream(seed: int, *names: object) -> np.random.Generator:
     """A generator for each purpose, so that what is drawn for one changes nothing for another."""
