@@ -6,8 +6,8 @@ effects, told `ideal`), `outside`, `left_out` (a catalogue effect, its name with
 
 The sets `quick` and `full` hide effects by their near laws only; `laws` by near and far ones.  `small` is as `laws`, of
 small cameras that are recorded for less long: an eighth of the data, and effects as many limits of that strong.  No two
-parts or sets share a seed; `tune` shares no outside mechanism with the others.  Of `report` cases have been looked at since, to find
-what was wrong; `verify` is as `report`, of seeds that were not.
+parts or sets share a seed; `tune` shares no outside mechanism with the others.  Of `report` cases have been looked at
+since, to find what was wrong; `verify` is as `report`, of seeds that were not.
 """
 
 from __future__ import annotations
