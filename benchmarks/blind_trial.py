@@ -94,14 +94,27 @@ class BlindTrial:
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
 
 
-def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str], threads: int) -> dict[str, Any]:
+def raced(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str], threads: int) -> dict[str, Any]:
+    """As `diagnosed`, by `--search race`."""
+    return diagnosed(campaign, model, out, seed, exclude, threads, search="race")
+
+
+def diagnosed(
+    campaign: Path,
+    model: str,
+    out: Path,
+    seed: int,
+    exclude: Sequence[str],
+    threads: int,
+    search: str = "forward",
+) -> dict[str, Any]:
     """`spikecam diagnose` as a trial wants it, its report included."""
     try:
         from spikecam_env.gap.diagnose import diagnose
         from spikecam_env.gap.report.page import write_report
     except ImportError as error:
         raise ImportError(f"this checkout has no spikecam_env.gap.diagnose to be tried ({error})") from error
-    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, progress=False)
+    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, search=search, progress=False)
     found.write(out)
     write_report(found, out / "report.html")
     written: dict[str, Any] = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
