@@ -41,6 +41,7 @@ def test_hosted_ci_runs_every_python_that_is_declared_and_no_other() -> None:
     declared = [c.rpartition(" ")[2] for c in PROJECT["classifiers"] if re.search(r"Python :: 3\.", c)]
     assert tried == declared and PROJECT["requires-python"] == f">={declared[0]}"
     assert (ROOT / ".ci" / "run").is_file() and "run: .ci/run" in text_of(".github/workflows/ci.yml")
+    assert "run: make test-oldest" in text_of(".github/workflows/ci.yml")
 
 
 def test_the_changelog_lists_every_format_with_the_module_that_names_it() -> None:
