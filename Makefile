@@ -28,8 +28,11 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 demo: install
 	$(BIN)/spikecam demo
 
+# Which renderer works is tried once: each of the many processes that draw would try it for itself.
+CHOSEN = $(BIN)/python -c "from scenes.renderers.choose import chosen; print(chosen())"
+
 test: install-dev
-	$(BIN)/python -m pytest $(SHARED_OUT)
+	SPIKECAM_RENDERER=$${SPIKECAM_RENDERER:-$$($(CHOSEN))} $(BIN)/python -m pytest $(SHARED_OUT)
 
 # The oldest releases that pyproject.toml allows (constraints-oldest.txt), in an environment of their own, without the
 # slow tests; numba's compiled code of one release is no use to another, so it goes to a folder of its own too.

@@ -102,9 +102,9 @@ def simulated(n: Null, change: np.ndarray, seed: int, own: float = 0.7) -> Predi
 
 def test_two_laws_that_do_the_same_are_rivals_though_twins_differ():
     """What twins of the second happen to do is no part of its law: taken for it, every lead above TIE would tell.
-    At 1 % doubt four of 400 are missed, and some more because twins also scatter further than CLEAR."""
+    At 1 % doubt two of 200 are missed, and some more because twins also scatter further than CLEAR."""
     missed = leads = 0
-    for seed in range(400):
+    for seed in range(200):
         n = null(seed)
         change = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
         one, other = (simulated(n, change, seed=1000 * i + seed) for i in (1, 2))
@@ -112,5 +112,5 @@ def test_two_laws_that_do_the_same_are_rivals_though_twins_differ():
         if lead(n, measured, one, other) > TIE:
             leads += 1
             missed += not is_rival(n, n.draws, measured, one, other)
-    print(f"{missed} missed of {leads} that lead, of 400")
-    assert leads > 40 and missed <= 12
+    print(f"{missed} missed of {leads} that lead, of 200")
+    assert leads > 20 and missed <= 6
