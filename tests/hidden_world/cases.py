@@ -135,7 +135,7 @@ SAME_TO_THE_EYE = (
 SINGLES = {"strong": (3.0, 10.0), "weak": (1.0, 3.0), "severe": (30.0, 100.0)}
 """Groups of one effect, and its strength over the detection limit."""
 
-SMALL = {"shape": (32, 32), "frames": 4000}
+SMALL_SHAPE, SMALL_FRAMES = (32, 32), 4000
 """A recording of the set `small`: an eighth of the pixel-steps of the others, and less time to diagnose."""
 
 TOGETHER = (5.0, 100.0)
@@ -199,7 +199,7 @@ def _case(group: str, what: str, recipe: Recipe, **rest: object) -> Case:
 
 def _smaller(case: Case) -> Case:
     """The same case in a small camera, its effects as many of that camera's detection limits strong."""
-    recipe = replace(case.recipe, **SMALL)
+    recipe = replace(case.recipe, shape=SMALL_SHAPE, frames=SMALL_FRAMES)
     share = recipe.pixel_steps / case.recipe.pixel_steps
     hidden = tuple(with_less_data(h, share) for h in recipe.hidden)
     rest = {"model": case.model, "truth": case.truth, "exclude": case.exclude, "accept": case.accept}
