@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -94,11 +95,6 @@ class BlindTrial:
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
 
 
-def raced(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str], threads: int) -> dict[str, Any]:
-    """As `diagnosed`, by `--search race`."""
-    return diagnosed(campaign, model, out, seed, exclude, threads, search="race")
-
-
 def diagnosed(
     campaign: Path,
     model: str,
@@ -119,6 +115,10 @@ def diagnosed(
     write_report(found, out / "report.html")
     written: dict[str, Any] = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     return written
+
+
+raced = partial(diagnosed, search="race")
+"""As `diagnosed`, by the race."""
 
 
 def run(args: list[str] | None = None) -> int:

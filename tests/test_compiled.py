@@ -136,17 +136,17 @@ def test_a_full_disk_loses_the_cache_and_not_the_result(monkeypatch) -> None:
 
 
 def test_of_processes_that_need_a_function_at_once_one_compiles_it(tmp_path: Path) -> None:
+    turn = tmp_path / "turn"
     code = f"""
-import sys
 from pathlib import Path
 from spikecam_env import compiled
 alone = compiled._alone
-compiled._alone = lambda path: alone(path.with_name("turn"))  # one file for all, which the test holds at first
+compiled._alone = lambda path: alone(Path({str(turn)!r}))  # one file for all, which the test holds at first
 {USES_A_KERNEL.replace("a = np", "print('ready', flush=True); a = np", 1)}
 """
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     running = []
-    with compiled._alone(tmp_path / "turn"):
+    with compiled._alone(turn):
         for _ in range(3):
             running.append(
                 subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True)

@@ -193,8 +193,13 @@ def _by_near_laws(which: str, part: str, seeds: Iterator[int]) -> list[Case]:
 
 def _case(group: str, what: str, recipe: Recipe, **rest: object) -> Case:
     model = rest.pop("model", recipe.base)
-    case = Case("", group, what, recipe, model, **rest)  # type: ignore[arg-type]
-    return replace(case, id=hashlib.sha256(json.dumps(asdict(case), sort_keys=True).encode()).hexdigest()[:12])
+    return _with_id(Case("", group, what, recipe, model, **rest))  # type: ignore[arg-type]
+
+
+def _with_id(case: Case) -> Case:
+    """The case with the id of all that it is."""
+    content = json.dumps(asdict(replace(case, id="")), sort_keys=True)
+    return replace(case, id=hashlib.sha256(content.encode()).hexdigest()[:12])
 
 
 def _smaller(case: Case) -> Case:
@@ -202,8 +207,7 @@ def _smaller(case: Case) -> Case:
     recipe = replace(case.recipe, shape=SMALL_SHAPE, frames=SMALL_FRAMES)
     share = recipe.pixel_steps / case.recipe.pixel_steps
     hidden = tuple(with_less_data(h, share) for h in recipe.hidden)
-    rest = {"model": case.model, "truth": case.truth, "exclude": case.exclude, "accept": case.accept}
-    return _case(case.group, case.what, replace(recipe, hidden=hidden), **rest)
+    return _with_id(replace(case, recipe=replace(recipe, hidden=hidden)))
 
 
 def _camera_kind(name: str, rng: np.random.Generator) -> str:

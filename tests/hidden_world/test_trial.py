@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks.blind_trial import BlindTrial, run
 from spikecam_env.errors import InputError
+from spikecam_env.gap.candidates.table import candidate
 from tests.hidden_world import trial
 from tests.hidden_world.cases import PARTS, SAME_TO_THE_EYE, SETS, Case, _case, cases
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
@@ -130,6 +131,12 @@ def test_small_cameras_have_an_eighth_of_the_data_and_effects_as_many_of_their_l
     for case in SMALL["verify"]:
         assert (case.recipe.shape, case.recipe.frames) == ((32, 32), 4000)
     assert [c.group for c in SMALL["verify"]] == [c.group for c in LAWS["verify"]]
+
+
+def test_what_shows_an_effect_goes_by_the_power_of_its_strength_that_the_diagnosis_takes():
+    """But of pixels: how many are hot or dead is counted, though the diagnosis draws units to see what they show."""
+    for name in set(CATALOGUE) - {"hot_pixels", "dead_pixels"}:
+        assert limits()[name].power == candidate(name).power, name
 
 
 def test_another_case_of_the_same_seed_has_another_id():
