@@ -451,6 +451,23 @@ def test_unusable_options_end_in_one_line_and_code_2(words, said, tmp_path, caps
     assert not (tmp_path / "trial").exists()
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("benchmarks.blind_trial:nothing", "benchmarks.blind_trial has no 'nothing'"),
+        ("benchmarks.blind_trial", "benchmarks.blind_trial has no ''"),
+        ("benchmarks.nothing:diagnosed", "No module named 'benchmarks.nothing'"),
+    ],
+)
+def test_a_function_to_try_that_is_not_there_is_an_error_and_no_wrong_answer(name, said, tmp_path, monkeypatch, capsys):
+    picked = [small(case_of("none"))]
+    monkeypatch.setattr(trial, "chosen", lambda *_: picked)
+    monkeypatch.setattr(trial, "cases", lambda *_: picked)
+    assert run(["--diagnose", name, "--out", str(tmp_path)]) == 2
+    assert f"spikecam: {said}\n" in capsys.readouterr().err
+    assert not list((tmp_path / "results").iterdir())
+
+
 def test_command_prints_the_figures(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(trial, "chosen", lambda *a: [small(c) for c in chosen(*a)])
     said = "tests.hidden_world.bench:says_dead_time"

@@ -139,7 +139,10 @@ def code() -> str:
 
 def _named(name: str) -> Diagnose:
     module, _, attribute = name.partition(":")
-    return getattr(importlib.import_module(module), attribute)
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except AttributeError as error:
+        raise ImportError(f"{module} has no {attribute!r}") from error
 
 
 def score_trial(out: Path, picked: Sequence[Case]) -> dict[str, Any]:
