@@ -8,7 +8,9 @@ pixel's mean times what its level does in that block (`common_mode`): lamp drift
 dark-current drift in all by their dark level, so neither is motion.  A single pixel counts three standard deviations at
 most, so a hot pixel is none either.  k is by how much neighbours of a level scatter about each other beyond that law
 (`excess`): single events, false or missed spikes and telegraph noise, are each pixel's own; what moves, neighbours
-share.  Rows are no regions: windows are as high as wide, and even, in which what alternates from row to row cancels.
+share.  Events that pixels of a row share, as a glitch of the read-out is, make rows scatter more from block to block
+than columns, which motion does not, and windows with them (`shared_variance`).  Rows are no regions: windows are as
+high as wide, and even, in which what alternates from row to row cancels.
 
 Blind to: what changes in all pixels of a level by the same share, regions smaller than the least of SIDES, and contrast
 below `least_contrast`, which local effects of a camera reach; slow noise of single pixels (1/f) is below it in the mean
@@ -213,18 +215,26 @@ def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask, limits: B
     tests = sum((len(counts) // span) * len(_starts(shape[0], h)) * len(_starts(shape[1], w))
                 for span in spans for h, w in sizes)  # fmt: skip
     least_z = least_deviate(tests, limits)
-    for span in spans:
-        firsts = range(0, len(counts) - span + 1, span)
-        hoped = np.stack([expected[first : first + span].sum(axis=0) for first in firsts])
-        off = np.stack([counts[first : first + span].sum(axis=0) for first in firsts]) - hoped
-        sd = np.sqrt(expected_variance(hoped))
-        deviates = without_bias(np.clip(off / sd, -MOST_OF_A_PIXEL, MOST_OF_A_PIXEL), groups)
-        scatter = excess(deviates.reshape(-1, *shape), kept, groups)
-        for i, first in enumerate(firsts):
-            parts = (off[i], deviates[i] * sd[i], scatter * sd[i] ** 2, hoped[i])
-            planes = [np.where(kept, a.reshape(shape), 0.0) for a in parts]
-            for size in sizes:
-                yield from beyond(planes, size, (first, first + span), least_z, limits)
+    planes = {span: _deviations(counts, expected, span, kept, groups) for span in {1, *spans}}
+    for size in sizes:
+        shared = shared_variance(planes[1], size[1])
+        for span in spans:
+            yield from beyond(planes[span], size, span, shared * span, least_z, limits)
+
+
+def _deviations(
+    counts: Array, expected: Array, span: int, kept: Mask, groups: list[NDArray[np.intp]]
+) -> tuple[Array, ...]:
+    """(n, H, W) of n parts of the time of `span` blocks: spikes off, off as far as a pixel counts, their variance, and
+    spikes expected; 0 where not `kept`."""
+    firsts = range(0, len(counts) - span + 1, span)
+    hoped = np.stack([expected[first : first + span].sum(axis=0) for first in firsts])
+    off = np.stack([counts[first : first + span].sum(axis=0) for first in firsts]) - hoped
+    sd = np.sqrt(expected_variance(hoped))
+    deviates = without_bias(np.clip(off / sd, -MOST_OF_A_PIXEL, MOST_OF_A_PIXEL), groups)
+    scatter = excess(deviates.reshape(-1, *kept.shape), kept, groups)
+    parts = (off, deviates * sd, scatter * sd**2, hoped)
+    return tuple(np.where(kept, part.reshape(-1, *kept.shape), 0.0) for part in parts)
 
 
 def least_deviate(tests: int, limits: Baseline) -> float:
@@ -233,17 +243,47 @@ def least_deviate(tests: int, limits: Baseline) -> float:
 
 
 def beyond(
-    planes: list[Array], size: tuple[int, int], blocks: tuple[int, int], least_z: float, limits: Baseline
+    planes: tuple[Array, ...], size: tuple[int, int], span: int, shared: float, least_z: float, limits: Baseline
 ) -> Iterator[_Window]:
-    """Windows of one size in one part of the time.  planes: (H, W) off, off as far as a pixel counts, variance,
-    expected."""
-    rows, columns = (_starts(n, s) for n, s in zip(planes[0].shape, size, strict=True))
+    """Windows of one size in parts of the time of `span` blocks.  planes: `_deviations`.  shared: variance of a pixel's
+    count that is of events which pixels of a row share, times those that share one.
+
+    Few events that pixels share are no normal deviates.  Their chance is bounded by Bernstein's inequality,
+    exp(-d^2 / (2 v + 2 m d / 3)) of a deviation d in steps of m spikes; m is by how much they multiply the variance.
+    """
+    rows, columns = (_starts(n, side) for n, side in zip(planes[0].shape[1:], size, strict=True))
     off, capped, variance, expected = (_window_sums(plane, rows, columns, size) for plane in planes)
-    z = capped / np.sqrt(np.maximum(variance, 1e-9))
+    own = float(planes[2].sum()) / max(np.count_nonzero(planes[2]), 1)
+    times = 1.0 + shared / max(own, 1e-9)
+    z = capped / np.sqrt(np.maximum(times * variance + (times - 1.0) * np.abs(capped) / 3.0, 1e-9))
     contrast = off / np.maximum(expected, 1e-9)
     enough = np.maximum(expected, expected + off) >= limits.least_counts
-    for i, j in np.argwhere(enough & (np.abs(z) > least_z) & (np.abs(contrast) > limits.least_contrast)):
-        yield _Window(int(rows[i]), int(columns[j]), *size, blocks, float(z[i, j]), float(contrast[i, j]))
+    for k, i, j in np.argwhere(enough & (np.abs(z) > least_z) & (np.abs(contrast) > limits.least_contrast)):
+        blocks = (int(k) * span, (int(k) + 1) * span)
+        yield _Window(int(rows[i]), int(columns[j]), *size, blocks, float(z[k, i, j]), float(contrast[k, i, j]))
+
+
+def shared_variance(planes: tuple[Array, ...], width: int) -> float:
+    """Variance of a pixel's count in a block, beside its own, in windows of a width [pixels]: of events that pixels of
+    a row share, times those that share one, `width` at most.
+
+    From block to block, parts of rows scatter more by it than parts of columns; what moves is shared along both, or
+    slow.  planes: `_deviations` of single blocks.
+    """
+    along_rows, along_columns = (_scatter_of_strips(planes, (1, width)[::turn]) for turn in (1, -1))
+    own = float(planes[2].sum()) / max(np.count_nonzero(planes[2]), 1)
+    return float(np.clip(along_rows - along_columns, 0.0, width - 1.0)) * own
+
+
+def _scatter_of_strips(planes: tuple[Array, ...], size: tuple[int, int]) -> float:
+    """Variance of strips of a size, from block to block, over that of their pixels."""
+    _, capped, variance, _ = planes
+    places = [np.arange(n - side + 1) for n, side in zip(capped.shape[1:], size, strict=True)]
+    if not all(p.size for p in places):
+        return 1.0
+    steps, own = (_window_sums(plane, places[0], places[1], size) for plane in (np.diff(capped, axis=0), variance))
+    blocks = len(capped)
+    return float(np.mean(steps**2) / 2.0 * (1.0 - 1.0 / blocks) / max(float(np.mean(own)), 1e-9))
 
 
 def _starts(length: int, side: int) -> NDArray[np.int64]:
@@ -251,12 +291,11 @@ def _starts(length: int, side: int) -> NDArray[np.int64]:
     return np.unique(np.append(np.arange(0, length - side + 1, max(side // 2, 1)), length - side))
 
 
-def _window_sums(plane: Array, rows: NDArray[np.int64], columns: NDArray[np.int64], size: tuple[int, int]) -> Array:
-    """(rows, columns) sums of a plane (H, W) over windows."""
-    total = np.pad(plane.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-    top, bottom, left, right = rows, rows + size[0], columns, columns + size[1]
-    to_the_right = total[np.ix_(bottom, right)] - total[np.ix_(top, right)]
-    return np.asarray(to_the_right - total[np.ix_(bottom, left)] + total[np.ix_(top, left)])
+def _window_sums(planes: Array, rows: NDArray[np.int64], columns: NDArray[np.int64], size: tuple[int, int]) -> Array:
+    """(n, rows, columns) sums of planes (n, H, W) over windows."""
+    total = np.pad(planes.cumsum(axis=1).cumsum(axis=2), ((0, 0), (1, 0), (1, 0)))
+    strips = total[:, rows + size[0]] - total[:, rows]
+    return np.asarray(strips[..., columns + size[1]] - strips[..., columns])
 
 
 def _union(windows: list[_Window], shape: tuple[int, int]) -> Mask:

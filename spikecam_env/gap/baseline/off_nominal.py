@@ -49,7 +49,7 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
         else:
             ratios["shot_noise"] = (shot + reset) / max(base.white, 1e-12)
         base = replace(base, white=shot + reset)
-    level = float(np.median(base.dark[live])) / max(float(np.median(unit.dark)), 1e-12)
+    level = level_off(base.dark[live], unit.dark)
     if "dark_current" in has and unusual(level, usual_unit.usual):
         ratios["dark_current"] = level
     for what, usual in (("gain", 1.0), ("dark", level)):
@@ -63,6 +63,16 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
         base = replace(base, dark=base.dark / level)
     rows = {n: {"measured": has[n] * r, "nominal": has[n], "ratio": r} for n, r in ratios.items() if n in has}
     return OffNominal(rows, base)
+
+
+def level_off(values: Array, nominal: Array) -> float:
+    """Ratio of two levels over pixels: of their medians or of their means, whichever is nearer to 1; 1 between both.
+
+    Two distributions of another form, as of dark currents with a tail, differ by one of these and are of one level.
+    """
+    ratios = [float(of(values)) / max(float(of(nominal)), 1e-12) for of in (np.median, np.mean)]
+    low, high = min(ratios), max(ratios)
+    return low if low > 1.0 else min(high, 1.0)
 
 
 def narrowed(values: Array, live: NDArray[np.bool_], factor: float) -> Array:

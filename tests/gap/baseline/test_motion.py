@@ -61,6 +61,39 @@ def test_events_of_single_pixels_are_no_motion(name: str, parameters: dict[str, 
     assert [looked_at(model, flat, FRAMES, seed) for seed in range(4)] == [None] * 4
 
 
+def glitched(spikes: np.ndarray, probability: float, length: int, seed: int) -> np.ndarray:
+    """Spikes (T, H, W) with words of a row, side by side, that read all ones."""
+    rng = np.random.default_rng(seed)
+    frames, rows, columns = spikes.shape
+    count = rng.poisson(probability * spikes.size / length)
+    at = rng.integers(0, frames, count), rng.integers(0, rows, count)
+    first = rng.integers(0, columns - length + 1, count)
+    out = spikes.copy()
+    for k in range(length):
+        out[(*at, first + k)] = True
+    return out
+
+
+@pytest.mark.parametrize("length", [4, 8, 16, 64])
+@pytest.mark.parametrize("level", [0.01, 0.125])
+def test_events_that_pixels_of_a_row_share_are_no_motion(length: int, level: float) -> None:
+    flat = np.full(SHAPE, level, np.float32)
+    for seed in range(3):
+        spikes = SpikeSensor(SCSIM, SHAPE, seed).step(flat, FRAMES)
+        seen = observe(pack_frames(glitched(spikes, 2e-3, length, seed)), SHAPE)
+        assert find_motion(Condition("scene", "unknown", np.nan, None, FRAMES, "fit"), seen) is None
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_stripes_that_move_are_found_along_rows_and_along_columns(turned: bool) -> None:
+    """Stripes along rows scatter these as glitches do, but by far more than `width` pixels that share them."""
+    times = np.arange(0, FRAMES + 16, 16)
+    row, column = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    along = (column if turned else row) - 0.01 * times[:, None, None]
+    light = (0.15 * (1 + 0.5 * np.sin(2 * np.pi * along / 12))).astype(np.float32)
+    assert looked_at(SCSIM, Keyframes(times.astype(np.float64), light), FRAMES, 0) is not None
+
+
 def test_a_square_is_found_where_and_when_it_is() -> None:
     """8 x 8 pixels of + 20 %: a block of 32 frames has 4.8 + 0.8 (of the mean, which has a quarter of it) spikes of
     variance at most 0.35, so z is 8 x 0.8 / 0.6 = 10.  Windows of 16 pixels reach 16 beyond, blocks one block."""

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from small import MODEL, effect, recorded
 
 from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
+from spikecam_env.gap.settings import UnitSettings
 from spikecam_env.gap.twins.fresh_units import width
 from spikecam_env.gap.unit.conversion import exact_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
@@ -43,6 +47,16 @@ def test_a_strength_that_is_off_is_measured_in_its_own_unit(other):
         assert row["measured"] == pytest.approx(other.parameters()[type(other).strength], rel=0.1)
     patched = next(e for e in with_strengths(MODEL, off).effects if e.name == name)
     assert patched.parameters()[type(patched).strength] == row["measured"]
+
+
+@pytest.mark.parametrize(("level", "off"), [(1.0, False), (0.5, True), (1.5, False), (5.0, True)])
+def test_dark_levels_of_another_distribution_are_off_if_their_middle_and_their_mean_are(level, off):
+    """Gamma of a unit's mean and 1.5 of it in standard deviation: its median is two fifths of its mean."""
+    unit = base_of()
+    dark = np.random.default_rng(0).gamma(1 / 2.25, 2.25 * level * unit.dark.mean(), unit.dark.size)
+    assert np.median(dark) < np.median(unit.dark) * level / UnitSettings().usual
+    found = off_nominal(recorded(), MODEL, replace(unit, dark=dark)).parameters
+    assert ("dark_current" in found) == off
 
 
 def test_less_noise_than_shot_noise_is_more_electrons():
