@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -102,7 +101,6 @@ def diagnosed(
     seed: int,
     exclude: Sequence[str],
     threads: int,
-    search: str = "forward",
 ) -> dict[str, Any]:
     """`spikecam diagnose` as a trial wants it, its report included."""
     try:
@@ -110,15 +108,11 @@ def diagnosed(
         from spikecam_env.gap.report.page import write_report
     except ImportError as error:
         raise ImportError(f"this checkout has no spikecam_env.gap.diagnose to be tried ({error})") from error
-    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, search=search, progress=False)
+    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, progress=False)
     found.write(out)
     write_report(found, out / "report.html")
     written: dict[str, Any] = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     return written
-
-
-raced = partial(diagnosed, search="race")
-"""As `diagnosed`, by the race."""
 
 
 def run(args: list[str] | None = None) -> int:

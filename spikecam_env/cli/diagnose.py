@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -43,8 +43,6 @@ class Diagnose:
     """Budget: how often the campaign may be simulated before optional steps are skipped; inf for no limit."""
     static_only: bool = False
     """In unknown scenes with motion, use only the pixels in which nothing moves."""
-    search: Literal["forward", "race"] = "forward"
-    """How effects are looked for: one after another, or as a race over sets of them, which is experimental."""
     settings: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Tuned numbers other than the defaults, a TOML file of lines such as `deviance.tie = 8.0`; all of them stand in
     docs/reference/diagnosis_settings.md."""
@@ -77,7 +75,6 @@ class Diagnose:
                 jobs=self.jobs,
                 effort=self.effort,
                 static_only=self.static_only,
-                search=self.search,
                 settings=settings,
                 progress=True,
             )

@@ -17,7 +17,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import InputError
 from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
 from spikecam_env.gap.baseline.label_audit import audit, upheld
@@ -33,7 +33,6 @@ from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
-from spikecam_env.gap.race.race import race
 from spikecam_env.gap.report.evidence import evidence_for
 from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
@@ -52,9 +51,6 @@ from spikecam_env.gap.verdict.verdict import conclude, with_stand_ins
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.own_effects import files_of
 
-SEARCHES = {"forward": forward_selection, "race": race}
-"""Searches by name: (problem, names of candidates, templates) -> rounds."""
-
 
 @sums_in_one_order
 def diagnose(
@@ -69,7 +65,6 @@ def diagnose(
     twin_count: int = 12,
     templates: Templates | None = None,
     static_only: bool = False,
-    search: str = "forward",
     settings: DiagnosisSettings | None = None,
     progress: bool = True,
 ) -> Diagnosis:
@@ -86,7 +81,6 @@ def diagnose(
         twin_count: simulations of the campaign under the model.
         templates: of the candidates; default those that ship, others are simulated.
         static_only: whether to use only the static pixels of unknown scenes that move.
-        search: `forward`, or `race`, which is experimental.
         settings: the tuned numbers; default `DiagnosisSettings()`.
         progress: whether to name each stage as it begins.
 
@@ -104,8 +98,6 @@ def diagnose(
         >>> diagnosis.sentence
         'No gap: these recordings and the model scsim agree to within the noise.'
     """
-    if search not in SEARCHES:
-        raise unknown_name("search", search, SEARCHES)
     if not effort > 0:
         raise InputError(f"effort {effort:g}: it must be above 0")
     settings = checked_settings(settings)
@@ -115,7 +107,7 @@ def diagnose(
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
-        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only, search, settings)
+        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only, settings)
         found = of_spikes(measured, tested, asked, templates, stages)
     else:
         with stages.timed("maps"):
@@ -150,7 +142,6 @@ def diagnose(
         motion=found.motion,
         static_only=static_only,
         remainder=conclusion.remainder,
-        search=search,
         settings=settings.changed(),
     )
 
@@ -178,7 +169,6 @@ class Asked:
     effort: float
     twin_count: int
     static_only: bool = False
-    search: str = "forward"
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
 
@@ -203,7 +193,7 @@ def of_spikes(
             templates = templates or templates_for(comparison, stages.progress)
         with stages.timed("candidates"):
             problem = Problem.of(case, comparison.model, null, values)
-            rounds = SEARCHES[asked.search](problem, comparison.names, templates)
+            rounds = forward_selection(problem, comparison.names, templates)
             rounds = with_stand_ins(case, null, values, rounds)
     with stages.timed("verdict"):
         conclusion = conclude(comparison, rounds, floor_of_halves(case, measured.recordings, null))

@@ -262,7 +262,6 @@ class Diagnosis:
         motion: of recordings that are labelled static.
         static_only: whether moving pixels were left out.
         remainder: for verdict `named`, the difference beyond chance that remains; None where nothing does.
-        search: `forward` or `race`.
         settings: those that differ from the defaults, by "stage.name".
 
     Example:
@@ -302,7 +301,6 @@ class Diagnosis:
     motion: tuple[Motion, ...] = ()
     static_only: bool = False
     remainder: Remainder | None = None
-    search: str = "forward"
     settings: dict[str, Any] = field(default_factory=dict)
 
     @property

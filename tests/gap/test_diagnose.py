@@ -188,7 +188,6 @@ def test_what_was_simulated_is_counted(only, nothing):
     assert not any("Skipped" in note for note in only.data), "the default is enough for one effect"
     assert "--effort" not in command_of(only)
     assert command_of(replace(only, effort=5.0)).endswith("--effort 5")
-    assert command_of(replace(only, search="race")).endswith("--search race")
 
 
 def test_labels_in_another_unit_change_no_bound_and_the_page_says_so(clean, nothing, tmp_path):

@@ -61,8 +61,6 @@ def command_of(d: Diagnosis) -> str:
         words.append(f"--effort {d.effort:g}")
     if d.static_only:
         words.append("--static-only")
-    if d.search != "forward":
-        words.append(f"--search {d.search}")
     if d.settings:
         words.append("--settings FILE")
     return " ".join(words)
