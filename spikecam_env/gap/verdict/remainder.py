@@ -65,6 +65,11 @@ def is_left(null: Null, values: Array, predicted: Prediction) -> NDArray[np.bool
     return np.asarray(p < null.settings.judging.gate)
 
 
+def squares_left(null: Null, values: Array, predicted: Prediction) -> float:
+    """Sum of squares, in the null model's noise, of the measured statistics (S,) that a prediction leaves off."""
+    return float(np.sum(in_noise(null, values, predicted.mean)[is_left(null, values, predicted)] ** 2))
+
+
 def sums_by_place(keys: Sequence[Key], squares: Array) -> Array:
     """(S,) sum of (S,) squares over the same group of statistics of the same recording."""
     places = [(k.group, k.recording) for k in keys]

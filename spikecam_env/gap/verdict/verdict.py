@@ -25,7 +25,7 @@ from spikecam_env.gap.verdict.gap import gap_of, usable_floor
 from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, patched_model
 from spikecam_env.gap.verdict.notes import notes_of
 from spikecam_env.gap.verdict.ranking import ranking
-from spikecam_env.gap.verdict.remainder import explains, remainder_of
+from spikecam_env.gap.verdict.remainder import explains, remainder_of, squares_left
 from spikecam_env.gap.verdict.structure import structure
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel
@@ -145,17 +145,22 @@ def second_left_out(case: Case) -> bool:
 
 
 def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
-    """The rounds up to the last that explains the data; what was added after it is no better.
+    """The rounds up to the one that is named: the last that explains the data and takes most of what the one before it
+    leaves.  What takes less stands for details of that one's law.
 
     If none explains the data, they end where the held-out gap is smallest: an empirical patch has to be of use in
     recordings that took no part."""
     *before, last = rounds
     explaining = [r for r in rounds[1:] if explains(null, values, r.prediction)]
-    if explaining and explaining[-1] is last:
-        return list(rounds)
-    gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
-    end = explaining[-1] if explaining else rounds[int(np.argmin(gaps))]
-    return [*before, replace(end, fits=())]
+    if explaining:
+        end, little = explaining[0], 1.0 - null.settings.searching.worth
+        for later in explaining[1:]:
+            if squares_left(null, values, later.prediction) <= little * squares_left(null, values, end.prediction):
+                end = later
+    else:
+        gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
+        end = rounds[int(np.argmin(gaps))]
+    return list(rounds) if explaining and end is last else [*before, replace(end, fits=())]
 
 
 def named(

@@ -25,6 +25,7 @@ from spikecam_env.gap.settings import PER_PARAMETER, Deviance, DiagnosisSettings
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.gap.verdict.remainder import explains, squares_left
 from spikecam_env.gap.verdict.verdict import with_stand_ins
 
 DEVIANCE = Deviance()
@@ -384,6 +385,27 @@ def test_rounds_end_with_the_last_that_explains(spoils: bool):
     end = Round(two, unit(), second.prediction, second.rho, second.misfit)
     after = with_stand_ins(case, n, values, [start, middle, end])
     assert len(after) == 3 and after[-1].model is (one if spoils else two)
+
+
+@pytest.mark.parametrize(("takes", "named"), [(0.1, False), (0.2, False), (0.4, True), (1.0, True)])
+def test_beside_a_remainder_an_effect_is_named_that_takes_most_of_it(takes: float, named: bool):
+    """A law that differs in details leaves most of what it changed in few statistics, of which others take a share:
+    half of a sum of squares is 0.29 of what is left of each."""
+    n, change, values, seen = campaign()
+    values, details = values + 15.0 * change, np.where(np.arange(COUNT) < 3, 0.6, 0.0)
+    seen = np.where(FIT, values, np.nan)
+    case = SimpleNamespace(held_out=lambda keys: ~FIT, conditions=())
+    one, two = MODEL.with_effect(DEAD_TIME), MODEL.with_effect(DEAD_TIME).with_effect(effect("optical_blur"))
+    first, second = (
+        a_fit(n, name, (1.0 - left * details) * (values - n.mean), seen)
+        for name, left in (("dead_time", 1.0), ("optical_blur", 1.0 - takes))
+    )
+    assert explains(n, values, first.prediction) and squares_left(n, values, first.prediction) > 0.0
+    start = Round(MODEL, unit(), n.prediction, change, 800.0, (first,))
+    middle = Round(one, unit(), first.prediction, first.rho, first.misfit, (second,))
+    end = Round(two, unit(), second.prediction, second.rho, second.misfit)
+    after = with_stand_ins(case, n, values, [start, middle, end])
+    assert after[-1].model is (two if named else one)
 
 
 @pytest.mark.parametrize("keeps", [True, False])
