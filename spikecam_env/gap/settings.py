@@ -383,7 +383,8 @@ class Searching:
         0.5,
         "of what the best removes",
         "What removes less is not worth another fit: a start, a shape, a runner-up of an earlier effect; nor is a "
-        "second bend that removes less of what is beyond chance refined before more is found.  Pixels differ by no "
+        "second bend that removes less of what is beyond chance refined before more is found, nor an effect named that "
+        "removes less of what another leaves of a law that differs in details.  Pixels differ by no "
         "more of a label's error; a recording that was turned gains more of what its correlation lacks.",
         CHOICE,
         most=1.0,
