@@ -16,6 +16,8 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.confirm import confirmed
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.result import Conclusion, NamedEffect, Remainder, Statistic
 from spikecam_env.gap.search.forward import SECOND
 from spikecam_env.gap.search.round import Round
@@ -161,6 +163,31 @@ def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round
         gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
         end = rounds[int(np.argmin(gaps))]
     return list(rounds) if explaining and end is last else [*before, replace(end, fits=())]
+
+
+def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequence[Round]) -> list[Round]:
+    """The rounds with the tested model's parameters as they are in the unit, if these explain the data beside the
+    effects that the rounds end with, and the unit's own take no more than half of what they leave.
+
+    An effect whose law differs in details scatters what a parameter is known by.  problem: of the null model.
+    """
+    *before, last = rounds
+    null, values, found = problem.null, problem.values, {e.name for e in last.model.effects}
+    if found <= {e.name for e in tested.effects} or not explains(null, values, last.prediction):
+        return list(rounds)
+    off = off_nominal(problem.case, with_patterns_of(tested, last.model), last.base)
+    count = problem.settings.twins.in_the_end
+    cost = count * len(problem.case.conditions)
+    if not off.parameters or not problem.allows("parameters as given", cost, needed=True):
+        return list(rounds)
+    own = Fit("", {}, {}, last.prediction, off.nominal, last.rho, last.misfit, last.model)
+    given = confirmed(problem, own, count)
+    left = squares_left(null, values, given.prediction)
+    most = squares_left(null, values, last.prediction) <= (1.0 - problem.settings.searching.worth) * left
+    if not explains(null, values, given.prediction) or (left > 0.0 and most):
+        return list(rounds)
+    end = replace(last, base=given.base, prediction=given.prediction, rho=given.rho, misfit=given.misfit)
+    return [*before, end]
 
 
 def named(

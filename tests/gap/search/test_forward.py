@@ -24,7 +24,9 @@ from spikecam_env.gap.search.round import Round, has_candidate, is_improvement, 
 from spikecam_env.gap.settings import PER_PARAMETER, Deviance, DiagnosisSettings, Searching
 from spikecam_env.gap.statistics import Key
 from spikecam_env.gap.twins.budget import Budget
+from spikecam_env.gap.unit.conversion import exact_refit
 from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.gap.verdict import verdict
 from spikecam_env.gap.verdict.remainder import explains, squares_left
 from spikecam_env.gap.verdict.verdict import with_stand_ins
 
@@ -406,6 +408,24 @@ def test_beside_a_remainder_an_effect_is_named_that_takes_most_of_it(takes: floa
     end = Round(two, unit(), second.prediction, second.rho, second.misfit)
     after = with_stand_ins(case, n, values, [start, middle, end])
     assert after[-1].model is (two if named else one)
+
+
+@pytest.mark.parametrize(("left", "off"), [(0.0, False), (0.6, True), (1.0, True)])
+def test_beside_an_effect_a_parameter_is_off_only_if_the_given_one_leaves_more(left: float, off: bool, monkeypatch):
+    """left: of three statistics that the effect changes, what it leaves with the parameters as given.  With the unit's
+    own it leaves nothing."""
+    n, change, values, seen = campaign()
+    values = values + 15.0 * change
+    noisy = exact_refit(MODEL.with_effect(effect("reset_noise", sigma_mV=25.0)).draw_unit((128, 128), 5))
+    problem = replace(Problem.of(recorded(), MODEL, n, values), seen=np.where(FIT, values, np.nan))
+    own, given = (
+        a_fit(n, "dead_time", (1.0 - x * (np.arange(COUNT) < 3)) * (values - n.mean), seen) for x in (0.0, left)
+    )
+    monkeypatch.setattr(verdict, "confirmed", lambda problem, found, count: replace(found, prediction=given.prediction))
+    end = Round(MODEL.with_effect(DEAD_TIME), noisy, own.prediction, own.rho, own.misfit)
+    after = verdict.with_given_parameters(problem, MODEL, [end])
+    assert (after[-1].base.white == noisy.white) == off
+    assert verdict.with_given_parameters(problem, MODEL, [replace(end, model=MODEL)])[-1].base is noisy, "no effect"
 
 
 @pytest.mark.parametrize("keeps", [True, False])
