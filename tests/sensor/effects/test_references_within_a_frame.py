@@ -15,7 +15,7 @@ from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Sta
 from spikecam_env.sensor.effects.base import Exposure, Shift, parameter
 
 SWING_MV = 1e3 * SensorModel.preset("ideal").circuit.swing_V
-A_FRAME = 512
+A_FRAME = 256
 """Steps of a frame of the event by event simulation, a whole number of which every edge below is from its start."""
 
 
