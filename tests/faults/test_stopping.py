@@ -129,7 +129,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_command_stops_at_any_moment_within_two_seconds_and_leaves_nothing(tmp_path: Path, recording: Path) -> None:
     size = ["--size", "64", "96"]
     commands = {  # longer than any moment, and a few GB at most: the disk is asked for all of it beforehand
-        "record": (4, ["record", "--out", "x.h5", "--frames", "4000000", *size]),
+        "record": (2, ["record", "--out", "x.h5", "--frames", "4000000", *size]),
         "film": (2, ["scenes", "fan", "--film", "x.mp4", "--frames", "2800000", *size]),
         "dataset": (2, ["dataset", "phm-n", "--out", "x", "--jobs", "2", "--frames", "400000", *size]),
         "live": (2, ["live", "disk", "--film", "x.mp4", *size]),

@@ -17,7 +17,7 @@ from tests.hidden_world.tricky import TRICKS
 from tests.hidden_world.world import MECHANISMS, Recipe, stream, write_campaign
 
 SMALL = Recipe(5, "scsim", shape=(24, 24), frames=800)
-TINY = replace(SMALL, shape=(16, 16), frames=200)
+TINY = replace(SMALL, shape=(16, 16), frames=100)
 ROOT = Path(__file__).resolve().parents[2]
 
 

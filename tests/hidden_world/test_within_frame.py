@@ -106,7 +106,7 @@ def stepped(x: float, frames: int, bar, pixels: int, fine: int) -> list[np.ndarr
 def test_ripple_of_17_khz_is_crossed_when_it_is_crossed():
     ripple, x = 0.02, 1 / 5.5
     gaps = intervals(filmed(QUIET, x, 3000, [hidden("supply_ripple", ripple=ripple, frequency_hz=17e3)]))
-    (slow,) = stepped(x, 400, lambda t: 1 + ripple * np.sin(2 * np.pi * 0.425 * t), 200, 400)
+    (slow,) = stepped(x, 110, lambda t: 1 + ripple * np.sin(2 * np.pi * 0.425 * t), 800, 400)
     near(gaps.mean(), 5.5, 0.01)
     near(gaps.var(), slow.var(), 0.02)
     near(gaps.var(), 0.25, 0.03)
@@ -172,11 +172,12 @@ def kicked_in_small_steps(gain: np.ndarray, x: float, kappa: float, kick: float,
 
 
 def test_a_kick_at_the_spike_is_in_the_order_of_time():
-    """Neighbours' bits, kick 0.02, light 0.22: about +0.036 in the same frame and -0.013 in the next; 1000 frames of
-    992 neighbours know it to 0.001."""
+    """Neighbours' bits, kick 0.02, light 0.22: about +0.036 in the same frame and -0.013 in the next; a
+    million pairs of neighbours know it to 0.001.  Small steps are of a larger array for fewer frames."""
     camera = plain_camera((32, 32), electrons=0.0, kappa=0.02, spread=0.1)
     bits = filmed(camera, 0.22, 4000, [hidden("crosstalk", kick=0.02)])[500:]
-    slow = kicked_in_small_steps(camera.gain, 0.22, 0.02, 0.02, 1200, 64)[200:]
+    large = plain_camera((64, 64), electrons=0.0, kappa=0.02, spread=0.1)
+    slow = kicked_in_small_steps(large.gain, 0.22, 0.02, 0.02, 350, 64)[100:]
     for lag, published in ((0, 0.036), (1, -0.013)):
         near(coincidences(bits, lag), coincidences(slow, lag), 0.005)
         near(coincidences(bits, lag), published, 0.01)

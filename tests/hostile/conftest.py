@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tally import MALFORMED, TALLY, count
 
-from spikecam_env.cli.main import run
+from spikecam_env.cli.main import run_parsed, understood
+
+
+@cache
+def command_of(words: tuple[str, ...]) -> Any:
+    """The command of these words, parsed once: of many bad files in one place, the line is the same."""
+    return understood(list(words))
 
 
 @pytest.fixture
@@ -23,7 +31,7 @@ def meets(request, tmp_path: Path, capfd) -> Callable[..., int]:
         before = listing(folder)
         capfd.readouterr()
         try:
-            code = run([str(a) for a in args])
+            code = run_parsed(lambda: command_of(tuple(str(a) for a in args)))
         except SystemExit as end:
             code = end.code
         printed = capfd.readouterr()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import os
 import tempfile
@@ -12,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 from mutations import damaged, json_files, npz, npz_files, toml_files
-from tally import reads_or_refuses
+from tally import each, reads_or_refuses
 
 from denoiser.evaluate.work import FORMAT, Results
 from denoiser.reconstruct.recipe import WIDTH_STEP, reconstructor_recipe
@@ -90,14 +91,15 @@ RESULT = {
 }
 
 
-def cases(files):
-    """As arguments of parametrize."""
-    return [pytest.param(data, id=label[:80]) for label, data in files]
+def put(path: Path, data: bytes) -> None:
+    """A new file there, even where a reader has the last one open."""
+    path.unlink(missing_ok=True)
+    path.write_bytes(data)
 
 
-def numbered(files):
-    """As `cases`, with numbers."""
-    return [pytest.param(data, number, id=label[:80]) for number, (label, data) in enumerate(files)]
+def every(share: int, files):
+    """The first of every so many, to the last."""
+    return itertools.islice(files, 0, None, share)
 
 
 @pytest.fixture(scope="module")
@@ -113,8 +115,8 @@ def changed(folder: Path, name: str, data: bytes, good: dict = CAMPAIGN) -> Path
     """The campaign with one file changed; it goes back to what it was with the next."""
     (folder / "campaign.json").write_text(json.dumps(good))
     for file, arrays in (("flat-01.npz", LIGHT), ("flat-02.npz", BRIGHTER), ("rates.npz", RATES)):
-        (folder / file).write_bytes(npz(arrays))
-    (folder / name).write_bytes(data)
+        put(folder / file, npz(arrays))
+    put(folder / name, data)
     return folder
 
 
@@ -133,20 +135,28 @@ def read_lit(folder: Path):
     return recordings
 
 
-@pytest.mark.parametrize("data, number", numbered(json_files(CAMPAIGN, within=2)))
-def test_a_malformed_campaign_json_is_refused(data: bytes, number: int, campaign: Path, tmp_path: Path, meets) -> None:
-    folder = changed(campaign, "campaign.json", data)
-    calibrated("campaign.json", folder, tmp_path / "out", meets, number % SHARE == 0)
+def test_a_malformed_campaign_json_is_refused(campaign: Path, tmp_path: Path, meets) -> None:
+    number = itertools.count()
+
+    def check(data: bytes) -> None:
+        folder = changed(campaign, "campaign.json", data)
+        calibrated("campaign.json", folder, tmp_path / "out", meets, next(number) % SHARE == 0)
+
+    each(json_files(CAMPAIGN, within=2), check)
 
 
-@pytest.mark.parametrize("data", cases(npz_files(LIGHT)))
-def test_malformed_light_is_refused(data: bytes, campaign: Path, tmp_path: Path, meets) -> None:
-    calibrated("light .npz", changed(campaign, "flat-01.npz", data), tmp_path / "out", meets)
+def test_malformed_light_is_refused(campaign: Path, tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        calibrated("light .npz", changed(campaign, "flat-01.npz", data), tmp_path / "out", meets)
+
+    each(npz_files(LIGHT), check)
 
 
-@pytest.mark.parametrize("data", cases(npz_files(RATES)))
-def test_malformed_rates_are_refused(data: bytes, campaign: Path, tmp_path: Path, meets) -> None:
-    calibrated("rates .npz", changed(campaign, "rates.npz", data), tmp_path / "out", meets)
+def test_malformed_rates_are_refused(campaign: Path, tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        calibrated("rates .npz", changed(campaign, "rates.npz", data), tmp_path / "out", meets)
+
+    each(npz_files(RATES), check)
 
 
 @pytest.mark.parametrize("command", ["diagnose", "ladder"])
@@ -158,17 +168,21 @@ def test_a_malformed_campaign_is_refused_before_it_is_simulated(
     assert meets(f"campaign.json ({command})", command, folder, "--out", tmp_path / "out") == 2
 
 
-@pytest.mark.parametrize("data", cases(toml_files(MODEL)))
-def test_a_malformed_model_is_refused_by_its_reader(data: bytes, tmp_path: Path) -> None:
-    (tmp_path / "model.toml").write_bytes(data)
-    reads_or_refuses("model .toml", lambda: SensorModel.from_toml(tmp_path / "model.toml"))
+def test_a_malformed_model_is_refused_by_its_reader(tmp_path: Path) -> None:
+    def check(data: bytes) -> None:
+        put(tmp_path / "model.toml", data)
+        reads_or_refuses("model .toml", lambda: SensorModel.from_toml(tmp_path / "model.toml"))
+
+    each(toml_files(MODEL), check)
 
 
-@pytest.mark.parametrize("data", cases(toml_files(MODEL))[::SHARE])
-def test_a_malformed_model_is_refused(data: bytes, tmp_path: Path, meets) -> None:
-    (tmp_path / "model.toml").write_bytes(data)
-    record = ("record", "--size", 4, 4, "--frames", 2, "--model", tmp_path / "model.toml", "--out")
-    meets("model .toml (record)", *record, tmp_path / "out.dat")
+def test_a_malformed_model_is_refused(tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        put(tmp_path / "model.toml", data)
+        record = ("record", "--size", 4, 4, "--frames", 2, "--model", tmp_path / "model.toml", "--out")
+        meets("model .toml (record)", *record, tmp_path / "out.dat")
+
+    each(every(SHARE, toml_files(MODEL)), check)
 
 
 TABLE = "file,radiance,name,use,v_d,temperature_k,note,height,width,flip,bit_order,first,count"
@@ -213,11 +227,13 @@ def recordings(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("data", cases(label_tables()))
-def test_a_malformed_table_of_labels_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
-    (tmp_path / "labels.csv").write_bytes(data)
-    options = ("--table", tmp_path / "labels.csv", "--frame-rate-hz", 40000)
-    meets("labels .csv (campaign import)", "campaign", "import", recordings, tmp_path / "out", *options)
+def test_a_malformed_table_of_labels_is_refused(recordings: Path, tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        put(tmp_path / "labels.csv", data)
+        options = ("--table", tmp_path / "labels.csv", "--frame-rate-hz", 40000)
+        meets("labels .csv (campaign import)", "campaign", "import", recordings, tmp_path / "out", *options)
+
+    each(label_tables(), check)
 
 
 def imported(meets, target: str, folder: Path, out: Path, *labels: str) -> int:
@@ -227,28 +243,36 @@ def imported(meets, target: str, folder: Path, out: Path, *labels: str) -> int:
     return meets(f"{target} (campaign import)", "campaign", "import", folder, out, *options, *shape)
 
 
-@pytest.mark.parametrize("data", cases([*npz_files(STREAM), *npz_files(PACKED)]))
-def test_a_malformed_stream_in_an_npz_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
-    (recordings / "x.npz").write_bytes(data)
-    imported(meets, "spikes .npz", recordings, tmp_path / "out", "x.npz=0.3")
+def test_a_malformed_stream_in_an_npz_is_refused(recordings: Path, tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        put(recordings / "x.npz", data)
+        imported(meets, "spikes .npz", recordings, tmp_path / "out", "x.npz=0.3")
+
+    each([*npz_files(STREAM), *npz_files(PACKED)], check)
 
 
-@pytest.mark.parametrize("data", cases(npz_files(MAPS)))
-def test_malformed_flat_maps_are_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
-    (recordings / "maps.npz").write_bytes(data)
-    imported(meets, "flat maps .npz", recordings, tmp_path / "out", "maps.npz=relative")
+def test_malformed_flat_maps_are_refused(recordings: Path, tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        put(recordings / "maps.npz", data)
+        imported(meets, "flat maps .npz", recordings, tmp_path / "out", "maps.npz=relative")
+
+    each(npz_files(MAPS), check)
 
 
-@pytest.mark.parametrize("data", cases(npz_files(LIGHT)))
-def test_malformed_light_of_a_label_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
-    (recordings / "light.npz").write_bytes(data)
-    imported(meets, "light .npz", recordings, tmp_path / "out", "a.dat=light.npz")
+def test_malformed_light_of_a_label_is_refused(recordings: Path, tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        put(recordings / "light.npz", data)
+        imported(meets, "light .npz", recordings, tmp_path / "out", "a.dat=light.npz")
+
+    each(npz_files(LIGHT), check)
 
 
-@pytest.mark.parametrize("data", cases(damaged(bytes(range(256)) * 2)))
-def test_a_malformed_dat_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
-    (recordings / "a.dat").write_bytes(data)
-    imported(meets, "spikes .dat", recordings, tmp_path / "out", "a.dat=0.3")
+def test_a_malformed_dat_is_refused(recordings: Path, tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        put(recordings / "a.dat", data)
+        imported(meets, "spikes .dat", recordings, tmp_path / "out", "a.dat=0.3")
+
+    each(damaged(bytes(range(256)) * 2), check)
 
 
 def h5_files():
@@ -314,11 +338,13 @@ def _h5(arrays: dict, attributes: dict, declared=None, external: bool = False, l
     return memory.getvalue()
 
 
-@pytest.mark.parametrize("data", cases(h5_files()))
-def test_a_malformed_h5_is_refused(data: bytes, recordings: Path, tmp_path: Path, meets) -> None:
-    (recordings / "x.h5").write_bytes(data)
-    labels = ("--label", "x.h5=0.3")
-    meets("spikes .h5 (campaign import)", "campaign", "import", recordings, tmp_path / "out", *labels)
+def test_a_malformed_h5_is_refused(recordings: Path, tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        put(recordings / "x.h5", data)
+        labels = ("--label", "x.h5=0.3")
+        meets("spikes .h5 (campaign import)", "campaign", "import", recordings, tmp_path / "out", *labels)
+
+    each(h5_files(), check)
 
 
 DATASET = {
@@ -341,16 +367,20 @@ DATASET = {
 }
 
 
-@pytest.mark.parametrize("data", cases(json_files(DATASET)))
-def test_a_malformed_manifest_is_refused_by_its_reader(data: bytes, tmp_path: Path) -> None:
-    (tmp_path / "dataset.json").write_bytes(data)
-    reads_or_refuses("dataset.json", lambda: verify(tmp_path))
+def test_a_malformed_manifest_is_refused_by_its_reader(tmp_path: Path) -> None:
+    def check(data: bytes) -> None:
+        put(tmp_path / "dataset.json", data)
+        reads_or_refuses("dataset.json", lambda: verify(tmp_path))
+
+    each(json_files(DATASET), check)
 
 
-@pytest.mark.parametrize("data", cases(json_files(DATASET))[::SHARE])
-def test_a_malformed_manifest_is_refused(data: bytes, tmp_path: Path, meets) -> None:
-    (tmp_path / "dataset.json").write_bytes(data)
-    meets("dataset.json (dataset verify)", "dataset", "verify", tmp_path, good_codes=(1,))  # its files are missing
+def test_a_malformed_manifest_is_refused(tmp_path: Path, meets) -> None:
+    def check(data: bytes) -> None:
+        put(tmp_path / "dataset.json", data)
+        meets("dataset.json (dataset verify)", "dataset", "verify", tmp_path, good_codes=(1,))  # its files are missing
+
+    each(every(SHARE, json_files(DATASET)), check)
 
 
 @pytest.mark.parametrize("kind", ["a folder", "no file", "a pipe", "unreadable"])
@@ -398,24 +428,30 @@ def test_the_good_ones_are_good(campaign: Path, recordings: Path, tmp_path: Path
     assert len(Manifest.read(tmp_path).files) == 2
 
 
-@pytest.mark.parametrize("data", cases(json_files({"format": FORMAT, **EVALUATION})))
-def test_a_malformed_head_of_results_is_refused(data: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "table1.jsonl"
-    path.write_bytes(data.replace(b"\n", b" ") + b"\n" + json.dumps(RESULT).encode())
-    reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+def test_a_malformed_head_of_results_is_refused(tmp_path: Path) -> None:
+    def check(data: bytes) -> None:
+        path = tmp_path / "table1.jsonl"
+        path.write_bytes(data.replace(b"\n", b" ") + b"\n" + json.dumps(RESULT).encode())
+        reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+
+    each(json_files({"format": FORMAT, **EVALUATION}), check)
 
 
-@pytest.mark.parametrize("data", cases(json_files(RESULT, within=2)))
-def test_a_malformed_result_is_refused(data: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "table1.jsonl"
-    path.write_bytes(json.dumps({"format": FORMAT, **EVALUATION}).encode() + b"\n" + data.replace(b"\n", b" "))
-    reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+def test_a_malformed_result_is_refused(tmp_path: Path) -> None:
+    def check(data: bytes) -> None:
+        path = tmp_path / "table1.jsonl"
+        path.write_bytes(json.dumps({"format": FORMAT, **EVALUATION}).encode() + b"\n" + data.replace(b"\n", b" "))
+        reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+
+    each(json_files(RESULT, within=2), check)
 
 
-@pytest.mark.parametrize("data", cases(damaged(pretrained_path("paper").read_bytes())))
-def test_malformed_weights_are_refused(data: bytes, tmp_path: Path) -> None:
-    (tmp_path / "x.pt").write_bytes(data)
-    reads_or_refuses("weights .pt", lambda: load_weights(tmp_path / "x.pt"))
+def test_malformed_weights_are_refused(tmp_path: Path) -> None:
+    def check(data: bytes) -> None:
+        put(tmp_path / "x.pt", data)
+        reads_or_refuses("weights .pt", lambda: load_weights(tmp_path / "x.pt"))
+
+    each(damaged(pretrained_path("paper").read_bytes()), check)
 
 
 def _reconstructor() -> bytes:
@@ -426,7 +462,9 @@ def _reconstructor() -> bytes:
         return (Path(folder) / "x.pt").read_bytes()
 
 
-@pytest.mark.parametrize("data", cases(damaged(_reconstructor())))
-def test_malformed_weights_of_a_reconstructor_are_refused(data: bytes, tmp_path: Path) -> None:
-    (tmp_path / "x.pt").write_bytes(data)
-    reads_or_refuses("reconstructor .pt", lambda: load_reconstructor(tmp_path / "x.pt"))
+def test_malformed_weights_of_a_reconstructor_are_refused(tmp_path: Path) -> None:
+    def check(data: bytes) -> None:
+        put(tmp_path / "x.pt", data)
+        reads_or_refuses("reconstructor .pt", lambda: load_reconstructor(tmp_path / "x.pt"))
+
+    each(damaged(_reconstructor()), check)

@@ -142,7 +142,7 @@ def test_what_is_no_model_is_refused_by_name() -> None:
         replace(ideal, effects=(dead_time(), dead_time(tau_us=0.2)))
 
 
-SHAPE, FRAMES = (6, 8), 40
+SHAPE, FRAMES = (6, 8), 16
 
 
 def check_engines_agree(model: SensorModel, seed: int = 0) -> None:

@@ -15,7 +15,7 @@ from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Sta
 from spikecam_env.sensor.effects.base import Exposure, Shift, parameter
 
 SWING_MV = 1e3 * SensorModel.preset("ideal").circuit.swing_V
-A_FRAME = 512
+A_FRAME = 256
 """Steps of a frame of the event by event simulation, a whole number of which every edge below is from its start."""
 
 
@@ -125,7 +125,7 @@ def test_ripple_of_no_frequency_is_a_constant_factor(engine: str, monkeypatch: p
     light = np.random.default_rng(0).uniform(0.0, 2.0, (20, 30))
     still = with_effects("ideal", CATALOGUE["supply_ripple"](ripple=0.05, frequency_hz=0.0, phase_cycles=0.25))
     raised = with_effects("ideal", Raised())
-    one, other = (SpikeSensor(model, (20, 30), 3, engine).step(light, 300) for model in (still, raised))
+    one, other = (SpikeSensor(model, (20, 30), 3, engine).step(light, 60) for model in (still, raised))
     np.testing.assert_array_equal(one, other)
 
 

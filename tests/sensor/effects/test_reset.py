@@ -9,12 +9,16 @@ from scipy.optimize import brentq
 
 from spikecam_env.sensor import CATALOGUE, SpikeSensor
 
+SPIKES = 200
+"""Of a pixel, from whose mean interval the effects below differ by ten times as much as it is known to, or more."""
+KNOWN_TO = 1 / (SPIKES - 1)
 
-def mean_interval(name: str, interval: float, count: int = 400, **parameters: float) -> float:
-    """Mean interval under steady light 1/interval, to 1 / (count - 1) frames without noise."""
+
+def mean_interval(name: str, interval: float, **parameters: float) -> float:
+    """Mean interval under steady light 1/interval, to KNOWN_TO frames without noise."""
     model = with_effects("ideal", CATALOGUE[name](**parameters))
-    t = spike_frames(model, np.full(50, interval), count, "reference", slack=1.6)
-    return float((t[:, -1] - t[:, 0]).mean() / (count - 1))
+    t = spike_frames(model, np.full(50, interval), SPIKES, "reference", slack=1.6)
+    return float((t[:, -1] - t[:, 0]).mean() / (SPIKES - 1))
 
 
 def test_synchronous_reset_locks_intervals_to_whole_frames() -> None:
@@ -29,14 +33,14 @@ def test_synchronous_reset_locks_intervals_to_whole_frames() -> None:
 @pytest.mark.parametrize("interval", [2.0, 9.3])
 def test_dead_time_lengthens_every_interval_by_tau(interval: float) -> None:
     """T = 1/x + tau: at x = 0.5 and 2.5 us, 0.1 frames, the mean interval is 2.1."""
-    check("mean interval", mean_interval("dead_time", interval, tau_us=2.5), interval + 0.1, 1 / 399)
+    check("mean interval", mean_interval("dead_time", interval, tau_us=2.5), interval + 0.1, KNOWN_TO)
 
 
 @pytest.mark.parametrize("interval", [2.0, 9.3, 40.0])
 def test_comparator_delay_lengthens_intervals_by_the_root_of_their_length(interval: float) -> None:
     """T = 1/x + c / sqrt(x), c = 2.5 us = 0.1 frames."""
     measured = mean_interval("comparator_delay", interval, delay_us=2.5)
-    check("mean interval", measured, interval + 0.1 * np.sqrt(interval), 1 / 399)
+    check("mean interval", measured, interval + 0.1 * np.sqrt(interval), KNOWN_TO)
 
 
 def intervals_read(times: np.ndarray) -> np.ndarray:
@@ -71,7 +75,7 @@ def steady_interval(x: float, fraction: float, tau: float) -> float:
 def test_incomplete_reset_shortens_long_intervals(interval: float) -> None:
     """T = (1 - f (1 - exp(-T/tau))) / x, tau = 10 frames."""
     measured = mean_interval("incomplete_reset", interval, fraction=0.2, tau_us=250.0)
-    check("mean interval", measured, steady_interval(1 / interval, 0.2, 10.0), 1 / 399)
+    check("mean interval", measured, steady_interval(1 / interval, 0.2, 10.0), KNOWN_TO)
 
 
 def test_incomplete_reset_makes_a_long_interval_be_followed_by_a_short_one() -> None:
