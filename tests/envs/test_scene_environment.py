@@ -39,7 +39,7 @@ def test_every_scene_of_the_catalogue_has_an_id() -> None:
 @pytest.mark.parametrize("name", OF_IDS)
 def test_every_id_starts_with_its_target_in_view_and_steps_and_one_of_each_kind_passes_check_env(name: str) -> None:
     """The ids of a kind have the code of one class, which their last assertion here finds again: `check_env`, which
-    makes a dozen episodes, is for one of them.  Without the render check, which `test_rotating_disk` has.
+    begins several episodes, is for one of them.  Without the render check, which `test_rotating_disk` has.
     """
     env = make(name, obs=OF_IDS[name], ground_truth=name in WITH_TRUTH)
     with warnings.catch_warnings():
