@@ -57,9 +57,12 @@ class Page:
                 self._line(line, block)
 
     def bring(self, code: str) -> None:
-        """Make the files that stand for what the reader has, where the block names one and it is not there yet."""
+        """Make the files that stand for what the reader has, where the block names one and it is not there yet.
+
+        What a line of the block makes (`--out NAME`) is not brought.
+        """
         for name, make in BROUGHT.items():
-            if re.search(rf"(?<![\w./-]){re.escape(name)}(?![\w-])", code) and not Path(name).exists():
+            if re.search(rf"(?<![\w./-])(?<!--out ){re.escape(name)}(?![\w-])", code) and not Path(name).exists():
                 make(Path(name))
 
     def python(self, code: str, line: int) -> None:

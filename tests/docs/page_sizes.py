@@ -17,7 +17,7 @@ SMALL = {
     "film": SIZE,
     "scenes": f"{SIZE} --frames 320",
     "live": "--frames 128 --size 48 80",
-    "play": "--film played.mp4 --episodes 1",
+    "play": "--film played.mp4 --episodes 1 --slow 4",
     "view": f"{SIZE} --frames 80 --save viewed.rrd",
     "dataset spift-n": f"{SIZE} --train 1 --test 1 --frames 320",
     "dataset phm-n": f"{SIZE} --scenes disk --frames 320",

@@ -53,7 +53,7 @@ def shown(law: Observation, spikes: np.ndarray, cut: int) -> list[np.ndarray]:
 @pytest.mark.parametrize("obs_state", [False, True])
 @pytest.mark.parametrize("obs", OBSERVATIONS)
 def test_check_env_is_clean_for_every_observation(obs: str, obs_state: bool) -> None:
-    """Of the disk; every id has one of them in `test_scene_environment`."""
+    """Of the disk; every scene id has one of them, and steps, in `test_scene_environment`."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gymnasium.make(DISK, **SMALL, obs=obs, obs_state=obs_state).unwrapped
