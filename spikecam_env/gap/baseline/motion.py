@@ -253,8 +253,7 @@ def beyond(
     """
     rows, columns = (_starts(n, side) for n, side in zip(planes[0].shape[1:], size, strict=True))
     off, capped, variance, expected = (_window_sums(plane, rows, columns, size) for plane in planes)
-    own = float(planes[2].sum()) / max(np.count_nonzero(planes[2]), 1)
-    times = 1.0 + shared / max(own, 1e-9)
+    times = 1.0 + shared / max(_own_variance(planes), 1e-9)
     z = capped / np.sqrt(np.maximum(times * variance + (times - 1.0) * np.abs(capped) / 3.0, 1e-9))
     contrast = off / np.maximum(expected, 1e-9)
     enough = np.maximum(expected, expected + off) >= limits.least_counts
@@ -270,9 +269,14 @@ def shared_variance(planes: tuple[Array, ...], width: int) -> float:
     From block to block, parts of rows scatter more by it than parts of columns; what moves is shared along both, or
     slow.  planes: `_deviations` of single blocks.
     """
-    along_rows, along_columns = (_scatter_of_strips(planes, (1, width)[::turn]) for turn in (1, -1))
-    own = float(planes[2].sum()) / max(np.count_nonzero(planes[2]), 1)
-    return float(np.clip(along_rows - along_columns, 0.0, width - 1.0)) * own
+    along_rows, along_columns = (_scatter_of_strips(planes, size) for size in ((1, width), (width, 1)))
+    return float(np.clip(along_rows - along_columns, 0.0, width - 1.0)) * _own_variance(planes)
+
+
+def _own_variance(planes: tuple[Array, ...]) -> float:
+    """Mean variance of a pixel's count, of pixels that are looked at."""
+    variance = planes[2][planes[2] > 0]
+    return float(variance.mean()) if variance.size else 0.0
 
 
 def _scatter_of_strips(planes: tuple[Array, ...], size: tuple[int, int]) -> float:
