@@ -271,9 +271,9 @@ def _(settings, patch):
 
 def is_off(settings, spikes: float, contrast: float) -> bool:
     """Whether a window of 16 pixels, of whose spikes so many are missing beyond chance, moves."""
-    expected = np.full((4, 4), spikes / 16)
-    planes = [-contrast * expected, -contrast * expected, np.full((4, 4), 1e-9), expected]
-    return bool([*motion.beyond(planes, (4, 4), (0, 1), 5.0, settings.baseline)])
+    expected = np.full((1, 4, 4), spikes / 16)
+    planes = (-contrast * expected, -contrast * expected, np.full((1, 4, 4), 1e-9), expected)
+    return bool([*motion.beyond(planes, (4, 4), 1, 0.0, 5.0, settings.baseline)])
 
 
 @probe_of("baseline.least_counts")
