@@ -15,15 +15,17 @@ export PYTHONDONTWRITEBYTECODE :=
 install: $(VENV)/.installed
 install-dev: $(VENV)/.installed-dev
 
-$(VENV)/.installed: pyproject.toml constraints.txt
+$(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
 	$(BIN)/python $(PIP) --constraint constraints.txt --editable .
 	touch $@
 
-$(VENV)/.installed-dev: $(VENV)/.installed
+$(VENV)/.installed-dev: pyproject.toml constraints.txt | $(BIN)/python
 	$(BIN)/python $(PIP) --constraint constraints.txt --editable ".[dev]"
 	$(BIN)/python $(PIP) --constraint constraints.txt --no-deps mmagic  # only its NIQE files are used
-	touch $@
+	touch $(VENV)/.installed $@
 
 demo: install
 	$(BIN)/spikecam demo
