@@ -34,6 +34,7 @@ from spikecam_env.cli.view import View
 from spikecam_env.cli.warned import warnings_as_lines
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import Stopped
+from spikecam_env.version import __version__
 from spikecam_env.whole import reason
 
 DESCRIPTION = """The spike camera you can step: simulate it, record it, denoise it online.
@@ -43,6 +44,7 @@ examples:
   spikecam record --frames 4000 --out disk.h5
   spikecam denoise disk.h5 --out denoised
   spikecam COMMAND --help
+  spikecam --version
 """
 
 COMMANDS: dict[str, Any] = {
@@ -76,10 +78,13 @@ def main(args: list[str] | None = None) -> None:
 
 
 def run(args: list[str] | None = None) -> int:
-    """Parse and run; returns the exit code.  Without a word it prints what to begin with."""
+    """Parse and run; returns the exit code.  Without a word it prints what to begin with; `--version`, the version."""
     words = sys.argv[1:] if args is None else args
     if not words:
         print(START)
+        return 0
+    if words == ["--version"]:
+        print(f"spikecam-env {__version__}")
         return 0
     return run_parsed(lambda: understood(words))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import h5py
@@ -28,6 +29,10 @@ def test_every_command_explains_itself_with_an_example(name: str, capsys) -> Non
         spikecam(name, "--help")
     assert end.value.code == 0
     assert f"example:  spikecam {name}" in capsys.readouterr().out
+
+
+def test_the_version_is_that_of_the_package(capsys) -> None:
+    assert run(["--version"]) == 0 and capsys.readouterr().out == f"spikecam-env {version('spikecam-env')}\n"
 
 
 def test_help_needs_no_torch() -> None:
