@@ -176,3 +176,13 @@ def test_few_spikes_are_no_outliers(factor: float, dim: bool, steady: bool, monk
     more = np.where(np.arange(2000) % 10 == 0, 4.0, 1.0)
     expected = common_mode(more, np.full(2000, 1.0), use)
     assert (abs(expected.mean() - 1.0) < 0.1) == steady
+
+
+@pytest.mark.parametrize("width", motion.SIDES)
+def test_rows_share_as_much_as_all_of_their_pixels_at_most(width: int) -> None:
+    """Rows off as a whole, by one standard deviation or by the three that a pixel counts; columns share none."""
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (BLOCKS, SHAPE[0], 1)) * np.ones((1, 1, SHAPE[1]))
+    one = np.ones_like(signs)
+    once, thrice = (motion.shared_variance((one, size * signs, one, one), width) for size in (1.0, 3.0))
+    assert once == pytest.approx(width - 1, rel=0.2) and thrice == width - 1
+    assert motion.shared_variance((one, signs.swapaxes(1, 2), one, one), width) == 0.0

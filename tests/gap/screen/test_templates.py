@@ -89,15 +89,14 @@ def test_what_stands_out_most_is_loud_however_quiet_it_is():
         effect("dead_time", tau_us=0.1),
         effect("dead_time", tau_us=1.0),
         effect("common_threshold_noise", sigma_mV=3.0),
+        effect("common_threshold_noise", sigma_mV=15.0),
         effect("row_temporal_noise", sigma_mV=25.0),
         effect("light_flicker", modulation=0.08, frequency_hz=400.0),
     ],
     ids=lambda e: f"{e.name} {e.parameters()[type(e).strength]:g}",
 )
 def test_screening_starts_near_the_truth_weak_or_severe(hidden):
-    """A bend of the rates weak and severe; of noise that pixels share all of them, a row, and a line of its spectrum.
-
-    In another array, for a quarter of the frames: the strength within a factor of 1.6, and one of those fitted."""
+    """In another array, for a quarter of the frames: the strength within a factor of 1.6, and one of those fitted."""
     case = recorded(hidden)
     null = model_null(case, MODEL, 6)
     values = values_of(case.bank, null.keys)

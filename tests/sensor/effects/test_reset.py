@@ -9,15 +9,15 @@ from scipy.optimize import brentq
 
 from spikecam_env.sensor import CATALOGUE, SpikeSensor
 
-SPIKES = 200
-"""Of a pixel, from whose mean interval the effects below differ by ten times as much as it is known to, or more."""
+SPIKES, PIXELS = 400, 25
 KNOWN_TO = 1 / (SPIKES - 1)
+"""Frames to which the spikes of a pixel give its mean interval without noise."""
 
 
 def mean_interval(name: str, interval: float, **parameters: float) -> float:
-    """Mean interval under steady light 1/interval, to KNOWN_TO frames without noise."""
+    """Mean interval under steady light 1/interval, to KNOWN_TO frames."""
     model = with_effects("ideal", CATALOGUE[name](**parameters))
-    t = spike_frames(model, np.full(50, interval), SPIKES, "reference", slack=1.6)
+    t = spike_frames(model, np.full(PIXELS, interval), SPIKES, "reference", slack=1.6)
     return float((t[:, -1] - t[:, 0]).mean() / (SPIKES - 1))
 
 
