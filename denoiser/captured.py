@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections.abc import Callable
 
 import torch
 from torch import Tensor
+
+from spikecam_env.errors import InputError
 
 WARM_UPS = 3
 """Calls before the capture: kernels are chosen and memory is taken in them.  They do what the step does."""
@@ -38,3 +42,10 @@ def captured(
         return found.clone()
 
     return replay
+
+
+def checked_compiler(device: str) -> None:
+    """Raises InputError where `torch.compile` finds no C++ compiler for a processor."""
+    compilers = (os.environ.get("CXX", ""), "g++", "clang++", "c++")
+    if torch.device(device).type == "cpu" and not any(map(shutil.which, compilers)):
+        raise InputError("compiled needs a C++ compiler on a processor; install g++, or leave it out")

@@ -9,6 +9,10 @@ the streams then are, the next step that takes them goes on.
                                                               step: from frame to frame, across passes too
 
 The light divides as its count noise does, so that dim scenes count.
+
+A small network may learn the rates of a larger one that sees the same (its teacher) instead of the light.  What nobody
+can know of the light from the spikes is not in those rates, so that a short training suffices.  Source: Hinton et al.,
+"Distilling the knowledge in a neural network", 2015.
 """
 
 from __future__ import annotations
@@ -23,7 +27,7 @@ from torch import Tensor, nn
 
 from denoiser.number_type import computing_in, number_type
 from denoiser.simulated import Bank, SimulatedStreams, in_turn
-from denoiser.stream_network import CARRY, Carried
+from denoiser.stream_network import CARRY
 from denoiser.window import WindowLayout
 from denoiser.window_torch import Windows, learned, pushed
 
@@ -47,13 +51,14 @@ POOL = 16
 class Pass(NamedTuple):
     """One pass of N streams.
 
-    rate, light: (N, planes, H, W) [spikes/frame].  before: (N, 2, H, W), the last rate and the last light of the pass
-    before; of a stream's first pass the first of this one.  planes: (N, layers, H, W), what the network saw.
+    rate, wanted: (N, planes, H, W) [spikes/frame], of the network, and the light or the rate of its teacher.
+    before: (N, 2, H, W), the last rate and what was wanted of the pass before; of a stream's first pass the first of
+    this one.  planes: (N, layers, H, W), what the network saw.
     valid, mapped: (N,) float32, 1 where the pass counts, and where the unit is calibrated, else 0.
     """
 
     rate: Tensor
-    light: Tensor
+    wanted: Tensor
     before: Tensor
     planes: Tensor
     valid: Tensor
@@ -65,17 +70,21 @@ class _Past:
     """What a stream brings to its next pass besides its windows.
 
     light: (N, planes, H, W), of the frames that came last.  last: (N, 1, H, W), hidden: (N, CARRY, H/2, W/2), what the
-    network carried on.  final: (N, 2, H, W), the last rate and the last light of the pass before.
+    network carried on.  final: (N, 2, H, W), the last rate and what was wanted of the pass before.
+    its_last, its_hidden: what the teacher carried on.
     """
 
     light: Tensor
     last: Tensor
     hidden: Tensor
     final: Tensor
+    its_last: Tensor
+    its_hidden: Tensor
 
     @classmethod
     def begin(cls, layout: WindowLayout, streams: int, patch: int, device: torch.device) -> _Past:
-        shapes = ((layout.planes, patch), (1, patch), (CARRY, patch // 2), (2, patch))
+        carried = ((1, patch), (CARRY, patch // 2))
+        shapes = ((layout.planes, patch), *carried, (2, patch), *carried)
         return cls(*(torch.zeros((streams, count, side, side), device=device) for count, side in shapes))
 
 
@@ -83,7 +92,8 @@ class Rollouts:
     """Simulated streams before a network of this layout, taken in turn.
 
     taken: streams a step.  pool: streams for each of them.  patch: their side [pixels].  seed: everything follows from
-    it.  bank, compiled: as for `SimulatedStreams`.  Raises InputError for a layout that `Windows` cannot begin.
+    it.  bank, compiled: as for `SimulatedStreams`.  teacher: a network of the same layout, whose rates are wanted
+    instead of the light.  Raises InputError for a layout that `Windows` cannot begin.
     """
 
     def __init__(
@@ -97,10 +107,11 @@ class Rollouts:
         pool: int = POOL,
         bank: Bank | None = None,
         compiled: bool = False,
+        teacher: nn.Module | None = None,
     ) -> None:
-        self.layout, self.taken = layout, taken
+        self.layout, self.taken, self.teacher = layout, taken, teacher
         count = pool * taken
-        self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled)
+        self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=("noisy",))
         self._type = number_type("auto", device)
         self._next = torch.zeros((), dtype=torch.int64, device=device)
         self._windows = Windows.begin(layout, count, (patch, patch), device)
@@ -109,9 +120,9 @@ class Rollouts:
     def loss(self, network: nn.Module, passes: int) -> Tensor:
         """Take some streams on by this many passes; mean loss of the passes, with gradients."""
         total: list[Tensor] = []
-        for rate, light, before, _, valid, _ in self._passes(network, passes):
+        for rate, wanted, before, _, valid, _ in self._passes(network, passes):
             weight = valid[:, None, None, None] / (rate.detach().clamp(min=0.0) + OFFSET)
-            error = rate - light
+            error = rate - wanted
             steps = torch.diff(torch.cat([(before[:, :1] - before[:, 1:]), error], dim=1), dim=1)
             total.append((weight * error.square()).mean() + STEADY * (weight * steps.square()).mean())
         return torch.stack(total).mean()
@@ -141,15 +152,21 @@ class Rollouts:
             self._calibrated(windows, part.begins, rows)
             windows, planes = pushed(layout, windows, part.noisy, part.begins)
             alive = (~part.begins).float()[:, None, None, None] * (windows.start > 0).float()[:, None, None, None]
-            carried: Carried = (past.last * alive, past.hidden * alive)
+            frames, carried = windows.frames.to(self._type), (past.last * alive, past.hidden * alive)
             with computing_in(self._type, device):
-                rate, kept = network(windows.frames.to(self._type), planes, carried)
+                rate, kept = network(frames, planes, carried)
             rate = rate.float()
+            wanted, its_kept = past.light, (past.its_last, past.its_hidden)
+            if self.teacher is not None:
+                with torch.no_grad(), computing_in(self._type, device):
+                    wanted, its_kept = self.teacher(frames, planes, (past.its_last * alive, past.its_hidden * alive))
+                wanted = wanted.float()
             valid = (windows.start >= 0).float()
-            before = torch.where(alive > 0, past.final, torch.cat([rate[:, :1], past.light[:, :1]], dim=1))
-            yield Pass(rate, past.light, before, planes, valid, windows.mapped)
+            before = torch.where(alive > 0, past.final, torch.cat([rate[:, :1], wanted[:, :1]], dim=1))
+            yield Pass(rate, wanted, before, planes, valid, windows.mapped)
             windows = learned(layout, windows, rate.detach().clamp(0.0, 1.0))
-            past = _Past(part.light, kept[0], kept[1], torch.cat([rate[:, -1:], past.light[:, -1:]], dim=1))
+            final = torch.cat([rate[:, -1:], wanted[:, -1:]], dim=1)
+            past = _Past(part.light, kept[0], kept[1], final, its_kept[0], its_kept[1])
         self._windows.put(rows, windows)
         for name, value in vars(past).items():
             getattr(self._past, name)[rows] = value.detach()

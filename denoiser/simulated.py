@@ -28,6 +28,9 @@ from spikecam_env.sensor.kernels import cuda, fast
 from spikecam_env.sensor.kernels.cuda.state import BatchLaw, BatchSegment, BatchState
 from spikecam_env.sensor.light import GRAINS
 
+TWINS = ("noisy", "clean")
+"""Spikes of a stream: of its camera, and of the camera without noise."""
+
 SHAPES = 5
 """Shapes before the background; each stream shows a part of them."""
 
@@ -78,14 +81,23 @@ CONTRAST = (2.0, 50.0)
 class Simulated:
     """The next frames of all streams (or of those asked for).
 
-    noisy, clean: (B, K, H, W) uint8, 0 or 1.  light: (B, K, H, W) float32 in [0, 1], each frame's mean [spikes/frame].
-    begins: (B,) bool, whether the stream began anew with the first of these frames.
+    spikes: of each twin that is simulated, (B, K, H, W) uint8, 0 or 1.  light: (B, K, H, W) float32 in [0, 1], each
+    frame's mean [spikes/frame].  begins: (B,) bool, whether the stream began anew with the first of these frames.
     """
 
-    noisy: Tensor
-    clean: Tensor
+    spikes: dict[str, Tensor]
     light: Tensor
     begins: Tensor
+
+    @property
+    def noisy(self) -> Tensor:
+        """Spikes of the noisy units."""
+        return self.spikes["noisy"]
+
+    @property
+    def clean(self) -> Tensor:
+        """Spikes of their noise-free twins."""
+        return self.spikes["clean"]
 
 
 @dataclass(frozen=True)
@@ -148,6 +160,7 @@ class SimulatedStreams:
 
     device: where they are.  seed: everything follows from it.  bank: default, drawn from the seed.
     compiled: the light by `torch.compile` (a GPU's kernels are then few; other rounding).
+    twins: which spikes are simulated; the same bits whether the other is or not.
 
     After the start only `advance` changes anything, and in place (`denoiser.captured`).
     Raises InputError for a patch that is larger than the bank's units.
@@ -162,8 +175,9 @@ class SimulatedStreams:
         *,
         bank: Bank | None = None,
         compiled: bool = False,
+        twins: tuple[str, ...] = TWINS,
     ) -> None:
-        self.device = torch.device(device)
+        self.device, self.twins = torch.device(device), twins
         self.count, self.patch = count, patch
         self.bank = Bank.drawn(seed, self.device) if bank is None else bank
         if patch > min(self.bank.gain.shape[1:]):
@@ -190,13 +204,12 @@ class SimulatedStreams:
         self._fresh.index_fill_(0, rows, False)
         times = mine["age"][:, None] + torch.arange(frames + 1, device=self.device)
         pictures = _paint(self.bank.textures, mine, times, self.patch, self._background, self._over)
-        noisy = self._exposed(mine, pictures, "noisy")
-        clean = self._exposed(mine, pictures, "clean")
+        spikes = {twin: self._exposed(mine, pictures, twin) for twin in self.twins}
         mine["age"] = mine["age"] + frames
         for name, value in mine.items():
             self._state[name][rows] = value
         light = ((pictures[:, :-1] + pictures[:, 1:]) / 2).clamp(0.0, 1.0)
-        return Simulated(noisy, clean, light, begins)
+        return Simulated(spikes, light, begins)
 
     def unit(self, rows: Tensor) -> tuple[Tensor, Tensor]:
         """True gain and dark rate [spikes/frame] of the units of these streams, (B, H, W) float32 each."""

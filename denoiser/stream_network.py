@@ -67,6 +67,7 @@ class StreamDnSS(nn.Module):
         super().__init__()
         fine, coarse, head = channels
         self.means = means
+        self._sizes = span, layers, planes, means
         self.stem = nn.Sequential(nn.Conv2d(span + layers + 1, fine, 2, 2), nn.ReLU(inplace=True))
         self.mix = conv_relu(fine + CARRY, fine)
         self.fine = conv_relu(fine, fine)
@@ -77,6 +78,10 @@ class StreamDnSS(nn.Module):
         self.out = conv(fine, 4 * planes)
         self.unfold = nn.PixelShuffle(2)
         self.head = nn.Sequential(conv_relu(planes + layers + 1, head), conv(head, planes + means[1] - means[0]))
+
+    def with_channels(self, channels: tuple[int, int, int]) -> StreamDnSS:
+        """An untrained network for the same windows, with other channels."""
+        return StreamDnSS(*self._sizes, channels)
 
     def forward(self, spikes: Tensor, planes: Tensor, carried: Carried = None) -> tuple[Tensor, tuple[Tensor, Tensor]]:
         height, width = spikes.shape[-2:]

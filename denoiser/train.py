@@ -23,13 +23,15 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor, nn
 
-from denoiser.captured import captured
+from denoiser.captured import captured, checked_compiler
 from denoiser.interval_training import IntervalWindows
+from denoiser.network import DnSS
 from denoiser.recipe import RECIPES, Recipe, checked_channels, recipe_of
 from denoiser.rollout import Rollouts
 from denoiser.run import Run
 from denoiser.simulated import Bank, SimulatedStreams
-from denoiser.stream_network import CHANNELS
+from denoiser.smaller import narrowed, without_refine
+from denoiser.stream_network import CHANNELS, StreamDnSS
 from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, pretrained_path, save_weights
@@ -39,6 +41,8 @@ from spikecam_env.torch_settings import torch_settings
 
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 8
+NARROWING_PASSES = 16
+"""Passes of so many streams on which the channels of a larger network are looked at, where a smaller one begins."""
 PASSES = {"best": 3, "paper": 1}
 """Passes of each stream that a step takes."""
 
@@ -66,8 +70,11 @@ class TrainConfig:
     threads: of the processor.  device: where streams and network are; a GPU wants larger batches.
     refine: `paper` with its refine module or, for the ablation, without.
     channels: of `best`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.
-    start: weights of the same mode to begin from, a file of this training or a mode's name for those that ship.
+    start: weights of the same mode to begin from, a file of this training or a mode's name for those that ship; of a
+    network with more channels, or with the refine module, what matters most (`smaller`).
     resume: go on from out/last.pt.
+    teacher: of `best`, weights whose rates the network is to learn, a file or "best", instead of the light.
+    compiled: the simulated light by `torch.compile`, on a processor too; a GPU always does.
     """
 
     mode: str = "best"
@@ -87,6 +94,8 @@ class TrainConfig:
     validate_passes: int = 24
     device: str = "cpu"
     start: str | None = None
+    teacher: str | None = None
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         recipe_of(self.mode)
@@ -100,7 +109,7 @@ class TrainConfig:
                 continue
             if not isinstance(amount, int | float) or isinstance(amount, bool) or not 0 < amount <= highest:
                 raise InputError(f"{name} is {amount!r}; it must be a number above 0, at most {highest:g}")
-        for name in ("resume", "refine"):
+        for name in ("resume", "refine", "compiled"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
         if self.patch % 16:
@@ -110,8 +119,14 @@ class TrainConfig:
             raise InputError(f"out is {self.out!r}; it must be the path of a folder")
         object.__setattr__(self, "out", Path(self.out))
         checked_device(self.device, "train with --device cpu")
-        if self.start is not None and not isinstance(self.start, str):
-            raise InputError(f"start is {self.start!r}; it must be the path of weights, or a mode's name")
+        if self.compiled:
+            checked_compiler(self.device)
+        for name in ("start", "teacher"):
+            given = getattr(self, name)
+            if given is not None and not isinstance(given, str):
+                raise InputError(f"{name} is {given!r}; it must be the path of weights, or a mode's name")
+        if self.teacher is not None and self.mode != "best":
+            raise InputError(f"teacher is for mode 'best'; leave it out for {self.mode!r}")
 
 
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
@@ -128,19 +143,21 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
     config.out.mkdir(parents=True, exist_ok=True)
     recipe = replace(recipe_of(config.mode), refine=config.refine, channels=config.channels)
     device = torch.device(config.device)
-    network = recipe.network() if config.start is None else _started(recipe, config.start)
+    network = recipe.network() if config.start is None else started(recipe, config.start, config.seed)
     run = Run.begin(network.to(device, memory_format=torch.channels_last))  # type: ignore[call-overload]
     if config.resume and (config.out / RUN_FILE).exists():
         run.load(config.out / RUN_FILE)
     torch.backends.cudnn.benchmark = True
+    taught = {} if config.teacher is None else {"teacher": _teacher(recipe, config.teacher).to(device)}
     streams = source(
         recipe,
+        **taught,
         seed=config.seed + run.step,  # a resumed run meets other streams
         taken=config.batch,
         patch=config.patch,
         device=device,
         bank=Bank.drawn(config.seed, device, streams=config.steps * config.batch, progress=progress),
-        compiled=device.type == "cuda",
+        compiled=config.compiled or device.type == "cuda",
     )
     judge = Judge(recipe, config.seed + VALIDATION_SEED, device, config.validate_passes)
     return learn(
@@ -210,13 +227,38 @@ class Judge:
         return {f"{name}_db": round(-10 * math.log10(max(error, 1e-12)), 3) for name, error in errors.items()}
 
 
-def _started(recipe: Recipe, start: str) -> nn.Module:
-    """The network of a file, or of the weights that ship under this name, ready to learn further."""
-    path = pretrained_path(start) if start in RECIPES else Path(start)
-    found, network, _ = load_weights(path)
-    if replace(found, decoder=recipe.decoder) != recipe:  # how rates become spikes is not learnt
-        raise InputError(f"start is {start!r}, weights of another network; give a file of this mode")
+def started(recipe: Recipe, start: str, seed: int) -> nn.Module:
+    """The network of a file, or of the weights that ship under this name, ready to learn further.
+
+    Of a larger network a smaller one is made (`smaller`), on streams of this seed.  Raises InputError where the recipe
+    is of another kind, or the larger one.
+    """
+    found, network, _ = load_weights(_named(start))
+    alike = replace(found, decoder=recipe.decoder, channels=recipe.channels, refine=recipe.refine) == recipe
+    larger = all(one >= other for one, other in zip(found.channels, recipe.channels, strict=True))
+    if not alike or not larger or found.refine < recipe.refine:  # how rates become spikes is not learnt
+        raise InputError(
+            f"start is {start!r}, weights of another network; give a file of this mode, as large or larger"
+        )
+    if isinstance(network, DnSS) and found.refine > recipe.refine:
+        network = without_refine(network)
+    if isinstance(network, StreamDnSS) and found.channels != recipe.channels:
+        seen = source(recipe, seed=seed, taken=VALIDATION_STREAMS, pool=1, patch=64, device=torch.device("cpu"))
+        network = narrowed(network, recipe.channels, lambda larger: seen.errors(larger, NARROWING_PASSES))
     return network.train()
+
+
+def _teacher(recipe: Recipe, teacher: str) -> nn.Module:
+    """Raises InputError for a network of other windows."""
+    found, network, _ = load_weights(_named(teacher))
+    if found.layout != recipe.layout:
+        raise InputError(f"teacher is {teacher!r}, weights of another mode; give a file of this mode")
+    return network.to(memory_format=torch.channels_last).requires_grad_(False)  # type: ignore[call-overload, no-any-return]
+
+
+def _named(weights: str) -> Path:
+    """The path of weights that are given by path, or of those that ship by the name of their mode."""
+    return pretrained_path(weights) if weights in RECIPES else Path(weights)
 
 
 def _save(config: TrainConfig, recipe: Recipe, run: Run) -> Path:

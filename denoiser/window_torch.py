@@ -120,8 +120,8 @@ def _planes(
     past, count, span = layout.past, layout.planes, layout.span
     times = torch.arange(span, device=frames.device, dtype=torch.int32)[None, :, None, None]
     fired = (frames > 0) & (times > none[:, None])
-    latest = torch.cummax(torch.where(fired, times, last[:, None]), dim=1).values  # last spike at or before each frame
-    following = torch.cummin(torch.where(fired, times, span).flip(1), dim=1).values.flip(1)  # first at or after each
+    latest = _greatest_so_far(torch.where(fired, times, last[:, None]))  # last spike at or before each frame
+    following = -_greatest_so_far(-torch.where(fired, times, span).flip(1)).flip(1)  # first at or after each
     counted = torch.cumsum(fired, dim=1, dtype=torch.int32)
     ends = torch.cat([following[:, past + 1 : past + count], following[:, past + count, None]], dim=1)
     planes = [1.0 / (ends - latest[:, past : past + count]).float()]
@@ -137,6 +137,16 @@ def _planes(
     memory = _memories(layout, frames.device)
     weight = 1.0 - (1.0 - 1.0 / memory) ** averaged[:, None]
     return torch.cat([*planes, means / weight[..., None, None]], dim=1), latest[:, count - 1]
+
+
+def _greatest_so_far(values: Tensor) -> Tensor:
+    """`torch.cummax` along dimension 1, by doubling: several times faster on a processor."""
+    reach = 1
+    while reach < values.shape[1]:
+        later = torch.maximum(values[:, reach:], values[:, :-reach])
+        values = torch.cat([values[:, :reach], later], dim=1)
+        reach *= 2
+    return values
 
 
 @lru_cache(maxsize=4)

@@ -25,7 +25,7 @@ class RollingWindows:
     def advance(self, frames: int) -> Windows:
         """Go on by `frames`; the windows that end there, which the next call overwrites."""
         part = self.streams.advance(frames)
-        _push(self._spikes, getattr(part, self._kind))
+        _push(self._spikes, part.spikes[self._kind])
         _push(self._light, part.light)
         self._age.copy_(torch.where(part.begins, 0, self._age) + frames)
         return Windows(self._spikes, self._light, self._age >= self._spikes.shape[1])

@@ -20,7 +20,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from denoiser.captured import captured
+from denoiser.captured import captured, checked_compiler
 from denoiser.number_type import computing_in, number_type
 from denoiser.reconstruct import ssml
 from denoiser.reconstruct.lessons import Lesson, Windows, lesson_of
@@ -65,6 +65,7 @@ class ReconstructorConfig:
     batch: streams, each a window a step.  patch: their side [pixels].  frames_a_step: by which they go on.
     lr: highest rate of learning.  validate_every: steps.  threads, device: of network and streams.
     resume: go on from out/last.pt.
+    compiled: the simulated light by `torch.compile`, on a processor too; a GPU always does.
     """
 
     mode: str = "spk2img-noisy"
@@ -82,6 +83,7 @@ class ReconstructorConfig:
     device: str = "cpu"
     width: int | None = None
     frames_a_step: int = 12
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         self.recipe()
@@ -91,12 +93,15 @@ class ReconstructorConfig:
         for name, highest in _AMOUNTS.items():
             if name != "minutes" or self.minutes is not None:
                 checked_number(getattr(self, name), name, 0.0, highest, above=True)
-        if not isinstance(self.resume, bool):
-            raise InputError(f"resume is {self.resume!r}; it must be True or False")
+        for name in ("resume", "compiled"):
+            if not isinstance(getattr(self, name), bool):
+                raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
         if not isinstance(self.out, str | os.PathLike):
             raise InputError(f"out is {self.out!r}; it must be the path of a folder")
         object.__setattr__(self, "out", Path(self.out))
         checked_device(self.device, "train with --device cpu")
+        if self.compiled:
+            checked_compiler(self.device)
 
     def recipe(self) -> ReconstructorRecipe:
         """What is trained; raises InputError for an unknown mode or width."""
@@ -153,17 +158,26 @@ def _windows(config: ReconstructorConfig, step: int, span: int) -> RollingWindow
     """Of the streams to learn from; a run that is resumed at `step` meets others."""
     device = torch.device(config.device)
     bank = Bank.drawn(config.seed, device)
-    seed, compiled = config.seed + step, device.type == "cuda"
-    streams = SimulatedStreams(config.batch, config.patch, device, seed, bank=bank, compiled=compiled)
-    return RollingWindows(streams, config.recipe().learns_from, span)
+    seed, twin = config.seed + step, config.recipe().learns_from
+    streams = SimulatedStreams(
+        config.batch,
+        config.patch,
+        device,
+        seed,
+        bank=bank,
+        compiled=config.compiled or device.type == "cuda",
+        twins=(twin,),
+    )
+    return RollingWindows(streams, twin, span)
 
 
 def _held_out(config: ReconstructorConfig) -> list[Windows]:
     """Windows of other streams at a few moments."""
     seed, device = config.seed + VALIDATION_SEED, torch.device(config.device)
     bank = Bank.drawn(seed, device, textures=VALIDATION_TEXTURES, units=VALIDATION_UNITS)
-    streams = SimulatedStreams(VALIDATION_STREAMS, config.patch, device, seed, bank=bank)
-    rolling = RollingWindows(streams, config.recipe().learns_from, WINDOW)
+    twin = config.recipe().learns_from
+    streams = SimulatedStreams(VALIDATION_STREAMS, config.patch, device, seed, bank=bank, twins=(twin,))
+    rolling = RollingWindows(streams, twin, WINDOW)
     return [rolling.advance(FRAMES_BETWEEN_MOMENTS).copy() for _ in range(VALIDATION_MOMENTS)]
 
 

@@ -16,6 +16,7 @@ ONLY_OF = {
     "refine": ("paper",),
     "channels": ("best",),
     "start": DENOISERS,
+    "teacher": ("best",),
     "validate_passes": DENOISERS,
     "width": RECONSTRUCTORS,
     "frames_a_step": RECONSTRUCTORS,
@@ -58,7 +59,10 @@ class Train:
     """Channels of `best` at half and at quarter resolution, and of its head: fewer are faster, and less accurate.
     Default: 64 128 24."""
     start: str | None = None
-    """Weights to begin from: a file of this command, or `best` or `paper` for those that ship.  Default: none."""
+    """Weights to begin from: a file of this command, or `best` or `paper` for those that ship.  A network with fewer
+    channels, or without the refine module, begins from a larger one.  Default: none."""
+    teacher: str | None = None
+    """Weights whose rates `best` learns instead of the true light, for a smaller network: a file, or `best`."""
     width: Count | None = None
     """Channels of a reconstructor, a multiple of 12 up to 252.  Default: 48."""
     frames_a_step: Count | None = None
@@ -67,6 +71,8 @@ class Train:
     """Steps between validations.  Default: 1000, of reconstructors 500."""
     validate_passes: Count | None = None
     """Passes of each validation along its eight streams.  Default: 24."""
+    compiled: bool = False
+    """Compile the simulation on a processor too: half as long a step, after a minute; needs a C++ compiler."""
     resume: bool = True
     """Continue from the folder's checkpoint, if there is one."""
 

@@ -104,7 +104,7 @@ def test_young_streams_teach_nothing(bank, monkeypatch):
 
     def begun(frames, rows):
         part = advance(frames, rows)
-        return Simulated(part.noisy, part.clean, part.light, torch.ones_like(part.begins))
+        return Simulated(part.spikes, part.light, torch.ones_like(part.begins))
 
     monkeypatch.setattr(windows.streams, "advance", begun)
     assert float(windows.loss(Same(), 15)) == 0 and set(windows.errors(Same(), 15).values()) == {0.0}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -18,23 +17,16 @@ from denoiser.reconstruct.rolling import RollingWindows
 from denoiser.reconstruct.train import ReconstructorConfig, train_reconstructor
 from denoiser.reconstruct.weights import load_reconstructor
 from denoiser.run import Run
-from denoiser.simulated import Bank
+from denoiser.simulated import TWINS, Bank, Simulated
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane
-
-
-@dataclass
-class Part:
-    noisy: torch.Tensor
-    clean: torch.Tensor
-    light: torch.Tensor
-    begins: torch.Tensor
 
 
 class Flats:
     """Still streams of one light each; noisy spikes are twice as many as clean ones.  Ages are counted in the light."""
 
-    def __init__(self, count=4, patch=16, device="cpu", seed=0, *, bank=None, compiled=False):
+    def __init__(self, count=4, patch=16, device="cpu", seed=0, *, bank=None, compiled=False, twins=TWINS):
+        self.twins = twins
         self.rng = torch.Generator().manual_seed(seed)
         self.count, self.patch, self.device, self.renewed = count, patch, device, []
         self.rate = torch.rand(count, 1, 1, 1, generator=self.rng) * 0.4 + 0.05
@@ -45,7 +37,8 @@ class Flats:
         begins = torch.zeros(self.count, dtype=torch.bool)
         begins[self.renewed] = True
         light = self.rate.expand(shape).contiguous()
-        return Part((drawn < 2 * light).byte(), (drawn < light).byte(), light, begins)
+        spikes = {"noisy": (drawn < 2 * light).byte(), "clean": (drawn < light).byte()}
+        return Simulated({twin: spikes[twin] for twin in self.twins}, light, begins)
 
 
 class NoBank:

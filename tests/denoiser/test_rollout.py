@@ -22,7 +22,7 @@ class Flats:
 
     light = 0.25
 
-    def __init__(self, count, patch, device, seed, *, bank=None, compiled=False):
+    def __init__(self, count, patch, device, seed, *, bank=None, compiled=False, twins=()):
         self.count, self.patch, self.device = count, patch, device
         self.rng = torch.Generator().manual_seed(seed)
         self.renewed, self.fresh, self.taken = [], True, []
@@ -33,7 +33,7 @@ class Flats:
         self.fresh = False
         spikes = torch.zeros((len(rows), frames, self.patch, self.patch), dtype=torch.uint8)
         spikes[:, :: round(1 / self.light)] = 1
-        return Simulated(spikes, spikes, torch.full(spikes.shape, self.light), begins)
+        return Simulated({"noisy": spikes}, torch.full(spikes.shape, self.light), begins)
 
     def unit(self, rows):
         shape = (len(rows), self.patch, self.patch)
@@ -113,6 +113,23 @@ def test_what_is_carried_reaches_the_next_pass_and_not_the_next_stream(flats):
         found = [carried[part].amax(dim=(1, 2, 3)).tolist() for carried in network.carried]
         assert all(torch.equal(c[part].amax(dim=(1, 2, 3)), c[part].amin(dim=(1, 2, 3))) for c in network.carried)
         assert found == [[0, 0], [0, 0], [2, 2], [3, 3], [4, 0], [5, 0], [6, 6], [7, 7]]
+
+
+def test_a_teacher_is_wanted_instead_of_the_light_and_carries_on_its_own(monkeypatch):
+    """Rates that rise like the teacher's cost nothing, though the light is another; the light does then cost."""
+    monkeypatch.setattr(rollout, "SimulatedStreams", Flats)
+    rising = [0.3 + 0.02 * n for n in range(16)]
+    losses = {}
+    for name, rates in (("teacher's", rising), ("light", [Flats.light] * 16)):
+        teacher = Answers(rising)
+        flats = Rollouts(LAYOUT, taken=2, patch=PATCH, device=CPU, seed=0, pool=1, teacher=teacher)
+        network = Answers(rates)
+        network.carried = [None] * 10  # so that it counts its passes from 11 on
+        losses[name] = [float(flats.loss(network, 1)) for _ in range(5)]
+        found = [carried[1].amax(dim=(1, 2, 3)).tolist() for carried in teacher.carried]
+        assert found == [[0, 0], [0, 0], [2, 2], [3, 3], [4, 4]]
+    print(losses)
+    assert losses["teacher's"] == [0] * 5 and all(loss > 0.05 for loss in losses["light"][1:])
 
 
 def test_gradients_reach_back_through_the_passes(flats):

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from denoiser.recipe import RECIPES
-from denoiser.simulated import AGES, SHAPES, SPEEDS, Bank, SimulatedStreams
+from denoiser.simulated import AGES, SHAPES, SPEEDS, TWINS, Bank, SimulatedStreams
 from scenes.catalogue import make_scene
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels import fast
@@ -223,6 +223,14 @@ def test_rows_advance_alone(bank):
         for name in ("noisy", "clean", "light", "begins"):
             assert torch.equal(getattr(a, name)[1], getattr(b, name)[0])
             assert torch.equal(getattr(a, name)[others], getattr(c, name))
+
+
+def test_a_twin_is_the_same_without_the_other(bank):
+    both, alone = (SimulatedStreams(4, PATCH, seed=5, bank=bank, twins=twins) for twins in (TWINS, ("noisy",)))
+    for _ in range(2):
+        part, mine = both.advance(32), alone.advance(32)
+        assert torch.equal(part.noisy, mine.noisy) and torch.equal(part.light, mine.light)
+    assert list(part.spikes) == list(TWINS) and list(mine.spikes) == ["noisy"]
 
 
 def test_a_bank_for_few_streams_holds_no_more_than_they_can_show():

@@ -13,11 +13,12 @@ from denoiser import train as training
 from denoiser import training_loop
 from denoiser.online import OnlineDnSS
 from denoiser.recipe import RECIPES
+from denoiser.reconstruct.train import ReconstructorConfig
 from denoiser.run import Run
 from denoiser.simulated import Bank
 from denoiser.train import Judge, TrainConfig, train
 from denoiser.training_record import command
-from denoiser.weights import load_weights
+from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.errors import InputError
 
 
@@ -118,9 +119,53 @@ def test_a_run_begins_from_the_weights_that_are_given(small, tmp_path):
     assert not any(torch.allclose(other["stem.0.weight"], given["stem.0.weight"]) for other in (elsewhere, shipped))
 
 
-def test_weights_of_another_network_are_no_start(tmp_path):
-    with pytest.raises(InputError, match="weights of another network"):
-        train(TrainConfig(mode="best", out=tmp_path, start="paper"), progress=False)
+@pytest.mark.parametrize(
+    "options",
+    [{"start": "paper"}, {"start": "best", "channels": (65, 128, 24)}, {"mode": "paper", "start": "bare"}],
+)
+def test_weights_of_another_network_are_no_start(small, tmp_path, options):
+    """Of another kind, or of a smaller one."""
+    bare = tmp_path / "bare"
+    if options["start"] == "bare":
+        weights_after(bare, 1, "paper", refine=False)
+        options = options | {"start": str(bare / "paper.pt")}
+    with pytest.raises(InputError, match=r"weights of another network.*as large or larger"):
+        train(TrainConfig(**options, out=tmp_path / "run"), progress=False)
+
+
+def test_a_smaller_network_begins_from_what_a_larger_one_has_learnt(small, tmp_path):
+    """Half the channels of `best` begin 5 dB better than untrained ones; without its refine module `paper` goes on."""
+    options = {"lr": 1e-9, "validate_every": 1, "validate_passes": 12, "channels": (32, 64, 12)}
+    for name, start in (("begun", "best"), ("untrained", None)):
+        weights_after(tmp_path / name, 1, start=start, **options)
+    begun, untrained = (
+        json.loads((tmp_path / name / "curve.json").read_text())[0]["network_db"] for name in ("begun", "untrained")
+    )
+    print(f"{begun} dB, untrained {untrained} dB")
+    assert begun > untrained + 5
+    weights = weights_after(tmp_path / "bare", 1, "paper", refine=False, start="paper", lr=1e-9)
+    shipped = load_weights(pretrained_path("paper"))[1].state_dict()
+    assert torch.allclose(weights["stem.0.0.weight"], shipped["stem.0.0.weight"], atol=1e-6)
+
+
+def test_a_network_learns_the_rates_of_a_teacher(small, tmp_path):
+    """From its own weights there is nothing to learn; the record names the teacher."""
+    options = {"start": "best", "validate_every": 2}
+    weights_after(tmp_path, 2, teacher="best", **options)
+    weights_after(tmp_path / "light", 2, **options)
+    taught, light = (json.loads((tmp_path / out / "curve.json").read_text())[0]["loss"] for out in (".", "light"))
+    print(taught, light)
+    assert taught < 1e-6 < light
+    assert "--teacher best" in load_weights(tmp_path / "best.pt")[2]["command"]
+
+
+def test_a_teacher_of_another_mode_is_refused(small, tmp_path):
+    with pytest.raises(InputError, match="weights of another mode; give a file of this mode"):
+        train(TrainConfig(teacher="paper", out=tmp_path), progress=False)
+    with pytest.raises(InputError, match="teacher is for mode 'best'"):
+        TrainConfig(mode="paper", teacher="best")
+    with pytest.raises(InputError, match="teacher is 3; it must be the path of weights"):
+        TrainConfig(teacher=3)
 
 
 def test_minutes_end_a_run(small, tmp_path):
@@ -147,7 +192,10 @@ def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
             {"mode": "paper", "refine": False, "batch": 48, "minutes": 7.5, "resume": False},
             "spikecam train --mode paper --out OUT --batch 48 --minutes 7.5 --no-refine",
         ),
-        ({"channels": (32, 64, 12)}, "spikecam train --mode best --out OUT --channels 32 64 12"),
+        (
+            {"channels": (32, 64, 12), "compiled": True},
+            "spikecam train --mode best --out OUT --channels 32 64 12 --compiled",
+        ),
     ],
 )
 def test_a_record_says_what_to_type(options, expected, monkeypatch):
@@ -176,6 +224,15 @@ def test_the_run_of_another_mode_is_refused(small, tmp_path):
 def test_unusable_options_are_named(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
         TrainConfig(**bad)
+
+
+@pytest.mark.parametrize("kind", [TrainConfig, ReconstructorConfig])
+def test_compiling_without_a_compiler_is_refused(kind, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CXX", raising=False)
+    with pytest.raises(InputError, match="compiler on a processor"):
+        kind(compiled=True)
+    assert not kind().compiled
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="this machine has a CUDA device")
