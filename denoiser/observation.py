@@ -28,8 +28,8 @@ from spikecam_env.envs.observations.protocol import Blocks, Observation, Streams
 class Rate(Observation):
     """(1, H, W) uint8: 255 where the denoised rate is `white` or above.
 
-    mode: "best", "paper", or the path of a checkpoint (.pt).  white: [spikes/frame]; eight bits round what is below a
-    500th of it to 0.
+    mode: "best", "fast", "paper", or the path of a checkpoint (.pt).
+    white: [spikes/frame]; eight bits round what is below a 500th of it to 0.
     Raises InputError for a white that is not above 0, and, when an episode begins, for another mode and for an unusable
     checkpoint.
     """

@@ -122,7 +122,7 @@ class OnlineDnSS:
 
     @classmethod
     def pretrained(cls, mode: str = "best", **options: Any) -> OnlineDnSS:
-        """With the shipped weights of a mode, "best" or "paper"."""
+        """With the shipped weights of a mode, "best", "fast" or "paper"."""
         return cls.from_file(pretrained_path(mode), **options)
 
     @classmethod

@@ -86,20 +86,18 @@ class _DeclaredRecipe(Declared):
     channels: Annotated[tuple[_Channels, _Channels, _Channels], Field(strict=False)] = CHANNELS
 
 
+_PASSES = WindowLayout(
+    past=16, planes=16, future=16, half_widths=(4, 12, 22), memories=(64.0, 512.0), gain_memory=1024.0
+)
 RECIPES = {
     "paper": Recipe(WindowLayout(past=20, planes=1, future=20), "clean_inverse_interval", "accumulate"),
-    "best": Recipe(
-        WindowLayout(
-            past=16, planes=16, future=16, half_widths=(4, 12, 22), memories=(64.0, 512.0), gain_memory=1024.0
-        ),
-        "light",
-        "accumulate",
-    ),
+    "best": Recipe(_PASSES, "light", "accumulate"),
+    "fast": Recipe(_PASSES, "light", "accumulate", channels=(32, 64, 12)),
 }
 
 
 def recipe_of(mode: str) -> Recipe:
-    """The recipe of a mode, "paper" or "best"."""
+    """The recipe of a mode: "paper", "best" or "fast"."""
     if not isinstance(mode, str) or mode not in RECIPES:
         raise unknown_name("denoiser mode", mode, RECIPES)
     return RECIPES[mode]

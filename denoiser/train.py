@@ -31,7 +31,7 @@ from denoiser.rollout import Rollouts
 from denoiser.run import Run
 from denoiser.simulated import Bank, SimulatedStreams
 from denoiser.smaller import narrowed, without_refine
-from denoiser.stream_network import CHANNELS, StreamDnSS
+from denoiser.stream_network import StreamDnSS
 from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, pretrained_path, save_weights
@@ -43,8 +43,8 @@ VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, oth
 VALIDATION_STREAMS = 8
 NARROWING_PASSES = 16
 """Passes of so many streams on which the channels of a larger network are looked at, where a smaller one begins."""
-PASSES = {"best": 3, "paper": 1}
-"""Passes of each stream that a step takes."""
+PASSES = {"light": 3, "clean_inverse_interval": 1}
+"""Passes of each stream that a step takes, by what the network learns."""
 
 _COUNTS = {
     "steps": (1, 10**9),
@@ -63,17 +63,18 @@ _AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """mode: "best" | "paper".  out: folder.  The run ends after `steps`, or `minutes` where that is given.
+    """mode: "best" | "fast" | "paper".  out: folder.  The run ends after `steps`, or `minutes` where that is given.
 
     batch: streams a step.  patch: their side [pixels], a multiple of 16.  lr: highest rate of learning.
     validate_every: steps between validations.  validate_passes: passes of each validation along its streams.
     threads: of the processor.  device: where streams and network are; a GPU wants larger batches.
     refine: `paper` with its refine module or, for the ablation, without.
-    channels: of `best`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.
+    channels: of `best` and `fast`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.  None:
+    the mode's.
     start: weights of the same mode to begin from, a file of this training or a mode's name for those that ship; of a
     network with more channels, or with the refine module, what matters most (`smaller`).
     resume: go on from out/last.pt.
-    teacher: of `best`, weights whose rates the network is to learn, a file or "best", instead of the light.
+    teacher: not of `paper`, weights whose rates the network is to learn, a file or "best", instead of the light.
     compiled: the simulated light by `torch.compile`, on a processor too; a GPU always does.
     """
 
@@ -88,7 +89,7 @@ class TrainConfig:
     patch: int = 64
     lr: float = 1e-3
     refine: bool = True
-    channels: tuple[int, int, int] = CHANNELS
+    channels: tuple[int, int, int] | None = None
     save_every_s: float = 60.0
     validate_every: int = 1000
     validate_passes: int = 24
@@ -114,7 +115,8 @@ class TrainConfig:
                 raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
         if self.patch % 16:
             raise InputError(f"patch is {self.patch}; it must be a multiple of 16")
-        object.__setattr__(self, "channels", checked_channels(self.channels))
+        if self.channels is not None:
+            object.__setattr__(self, "channels", checked_channels(self.channels))
         if not isinstance(self.out, str | os.PathLike):
             raise InputError(f"out is {self.out!r}; it must be the path of a folder")
         object.__setattr__(self, "out", Path(self.out))
@@ -125,8 +127,8 @@ class TrainConfig:
             given = getattr(self, name)
             if given is not None and not isinstance(given, str):
                 raise InputError(f"{name} is {given!r}; it must be the path of weights, or a mode's name")
-        if self.teacher is not None and self.mode != "best":
-            raise InputError(f"teacher is for mode 'best'; leave it out for {self.mode!r}")
+        if self.teacher is not None and recipe_of(self.mode).target != "light":
+            raise InputError(f"teacher is for modes that learn the light; leave it out for {self.mode!r}")
 
 
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
@@ -141,11 +143,16 @@ def train(config: TrainConfig, *, progress: bool = True) -> Path:
 
 def _trained(config: TrainConfig, progress: bool) -> Path:
     config.out.mkdir(parents=True, exist_ok=True)
-    recipe = replace(recipe_of(config.mode), refine=config.refine, channels=config.channels)
+    recipe = replace(recipe_of(config.mode), refine=config.refine)
+    recipe = recipe if config.channels is None else replace(recipe, channels=config.channels)
     device = torch.device(config.device)
-    network = recipe.network() if config.start is None else started(recipe, config.start, config.seed)
+    resumes = config.resume and (config.out / RUN_FILE).exists()
+    if config.start is None or resumes:
+        network = recipe.network()
+    else:
+        network = started(recipe, config.start, config.seed, config.patch)
     run = Run.begin(network.to(device, memory_format=torch.channels_last))  # type: ignore[call-overload]
-    if config.resume and (config.out / RUN_FILE).exists():
+    if resumes:
         run.load(config.out / RUN_FILE)
     torch.backends.cudnn.benchmark = True
     taught = {} if config.teacher is None else {"teacher": _teacher(recipe, config.teacher).to(device)}
@@ -163,7 +170,7 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
     return learn(
         config,
         run,
-        lambda: stepper(run, streams, PASSES[config.mode]),
+        lambda: stepper(run, streams, PASSES[recipe.target]),
         lambda: judge.scores(run.network),
         lambda: _save(config, recipe, run),
         began=time.monotonic(),
@@ -227,11 +234,11 @@ class Judge:
         return {f"{name}_db": round(-10 * math.log10(max(error, 1e-12)), 3) for name, error in errors.items()}
 
 
-def started(recipe: Recipe, start: str, seed: int) -> nn.Module:
+def started(recipe: Recipe, start: str, seed: int, patch: int = 64) -> nn.Module:
     """The network of a file, or of the weights that ship under this name, ready to learn further.
 
-    Of a larger network a smaller one is made (`smaller`), on streams of this seed.  Raises InputError where the recipe
-    is of another kind, or the larger one.
+    Of a larger network a smaller one is made (`smaller`), on streams of this seed and side [pixels].  Raises InputError
+    where the recipe is of another kind, or the larger one.
     """
     found, network, _ = load_weights(_named(start))
     alike = replace(found, decoder=recipe.decoder, channels=recipe.channels, refine=recipe.refine) == recipe
@@ -243,7 +250,7 @@ def started(recipe: Recipe, start: str, seed: int) -> nn.Module:
     if isinstance(network, DnSS) and found.refine > recipe.refine:
         network = without_refine(network)
     if isinstance(network, StreamDnSS) and found.channels != recipe.channels:
-        seen = source(recipe, seed=seed, taken=VALIDATION_STREAMS, pool=1, patch=64, device=torch.device("cpu"))
+        seen = source(recipe, seed=seed, taken=VALIDATION_STREAMS, pool=1, patch=patch, device=torch.device("cpu"))
         network = narrowed(network, recipe.channels, lambda larger: seen.errors(larger, NARROWING_PASSES))
     return network.train()
 

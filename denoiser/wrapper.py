@@ -21,8 +21,8 @@ WARM_UPS = ("black", "noisy")
 class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     """Replaces each (K, H, W) block of spikes by the denoised block of the same length, `denoiser_latency` frames late.
 
-    mode: "best", "paper", the path of a checkpoint (.pt), or an `OnlineDnSS` of your own, of which the wrapper takes
-    another one: the same weights, stride and precision, a stream of its own.
+    mode: "best", "fast", "paper", the path of a checkpoint (.pt), or an `OnlineDnSS` of your own, of which the wrapper
+        takes another one: the same weights, stride and precision, a stream of its own.
     output: "spikes" (same space) or "rate" (float32 in [0, 1]).
     warm_up: what the first `denoiser_latency` frames of an episode show, which nothing was denoised for: "black", or
         "noisy", the first block: its frames over again, or their mean rate.

@@ -41,7 +41,19 @@ ABLATION = (
     *("baseline-held", "baseline-mus", "baseline", "paper-held", "paper-mus", "paper"),
     *("clean", "light-held", "light-mus", "light"),
 )
-METHODS = ("noisy", "tfp", "ssml", "spk2img-clean", "spk2img-noisy", "paper-mus", "paper", "best", "clean", "light")
+METHODS = (
+    "noisy",
+    "tfp",
+    "ssml",
+    "spk2img-clean",
+    "spk2img-noisy",
+    "paper-mus",
+    "paper",
+    "fast",
+    "best",
+    "clean",
+    "light",
+)
 REAL_METHODS = METHODS[:-2]
 REAL_ABLATION = ABLATION[:7]
 BYTES = 12

@@ -47,7 +47,7 @@ class LiveDnSS:
     """Denoised pictures of a stream of packed frames, at the instants at which they are asked for.
 
     shape: (rows, columns).
-    mode: "best", "paper", or the path of a checkpoint.
+    mode: "best", "fast", "paper", or the path of a checkpoint.
     passes: of the network for a picture, one after another; the last is shown.  More know more, and take longer.
     plane: which frame of a pass a picture shows, 0 the oldest; default its middle, which the network knows best.
     room: frames that are kept.

@@ -10,6 +10,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from spikecam_env.streams.vidar import save_vidar_dat
 
 RECORDED = 1024
 """Frames of the file that is played over and over: 13 MB, which a machine keeps in memory, as it would a camera's."""
+MODES = ("best", "fast")
 SPEEDS = (1.0, 0.5, 0.1)
 """Of the file, 1 being real time."""
 SECONDS = 60.0
@@ -65,16 +67,18 @@ def bench_live(seconds: float = SECONDS, seed: int = 0) -> dict[str, list[dict[s
 
 
 def costs(spikes: NDArray[np.uint8]) -> list[dict[str, Any]]:
-    """CPU time of taking a frame in, of reading it, and of a picture; `OnlineDnSS`, for every frame, to compare with.
+    """CPU time of taking a frame in, of reading it, and of a picture by mode; `OnlineDnSS`, for every frame, to compare
+    with.
 
     Columns: what, CPU time [us] of a frame or picture, MB/s of packed bytes, and the cores that real time would take
     (30 pictures a second).
     """
     packed = pack_frames(spikes)
-    live = LiveDnSS(SHAPE)
-    live.warm_up()
-    push_s = _cpu_s(lambda: _pushed(live, packed), 20) / len(packed)
-    picture_s = _cpu_s(lambda: _pictured(live, packed), 8) - push_s * len(packed)
+    modes = {mode: LiveDnSS(SHAPE, mode) for mode in MODES}
+    for live in modes.values():
+        live.warm_up()
+    push_s = _cpu_s(lambda: _pushed(modes[MODES[0]], packed), 20) / len(packed)
+    pictures_s = [_cpu_s(partial(_pictured, live, packed), 8) - push_s * len(packed) for live in modes.values()]
     online = OnlineDnSS.pretrained("best", output="rate")
     chunk = spikes[:16]
     online.push(spikes[:64])
@@ -85,7 +89,7 @@ def costs(spikes: NDArray[np.uint8]) -> list[dict[str, Any]]:
         ("push, a frame", push_s, FRAME_RATE_HZ),
         ("read from .dat, a frame", dat, FRAME_RATE_HZ),
         ("read from .h5, a frame", h5, FRAME_RATE_HZ),
-        ("picture", picture_s, 30),
+        *((f"picture, {mode}", picture_s, 30) for mode, picture_s in zip(modes, pictures_s, strict=True)),
         ("OnlineDnSS, a frame", whole_s, FRAME_RATE_HZ),
     )
     return [
@@ -108,11 +112,12 @@ def streams(spikes: NDArray[np.uint8], seconds: float) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder:
         path = _saved(spikes, Path(folder) / "stream.dat")
-        for speed in tqdm(SPEEDS, desc="bench", unit="speed", leave=False):
-            figures = _played(path, speed, seconds)
+        played = [(mode, speed) for mode in MODES for speed in SPEEDS]
+        for mode, speed in tqdm(played, desc="bench", unit="speed", leave=False):
+            figures = _played(path, mode, speed, seconds)
             rows.append(
                 {
-                    "what": f"live, speed {speed:g}",
+                    "what": f"live, {mode}, speed {speed:g}",
                     "frames/s": figures.frames_per_s,
                     "lost": figures.lost,
                     "pictures/s": figures.pictures_per_s,
@@ -170,10 +175,10 @@ def _recorded(scene: Scene, camera: SpikeSensor, first: int, stop: int) -> NDArr
     return np.concatenate(blocks)
 
 
-def _played(path: Path, speed: float, seconds: float) -> Figures:
+def _played(path: Path, mode: str, speed: float, seconds: float) -> Figures:
     with (
         open_source(str(path), loop=True) as source,
-        Session(source, LiveDnSS(SHAPE), speed=speed, seconds=seconds) as session,
+        Session(source, LiveDnSS(SHAPE, mode), speed=speed, seconds=seconds) as session,
     ):
         shown: Shown | None = None
         while not session.over:

@@ -2,7 +2,8 @@
 
 spikecam bench loop
 
-Beside it, block by block on the same spikes, a plain denoiser: the float32 network, called as in training.
+Beside it, block by block on the same spikes, the mode `fast`, and a plain denoiser: the float32 network, called as in
+training.
 Other programs slow a machine, so both are compared by the processor's time.
 """
 
@@ -38,6 +39,7 @@ SPACE = "tumble"
 
 STAGES = ("light", "camera", "denoiser")
 WHOLE = "whole"
+FAST = "denoiser, mode fast"
 FIRST_WAY = "denoiser, float32, called as in training"
 
 Rows = list[dict[str, Any]]
@@ -62,10 +64,10 @@ def bench_loop(
 ) -> dict[str, Rows]:
     """Tables by title, one a scene.
 
-    seconds: for each scene, plain denoiser included; three blocks of 64 frames at least.  threads: of torch, default
+    seconds: for each scene, all denoisers included; three blocks of 64 frames at least.  threads: of torch, default
     its own; light and camera take NUMBA_NUM_THREADS.  engine: of the denoiser.
     Columns: stage, frames/s (wall clock) and x real time (40 000 frames a second), processor ms/frame, of the whole, %
-    (processor's time), x plain float32 (of the denoiser and of the whole, processor's time: medians over blocks).
+    (processor's time), x plain float32 (of the denoisers and of the whole, processor's time: medians over blocks).
     """
     with torch_settings(threads):
         scenes: dict[str, Callable[[], Scene]] = {
@@ -80,12 +82,12 @@ def bench_loop(
 
 
 def loop_table(scene: Scene, seconds: float, engine: str = "torch") -> Rows:
-    """Rows of one scene: its stages, the whole, and the plain denoiser."""
+    """Rows of one scene: its stages, the whole, and the other denoisers."""
     blocks = _timed(scene, seconds, engine)
     rows = []
-    spent = {stage: np.median([block[stage] for block in blocks], axis=0) for stage in (*STAGES, FIRST_WAY)}
+    spent = {stage: np.median([block[stage] for block in blocks], axis=0) for stage in (*STAGES, FAST, FIRST_WAY)}
     spent[WHOLE] = np.asarray(sum(spent[stage] for stage in STAGES))
-    for stage in (*STAGES, WHOLE, FIRST_WAY):
+    for stage in (*STAGES, WHOLE, FAST, FIRST_WAY):
         wall, processor = spent[stage] / BLOCK
         rows.append(
             {
@@ -101,11 +103,12 @@ def loop_table(scene: Scene, seconds: float, engine: str = "torch") -> Rows:
 
 
 def _timed(scene: Scene, seconds: float, engine: str) -> list[Seconds]:
-    """Blocks through the loop and through the plain denoiser, in turn."""
+    """Blocks through the loop and through the other denoisers, in turn."""
     height, width = scene.shape
     sensor = SpikeSensor("scsim", (height, width), seed=0)
     recipe, network, _ = load_weights(pretrained_path("best"))
     now = OnlineDnSS(recipe, network, output="rate", engine=engine)
+    fast = OnlineDnSS.pretrained("fast", output="rate", engine=engine)
     first = OnlineDnSS(recipe, CalledAsInTraining(network), output="rate", precision="float32")
     blocks: list[Seconds] = []
     begin = time.perf_counter()
@@ -114,6 +117,7 @@ def _timed(scene: Scene, seconds: float, engine: str) -> list[Seconds]:
         light = _clocked(block, "light", scene.radiance, sensor.frame, sensor.frame + BLOCK)
         spikes = _clocked(block, "camera", sensor.step, light, BLOCK)
         _clocked(block, "denoiser", now.push, spikes)
+        _clocked(block, FAST, fast.push, spikes)
         _clocked(block, FIRST_WAY, first.push, spikes)
         blocks.append(block)
     return blocks[WARM:]
@@ -128,9 +132,9 @@ def _clocked(block: Seconds, stage: str, work: Callable[..., Any], *arguments: A
 
 
 def _gain(blocks: list[Seconds], stage: str) -> float | None:
-    """Processor's time of the plain denoiser over that of the loop; None for other stages."""
-    if stage == "denoiser":
-        return float(np.median([block[FIRST_WAY][1] / block["denoiser"][1] for block in blocks]))
+    """Processor's time of the plain denoiser over that of a denoiser or of the loop; None for other stages."""
+    if stage in ("denoiser", FAST):
+        return float(np.median([block[FIRST_WAY][1] / block[stage][1] for block in blocks]))
     if stage == WHOLE:
         other = [sum(block[s][1] for s in ("light", "camera", FIRST_WAY)) for block in blocks]
         return float(np.median([o / sum(block[s][1] for s in STAGES) for o, block in zip(other, blocks, strict=True)]))

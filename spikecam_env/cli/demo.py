@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Count, Rpm, Seed, Size
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class Demo:
     """Speed of the disk; default 2000."""
     frames: Count | None = None
     """Spike frames to stream; default 1200, one turn at 2000 rpm; with --quick 250."""
-    mode: Literal["best", "paper"] = "best"
+    mode: Mode = "best"
     """Which DnSS denoises the film."""
     camera: Camera = field(default_factory=Camera)
     size: Size = (250, 400)

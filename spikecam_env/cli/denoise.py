@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import tyro
 
+from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Count
 from spikecam_env.cli.reading import Reading
 
@@ -24,16 +25,16 @@ class Denoise:
     .bin (a byte a pixel)."""
     out: Path = Path("denoised")
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
-    mode: Literal["best", "paper"] = "best"
-    """Which DnSS: `best`, or `paper` (the paper's network; slower)."""
+    mode: Mode = "best"
+    """Which DnSS: `best`, `fast` (a quarter of its weights), or `paper` (the paper's network; slower)."""
     engine: Literal["torch", "openvino"] = "torch"
-    """What computes the network; `openvino` (pip install 'spikecam-env[openvino]') takes `best` only."""
+    """What computes the network; `openvino` (pip install 'spikecam-env[openvino]') takes no `paper`."""
     window: Count = 41
     """Frames averaged in the pictures (TFP window); odd."""
     overlap: bool = False
-    """`best` only: passes that overlap by half: less error, no seams, twice the time."""
+    """Not for `paper`: passes that overlap by half: less error, no seams, twice the time."""
     calibration: Path | None = None
-    """`best` only: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
+    """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised."""
     reading: Reading = field(default_factory=Reading)

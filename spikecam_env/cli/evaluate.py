@@ -15,12 +15,13 @@ from spikecam_env.cli.evaluate_spikezoo import SpikeZoo
 from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
 from spikecam_env.cli.evaluate_tasks import Tasks
 from spikecam_env.cli.evaluate_truth import Truth
+from spikecam_env.cli.mode_weights import Mode, ModeWeights
 from spikecam_env.cli.options import Checked, Seed
 
 
 @dataclass
 class Quick:
-    """Compare noisy, denoised (both modes) and clean-twin streams on held-out scenes.
+    """Compare noisy, denoised and clean-twin streams on held-out scenes.
 
     Held-out textures, speeds and light levels, TFP 21 and 41, against true light and the clean twin.
 
@@ -33,6 +34,10 @@ class Quick:
     """Weights of the `paper` mode to evaluate instead of the shipped ones."""
     best: Path | None = None
     """Weights of the `best` mode to evaluate instead of the shipped ones."""
+    fast: Path | None = None
+    """Weights of the `fast` mode to evaluate instead of the shipped ones."""
+    modes: tuple[Mode, ...] = ("paper", "best")
+    """Modes to evaluate."""
     scenes: Annotated[int, Checked(checked_count, most=1000)] = 2
     """Scenes in each class of speed and light; the same count again gives a finer mean."""
     seed: Seed = 0
@@ -42,9 +47,11 @@ class Quick:
         from denoiser.evaluate import evaluate_quick, report
         from spikecam_env.cli.files import out_folder
 
-        weights = {mode: path for mode, path in (("paper", self.paper), ("best", self.best)) if path is not None}
+        weights = ModeWeights(self.paper, self.best, self.fast).by_mode()
         with nullcontext() if self.out is None else out_folder(self.out):
-            result = evaluate_quick(weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=self.out)
+            result = evaluate_quick(
+                self.modes, weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=self.out
+            )
         print(report(result), end="")
         if self.out is not None:
             print(f"wrote evaluate.json and evaluate.txt in {self.out}")

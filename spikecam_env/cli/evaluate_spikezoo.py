@@ -5,11 +5,10 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import tyro
 
-from spikecam_env.cli.mode_weights import ModeWeights
+from spikecam_env.cli.mode_weights import Mode, ModeWeights
 from spikecam_env.cli.options import Positive
 
 
@@ -26,7 +25,7 @@ class SpikeZoo:
     """Folder of spike/*.dat and gt/*.png of the same names, or test/ with them.  Pictures say rows and columns."""
     out: Path | None = None
     """Folder for spikezoo.json and spikezoo.txt."""
-    modes: tuple[Literal["paper", "best"], ...] = ("paper", "best")
+    modes: tuple[Mode, ...] = ("paper", "best")
     """Modes to evaluate."""
     rate: Positive = 0.6
     """Light [spikes/frame] that is white in the pictures; 0.6 in Spike-Zoo's REDS clips."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from spikecam_env.checked import checked_count
-from spikecam_env.cli.mode_weights import ModeWeights
+from spikecam_env.cli.mode_weights import Mode, ModeWeights
 from spikecam_env.cli.options import Checked, Seed
 
 
@@ -28,7 +28,7 @@ class Truth:
     """A recording in which everything moves: what stays at a pixel is the camera's own pattern."""
     out: Path | None = None
     """Folder for truth.json and truth.txt."""
-    modes: tuple[Literal["paper", "best"], ...] = ("paper", "best")
+    modes: tuple[Mode, ...] = ("paper", "best")
     """Modes to evaluate."""
     scenes: Annotated[int, Checked(checked_count, most=1000)] = 1
     """Simulated scenes for each camera, and in each class of speed and light."""

@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from spikecam_env.checked import checked_number
 from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Checked, Count, Positive, Rpm, Seed, Size
 from spikecam_env.cli.reading import Reading
 from spikecam_env.errors import InputError, unknown_name
@@ -50,14 +51,14 @@ class Live:
     """Begin a file again when it is over."""
     pictures: Annotated[float, Checked(checked_number, least=0.01, most=MOST_PICTURES_S)] = 30.0
     """Pictures a second, at most."""
-    mode: Literal["best", "paper"] = "best"
+    mode: Mode = "best"
     """Which DnSS."""
     weights: Path | None = None
     """A checkpoint of `spikecam train` instead of the mode's shipped weights."""
     passes: Count = 1
     """Passes of the network for a picture; more passes use more of the frames before it, and take longer."""
     calibration: Path | None = None
-    """`best` only: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
+    """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     size: Size = (250, 400)
     """Rows and columns of a scene."""
     rpm: Rpm | None = None

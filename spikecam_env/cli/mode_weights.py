@@ -1,9 +1,13 @@
-"""Weights of the denoiser's modes, as options say them."""
+"""The denoiser's modes and their weights, as options say them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Literal
+
+Mode = Literal["best", "fast", "paper"]
+"""Of `denoiser.recipe.RECIPES`."""
 
 
 @dataclass(frozen=True)
@@ -14,6 +18,8 @@ class ModeWeights:
     """Weights of the `paper` mode."""
     best: Path | None = None
     """Weights of the `best` mode."""
+    fast: Path | None = None
+    """Weights of the `fast` mode."""
 
     def by_mode(self) -> dict[str, Path]:
         """Those that were given."""

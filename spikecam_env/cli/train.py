@@ -11,12 +11,13 @@ from spikecam_env.cli.options import Checked, Count, Positive, Seed, Workers
 from spikecam_env.errors import InputError
 
 RECONSTRUCTORS = ("spk2img-clean", "spk2img-noisy", "ssml")
-DENOISERS = ("best", "paper")
+DENOISERS = ("best", "fast", "paper")
+STREAMS = ("best", "fast")
 ONLY_OF = {
     "refine": ("paper",),
-    "channels": ("best",),
+    "channels": STREAMS,
     "start": DENOISERS,
-    "teacher": ("best",),
+    "teacher": STREAMS,
     "validate_passes": DENOISERS,
     "width": RECONSTRUCTORS,
     "frames_a_step": RECONSTRUCTORS,
@@ -34,8 +35,9 @@ class Train:
 
     out: Path
     """Folder of the run: weights, checkpoint to resume from, validation curve (JSON, PNG)."""
-    mode: Literal["best", "paper", "spk2img-clean", "spk2img-noisy", "ssml"] = "best"
-    """`paper`: the paper's network and loss; `best`: many rate planes a pass, trained on true light.  The others are
+    mode: Literal["best", "fast", "paper", "spk2img-clean", "spk2img-noisy", "ssml"] = "best"
+    """`paper`: the paper's network and loss; `best`: many rate planes a pass, trained on true light;
+    `fast`: the same with a quarter of the weights.  The others are
     reconstructors, which make pictures of spikes."""
     steps: Count = 20_000
     """Training steps in all; the learning rate falls to zero over them."""
@@ -56,13 +58,14 @@ class Train:
     refine: bool = True
     """Give `paper` its refine module; without it for the ablation."""
     channels: tuple[Count, Count, Count] | None = None
-    """Channels of `best` at half and at quarter resolution, and of its head: fewer are faster, and less accurate.
-    Default: 64 128 24."""
+    """Channels of `best` or `fast` at half and at quarter resolution, and of the head: fewer are faster, and less
+    accurate.  Default: 64 128 24 and 32 64 12."""
     start: str | None = None
-    """Weights to begin from: a file of this command, or `best` or `paper` for those that ship.  A network with fewer
-    channels, or without the refine module, begins from a larger one.  Default: none."""
+    """Weights to begin from: a file of this command, or `best`, `fast` or `paper` for those that ship.  A network
+    with fewer channels, or without the refine module, begins from a larger one.  Default: none."""
     teacher: str | None = None
-    """Weights whose rates `best` learns instead of the true light, for a smaller network: a file, or `best`."""
+    """Weights whose rates `best` or `fast` learns instead of the true light, as a small network does better: a file, or
+    `best`."""
     width: Count | None = None
     """Channels of a reconstructor, a multiple of 12 up to 252.  Default: 48."""
     frames_a_step: Count | None = None
@@ -72,7 +75,7 @@ class Train:
     validate_passes: Count | None = None
     """Passes of each validation along its eight streams.  Default: 24."""
     compiled: bool = False
-    """Compile the simulation on a processor too: half as long a step, after a minute; needs a C++ compiler."""
+    """Compile the simulated light on a processor too: faster steps, after a minute; needs a C++ compiler."""
     resume: bool = True
     """Continue from the folder's checkpoint, if there is one."""
 

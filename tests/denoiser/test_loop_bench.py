@@ -8,7 +8,7 @@ import pytest
 from denoiser.online import OnlineDnSS
 from denoiser.weights import load_weights, pretrained_path
 from scenes import RotatingDisk
-from spikecam_env.bench.loop import FIRST_WAY, STAGES, WHOLE, CalledAsInTraining, bench_loop, loop_table
+from spikecam_env.bench.loop import FAST, FIRST_WAY, STAGES, WHOLE, CalledAsInTraining, bench_loop, loop_table
 from spikecam_env.sensor import SpikeSensor
 
 SHAPE = (20, 24)
@@ -16,7 +16,7 @@ SHAPE = (20, 24)
 
 def test_stages_make_up_the_whole():
     rows = {row["stage"]: row for row in loop_table(RotatingDisk(SHAPE), seconds=0.0)}
-    assert set(rows) == {*STAGES, WHOLE, FIRST_WAY}
+    assert set(rows) == {*STAGES, WHOLE, FAST, FIRST_WAY}
     assert sum(rows[stage]["of the whole, %"] for stage in STAGES) == pytest.approx(100)
     assert sum(1 / rows[stage]["frames/s"] for stage in STAGES) == pytest.approx(1 / rows[WHOLE]["frames/s"])
     assert all(row["x real time"] == pytest.approx(row["frames/s"] / 40_000) for row in rows.values())

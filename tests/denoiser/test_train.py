@@ -162,7 +162,7 @@ def test_a_network_learns_the_rates_of_a_teacher(small, tmp_path):
 def test_a_teacher_of_another_mode_is_refused(small, tmp_path):
     with pytest.raises(InputError, match="weights of another mode; give a file of this mode"):
         train(TrainConfig(teacher="paper", out=tmp_path), progress=False)
-    with pytest.raises(InputError, match="teacher is for mode 'best'"):
+    with pytest.raises(InputError, match="teacher is for modes that learn the light"):
         TrainConfig(mode="paper", teacher="best")
     with pytest.raises(InputError, match="teacher is 3; it must be the path of weights"):
         TrainConfig(teacher=3)

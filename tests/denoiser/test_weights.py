@@ -8,6 +8,7 @@ import torch
 
 from denoiser.online import OnlineDnSS
 from denoiser.recipe import RECIPES
+from denoiser.reconstruct.recipe import LEARNED
 from denoiser.weights import load_weights, pretrained_path, save_weights
 from spikecam_env.errors import InputError
 
@@ -31,7 +32,7 @@ def test_a_checkpoint_comes_back_as_it_was(checkpoint):
     assert not list(checkpoint.parent.glob("*.part"))
 
 
-@pytest.mark.parametrize("mode", ["paper", "best"])
+@pytest.mark.parametrize("mode", ["paper", "fast", "best"])
 def test_shipped_weights_say_how_they_were_made(mode):
     path = pretrained_path(mode)
     recipe, _, training = load_weights(path)
@@ -46,8 +47,8 @@ def test_shipped_weights_are_small_together():
     print(
         {name: f"{size / 1e6:.2f} MB" for name, size in sizes.items()}, f"{sum(sizes.values()) / 1e6:.2f} MB together"
     )
-    assert {"best.pt", "paper.pt", "spk2img-clean.pt", "spk2img-noisy.pt"} == set(sizes)
-    assert sum(sizes.values()) < 9e6
+    assert {f"{name}.pt" for name in (*RECIPES, "paper-no-refine", *LEARNED)} == set(sizes)
+    assert sum(sizes.values()) < 12e6
 
 
 def test_a_truncated_file_is_refused(checkpoint):
@@ -86,5 +87,5 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 def test_an_unknown_mode_is_named():
-    with pytest.raises(InputError, match="choose one of best, paper"):
+    with pytest.raises(InputError, match="choose one of best, fast, paper"):
         OnlineDnSS.pretrained("worst")
