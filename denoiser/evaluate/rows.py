@@ -108,7 +108,7 @@ class Weights:
 
     def missing(self, name: str) -> str:
         """Why there are none, or ""."""
-        return "" if self.path(name).is_file() else f"no weights are shipped yet: {self.path(name).name}"
+        return "" if self.path(name).is_file() else f"no weights are shipped under this name: {self.path(name).name}"
 
     def digest(self, name: str) -> str | None:
         """SHA-256 of the file; None where there is none."""

@@ -57,14 +57,13 @@ def test_the_multi_stage_update_of_the_true_light_is_worse_than_its_accumulation
 
 
 def test_rows_without_weights_are_named_with_the_reason(tmp_path: Path) -> None:
-    found = evaluate_table("table3", replace(SMALL, seeds=1, rows=("baseline", "clean"), out=tmp_path / "out"))
+    """Of earlier weights none are shipped."""
+    found = evaluate_table("table3", replace(SMALL, seeds=1, rows=("before", "clean"), out=tmp_path / "out"))
     text = report(found)
-    if "baseline" not in found["missing"]:
-        pytest.skip("weights without the refine module are shipped")
-    assert "paper-no-refine.pt" in found["missing"]["baseline"]
-    assert "baseline: no weights are shipped yet" in text
-    line = next(line for line in text.splitlines() if line.startswith("no refine, accumulated"))
-    assert set(line.removeprefix("no refine, accumulated")) <= set(" -|")
+    assert "before.pt" in found["missing"]["before"]
+    assert "before: no weights are shipped under this name: before.pt" in text
+    line = next(line for line in text.splitlines() if line.startswith("best, earlier weights"))
+    assert set(line.removeprefix("best, earlier weights")) <= set(" -|")
     with pytest.raises(InputError, match=r"there is no file .*none\.pt"):
         evaluate_table(
             "table3", replace(SMALL, weights=Weights({"paper-no-refine": tmp_path / "none.pt"}), rows=("baseline",))
