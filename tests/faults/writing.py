@@ -73,7 +73,7 @@ def _bank(*_: object, **__: object) -> object:
     return Bank(torch.rand(1, TEXTURE_SIZE, TEXTURE_SIZE), nothing + GRAINS, nothing, nothing, torch.zeros(1, 8))
 
 
-def _evaluation(**options) -> dict[str, object]:
+def _evaluation(_: object, **options) -> dict[str, object]:
     from denoiser.evaluate import quick
 
     quick._write(Path(options["out"]), {"figures": list(range(3000))})
