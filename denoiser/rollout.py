@@ -71,7 +71,7 @@ class _Past:
 
     light: (N, planes, H, W), of the frames that came last.  last: (N, 1, H, W), hidden: (N, CARRY, H/2, W/2), what the
     network carried on.  final: (N, 2, H, W), the last rate and what was wanted of the pass before.
-    its_last, its_hidden: what the teacher carried on.
+    its_last, its_hidden: what the teacher carried on; without one they have no channels.
     """
 
     light: Tensor
@@ -82,9 +82,10 @@ class _Past:
     its_hidden: Tensor
 
     @classmethod
-    def begin(cls, layout: WindowLayout, streams: int, patch: int, device: torch.device) -> _Past:
+    def begin(cls, layout: WindowLayout, streams: int, patch: int, device: torch.device, taught: bool) -> _Past:
         carried = ((1, patch), (CARRY, patch // 2))
-        shapes = ((layout.planes, patch), *carried, (2, patch), *carried)
+        its = carried if taught else ((0, patch), (0, patch // 2))
+        shapes = ((layout.planes, patch), *carried, (2, patch), *its)
         return cls(*(torch.zeros((streams, count, side, side), device=device) for count, side in shapes))
 
 
@@ -115,7 +116,7 @@ class Rollouts:
         self._type = number_type("auto", device)
         self._next = torch.zeros((), dtype=torch.int64, device=device)
         self._windows = Windows.begin(layout, count, (patch, patch), device)
-        self._past = _Past.begin(layout, count, patch, device)
+        self._past = _Past.begin(layout, count, patch, device, teacher is not None)
 
     def loss(self, network: nn.Module, passes: int) -> Tensor:
         """Take some streams on by this many passes; mean loss of the passes, with gradients."""
