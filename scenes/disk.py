@@ -19,8 +19,8 @@ from typing import Any
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import gaussian_filter
 
 from scenes.keys import interval_for, key_frames
 from scenes.painted_disk import Texels, paint_tile, prefiltered
@@ -257,7 +257,7 @@ def _background_tile(
 ) -> NDArray[np.float32]:
     """(h, w) float32 radiance, to be repeated."""
     if background is None:
-        noise = gaussian_filter(fractal_noise(rng, 2 * (max(shape) // 2) + 64), 1.0, mode="wrap")
+        noise = scipy.ndimage.gaussian_filter(fractal_noise(rng, 2 * (max(shape) // 2) + 64), 1.0, mode="wrap")
         cloudy: NDArray[np.float32] = np.float32(light[0]) + np.float32(0.4 * (light[1] - light[0])) * noise
         return cloudy
     tile = np.atleast_2d(np.asarray(background, np.float32))

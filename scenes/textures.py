@@ -10,9 +10,10 @@ from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
+from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError, unknown_name
 
 Texture = NDArray[np.float32]
@@ -61,7 +62,10 @@ def dead_leaves(rng: np.random.Generator, size: int) -> Texture:
     smallest, largest = max(2.0, size / 100), size / 4
     radii = (smallest**-2 - rng.random(1200) * (smallest**-2 - largest**-2)) ** -0.5
     for radius in radii:
-        _paint_disc(image, rng.uniform(0, size, 2), radius, rng.random(), rng.normal(0, 0.15, 2))
+        row, column = rng.uniform(0, size, 2)
+        grey = rng.random()
+        down, right = rng.normal(0, 0.15, 2)
+        _paint_disc(image, int(row), int(column), radius, grey, down, right)
     return _soften(image)
 
 
@@ -101,7 +105,8 @@ def blobs(rng: np.random.Generator, size: int) -> Texture:
     >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
     ((64, 64), True)
     """
-    noise = gaussian_filter(rng.standard_normal((size, size)), rng.uniform(0.004, 0.03) * size, mode="wrap")
+    grain = rng.standard_normal((size, size))
+    noise = scipy.ndimage.gaussian_filter(grain, rng.uniform(0.004, 0.03) * size, mode="wrap")
     return _stretch(np.tanh(rng.uniform(0.5, 5.0) * noise / noise.std()))
 
 
@@ -127,7 +132,7 @@ def gradient(rng: np.random.Generator, size: int) -> Texture:
     >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
     ((64, 64), True)
     """
-    noise = gaussian_filter(rng.standard_normal((size, size)), rng.uniform(0.08, 0.2) * size, mode="wrap")
+    noise = scipy.ndimage.gaussian_filter(rng.standard_normal((size, size)), rng.uniform(0.08, 0.2) * size, mode="wrap")
     return _stretch(noise)
 
 
@@ -192,7 +197,7 @@ def _grid(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def _soften(image: Texture) -> Texture:
     """A blur of 0.6 texels across hard edges."""
-    return np.asarray(gaussian_filter(image, 0.6, mode="wrap").clip(0, 1).astype(np.float32, copy=False))
+    return np.asarray(scipy.ndimage.gaussian_filter(image, 0.6, mode="wrap").clip(0, 1).astype(np.float32, copy=False))
 
 
 def _stretch(image: NDArray[np.float64]) -> Texture:
@@ -201,15 +206,12 @@ def _stretch(image: NDArray[np.float64]) -> Texture:
     return np.asarray(((image - low) / max(high - low, 1e-12)).astype(np.float32))
 
 
-def _paint_disc(
-    image: Texture, centre: NDArray[np.float64], radius: float, grey: float, slope: NDArray[np.float64]
-) -> None:
-    """A shaded disc over the image, wrapped at the borders."""
-    size = len(image)
-    reach = int(np.ceil(radius))
-    offset = np.arange(-reach, reach + 1)
-    dy, dx = offset[:, None], offset[None, :]
-    rows, columns = np.broadcast_arrays(int(centre[0]) + dy, int(centre[1]) + dx)
-    inside = dy**2 + dx**2 <= radius**2
-    shade = np.clip(grey + (slope[0] * dy + slope[1] * dx) / radius, 0, 1)
-    image[rows[inside] % size, columns[inside] % size] = shade[inside]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _paint_disc(image: Texture, row: int, column: int, radius: float, grey: float, down: float, right: float) -> None:
+    """A disc over the image, wrapped at the borders; its shade rises by `down` and `right` from middle to edge."""
+    size, reach = len(image), int(np.ceil(radius))
+    for dy in range(-reach, reach + 1):
+        line = image[(row + dy) % size]
+        for dx in range(-reach, reach + 1):
+            if dy**2 + dx**2 <= radius**2:
+                line[(column + dx) % size] = min(max(grey + (down * dy + right * dx) / radius, 0.0), 1.0)

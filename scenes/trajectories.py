@@ -10,13 +10,12 @@ frame rate; lengths are in the world's unit (metres in the catalogue); y is up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from spikecam_env.errors import InputError
 
@@ -89,7 +88,7 @@ class Still(Motion):
 
     @cached_property
     def _rotation(self) -> NDArray[np.float64]:
-        return np.asarray(Rotation.from_rotvec(np.radians(self.turn)).as_matrix())
+        return _turns(np.radians(self.turn))
 
 
 @dataclass(frozen=True)
@@ -219,8 +218,9 @@ class Path(Motion):
         return _pose(t.shape, np.eye(3), self._curve(inside))
 
     @cached_property
-    def _curve(self) -> CubicSpline:
-        return CubicSpline(self.time_s, self.positions, bc_type="periodic" if self.closed else "natural")
+    def _curve(self) -> scipy.interpolate.CubicSpline:
+        ends = "periodic" if self.closed else "natural"
+        return scipy.interpolate.CubicSpline(self.time_s, self.positions, bc_type=ends)
 
 
 @dataclass(frozen=True)
@@ -244,7 +244,7 @@ class Shake(Motion):
         rng = np.random.default_rng(self.seed)
         frequency = self.highest_hz * rng.uniform(0.1, 1.0, (6, _SINES))
         wave = np.sin(2 * np.pi * (frequency * t + rng.random((6, _SINES)))).sum(-1) * np.sqrt(2 / _SINES)
-        turn = Rotation.from_rotvec(np.radians(self.angle_deg) * wave[..., :3].reshape(-1, 3)).as_matrix()
+        turn = _turns(np.radians(self.angle_deg) * wave[..., :3].reshape(-1, 3))
         return _pose(t.shape[:-2], turn.reshape(*t.shape[:-2], 3, 3), self.shift * wave[..., 3:])
 
 
@@ -271,15 +271,30 @@ AT_REST = Still()
 _SINES = 5
 
 
+def _turns(rotation_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrices (..., 3, 3) of rotation vectors (..., 3) [radians]."""
+    return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(rotation_vectors).as_matrix())
+
+
 def _turned(axis: Vector, angle: NDArray[np.float64]) -> Pose:
     """Rotation by angles (...) [radians] about an axis (Rodrigues' formula)."""
+    cross, twice = _crosses(tuple(axis))
+    sine, versine = np.sin(angle)[..., None, None], (1 - np.cos(angle))[..., None, None]
+    return _pose(np.shape(angle), _UNTURNED + sine * cross + versine * twice, _AT_ORIGIN)
+
+
+_UNTURNED, _AT_ORIGIN = np.eye(3), np.zeros(3)
+
+
+@lru_cache(maxsize=256)
+def _crosses(axis: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The matrix of the cross product with an axis of length 1, and its square; a scene asks for them in every step."""
     length = float(np.linalg.norm(axis))
     if not length > 0:
         raise InputError(f"the axis of a turn is {axis}; it must have a length")
     x, y, z = np.asarray(axis, np.float64) / length
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    sine, versine = np.sin(angle)[..., None, None], (1 - np.cos(angle))[..., None, None]
-    return _pose(np.shape(angle), np.eye(3) + sine * cross + versine * (cross @ cross), np.zeros(3))
+    return cross, cross @ cross
 
 
 def _pose(shape: tuple[int, ...], rotation: NDArray[np.float64], position: ArrayLike) -> Pose:

@@ -18,8 +18,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 from tqdm import tqdm
 
 from denoiser.evaluate.grain import GAP, Picture, elsewhere, kept, relative_grain, two_looks
@@ -134,7 +134,7 @@ def _less(looks: Looks, light: list[Any]) -> Looks:
 def _rows(noisy: Looks, denoised: Mapping[str, Looks], seen: Looks | None = None) -> list[dict[str, Any]]:
     """seen: looks whose light the pattern is relative to, default the noisy ones."""
     first, second = noisy if seen is None else seen
-    light = uniform_filter((first + second) / 2, SMOOTH)
+    light = scipy.ndimage.uniform_filter((first + second) / 2, SMOOTH)
     rows = []
     for row, looks in {"noisy": noisy, **denoised}.items():
         size, size_error = relative_grain(looks, light)

@@ -15,8 +15,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import convolve
 
 Picture = NDArray[np.floating]
 TILES = 4
@@ -39,7 +39,7 @@ def two_looks(spikes: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.
 def residual(picture: Picture) -> NDArray[np.float64]:
     """(H, W) -> (H, W) what a pixel differs from its 8 neighbours by; 0 at the border, where some are missing."""
     wide = np.asarray(picture, np.float64)
-    grain: NDArray[np.float64] = wide - convolve(wide, _AROUND)
+    grain: NDArray[np.float64] = wide - scipy.ndimage.convolve(wide, _AROUND)
     grain[[0, -1], :] = grain[:, [0, -1]] = 0.0
     return grain
 

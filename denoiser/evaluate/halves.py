@@ -27,8 +27,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
 from denoiser.evaluate.grain import GAP, kept, two_looks
 from denoiser.evaluate.restored import restored
@@ -95,7 +95,7 @@ def evaluate_halves(spikes: NDArray[np.uint8], online: Mapping[str, OnlineDnSS])
 def static_pixels(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """(H, W) where two parts of a recording, of as many frames, saw as much light."""
     difference = first.sum(axis=0, dtype=np.int64) - second.sum(axis=0, dtype=np.int64)
-    around = uniform_filter(np.square(difference.astype(np.float64)), BOX)
+    around = scipy.ndimage.uniform_filter(np.square(difference.astype(np.float64)), BOX)
     usual = np.median(around)
     still: NDArray[np.bool_] = around <= usual + MOVES_SD * SD_BY_MEDIAN * np.median(np.abs(around - usual))
     return still

@@ -7,8 +7,8 @@ quantisation averages out over pixels.  NaN stands for a measure that has no val
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from denoiser.metrics import psnr_db
 
@@ -89,12 +89,12 @@ def texture_slope(picture: NDArray[np.floating], light: NDArray[np.floating]) ->
     the picture does not bias it, for the light has none.  NaN where there is no such texture.
     """
     truth, found = (np.asarray(p, np.float64) for p in (light, picture))
-    level = gaussian_filter(truth, FINE)
+    level = scipy.ndimage.gaussian_filter(truth, FINE)
     texture = truth - level
-    contrast = np.sqrt(gaussian_filter(np.square(texture), FINE))
+    contrast = np.sqrt(scipy.ndimage.gaussian_filter(np.square(texture), FINE))
     low = (contrast < LOW_CONTRAST * level) & (contrast > FAINTEST * level)
     energy = float(np.square(texture[low]).sum())
-    seen = found - gaussian_filter(found, FINE)
+    seen = found - scipy.ndimage.gaussian_filter(found, FINE)
     return float((seen[low] * texture[low]).sum() / energy) if energy > 0 else float("nan")
 
 

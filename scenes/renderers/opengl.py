@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -64,6 +64,7 @@ class OpenGL:
         )
         for program in (self._surface_program, self._mean_program):
             program._add_to_context()
+        self._uniforms: dict[int, dict[str, int]] = {}
         self._nothing = GL.glGenVertexArrays(1)
         self._kept: WeakKeyDictionary[Surface, _Uploaded] = WeakKeyDictionary()
         self._forgotten: list[_Uploaded] = []
@@ -197,8 +198,16 @@ class OpenGL:
             self._targets = _Targets.of(rows, columns)
         return self._targets
 
-    def _at(self, program: Any) -> Any:
-        return lambda name: self._gl.glGetUniformLocation(program._program_id, name)
+    def _at(self, program: Any) -> Callable[[str], int]:
+        """Where its uniforms are.  OpenGL is asked once: through Python that takes longer than to set one."""
+        known = self._uniforms.setdefault(program._program_id, {})
+
+        def place(name: str) -> int:
+            if name not in known:
+                known[name] = self._gl.glGetUniformLocation(program._program_id, name)
+            return known[name]
+
+        return place
 
 
 @dataclass(frozen=True)

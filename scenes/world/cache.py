@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.layers import Key
-from scenes.renderers.protocol import Sprite
+from scenes.renderers.protocol import Pinhole, Sprite, Window
 from scenes.world.extent import Probe, probe_of
-from scenes.world.plan import BlockPlan
+from scenes.world.plan import BlockPlan, Pace
 from scenes.world.spec import WorldSpec
 
 PLANS = 64
@@ -36,6 +36,17 @@ BACKDROPS_A_BODY = 2
 T = TypeVar("T")
 
 
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A body before the camera at a frame, and what is rendered of it.  view: (4, 4) from its coordinates to the
+    camera's."""
+
+    pose: NDArray[np.float64]
+    camera: Pinhole
+    view: NDArray[np.float64]
+    window: Window
+
+
 class Recent(Generic[T]):
     """The results asked for most recently, by name: at most `most` of them, and at least one."""
 
@@ -45,6 +56,10 @@ class Recent(Generic[T]):
 
     def __len__(self) -> int:
         return len(self._kept)
+
+    def take(self, other: Recent[T]) -> None:
+        """Know what another one knows."""
+        self._kept.update(other._kept)
 
     def get(self, name: Hashable, make: Callable[[], T]) -> T:
         """What is kept by this name, or what `make` returns, which is kept from now on."""
@@ -61,7 +76,9 @@ class WorldCache:
     """One world's.  For B bodies at most:
 
     plans       64 plans of blocks
+    paces       64 B, of each body in each of these
     probes      B, one a body
+    sights      4 B + 8, where bodies are at key times
     keys        4 B + 8 bodies rendered at key times: what takes the memory, 72 bytes a pixel of each key's window,
                 up to 37 MB at 250 x 400 of a body that fills the picture and its surroundings
     backdrops   2 B backdrops rendered at an instant, 12 bytes a pixel
@@ -70,7 +87,9 @@ class WorldCache:
     """
 
     plans: Recent[BlockPlan]
+    paces: Recent[Pace]
     probes: Recent[Probe]
+    sights: Recent[Sight]
     keys: Recent[Key]
     backdrops: Recent[Sprite]
     tile: Recent[NDArray[np.float32]]
@@ -81,12 +100,20 @@ class WorldCache:
         """An empty one for a world of so many bodies."""
         return cls(
             plans=Recent(PLANS),
+            paces=Recent(PLANS * bodies),
             probes=Recent(bodies),
+            sights=Recent(KEYS_A_BODY * bodies + KEYS_MORE),
             keys=Recent(KEYS_A_BODY * bodies + KEYS_MORE),
             backdrops=Recent(BACKDROPS_A_BODY * bodies),
             tile=Recent(1),
             base=Recent(1),
         )
+
+    def take_motion(self, other: WorldCache) -> None:
+        """What another world knows that differs in its light alone: plans, paces and probes."""
+        self.plans.take(other.plans)
+        self.paces.take(other.paces)
+        self.probes.take(other.probes)
 
     def probe(self, spec: WorldSpec, body: int) -> Probe:
         """The points that stand for a body of the world."""

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from scenes.layers import Carried, Key, carry, lay, render_key
 from scenes.protocol import Gaze
-from scenes.world.cache import WorldCache
+from scenes.world.cache import Sight, WorldCache
 from scenes.world.extent import extent, window_around
-from scenes.world.plan import BLOCK, BlockPlan
+from scenes.world.plan import BLOCK, BlockPlan, pace_of
 from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets
 from scenes.world.sprites import TRUTH_RAYS, body_sprite, lay_over
@@ -47,8 +47,9 @@ def paint(
     """Start to paint pictures (n, H, W) at frames (n,) of the block that is planned; they are done when the futures
     are."""
     still = plan.still and gaze is None
+    to_camera, centres = spec.to_camera(frames), spec.gaze_centres(gaze, frames)
     layers = [
-        _layer(spec, cache, plan, body, frames, gaze)
+        _layer(spec, cache, plan, body, frames, to_camera @ spec.pose(body, frames), centres, gaze)
         for body in plan.order
         if not (still and spec.bodies[body].backdrop)
     ]
@@ -106,13 +107,23 @@ class _Layer:
     marked: bool
 
 
-def _layer(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, body: int, frames: Floats, gaze: Gaze | None) -> _Layer:
-    """A body's keys around the frames, carried to each of them."""
-    step = plan.steps[body]
+def _layer(
+    spec: WorldSpec,
+    cache: WorldCache,
+    plan: BlockPlan,
+    body: int,
+    frames: Floats,
+    view: Floats,
+    centre: Floats,
+    gaze: Gaze | None,
+) -> _Layer:
+    """A body's keys around the frames, carried to each of them; view (n, 4, 4) and centre (n, 2) as `carry` takes
+    them."""
+    probe = cache.probe(spec, body)
+    pace = cache.paces.get((plan.block, body), lambda: pace_of(spec, body, probe, plan.block))
+    step = pace.step
     before = np.floor(frames / step).astype(int)
-    view = spec.view(body, frames)
-    centre = spec.gaze_centres(gaze, frames)
-    boxes = extent(cache.probe(spec, body).extreme, view, spec.focal, centre)
+    boxes = extent(probe.extreme, view, spec.focal, centre)
     boxes = np.clip(boxes, 0, [*spec.shape, *spec.shape])
     parts = []
     for index in np.unique(before):
@@ -130,26 +141,30 @@ def _layer(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, body: int, frame
         if carried[0].key is carried[-1].key:
             share = np.zeros_like(share)
         parts.append(_Part(int(first), int(last), carried[0], carried[-1], share))
-    return _Layer(parts, boxes, body in plan.solid, body in plan.tested, body in plan.marked)
+    return _Layer(parts, boxes, pace.solid, body in plan.tested, body in plan.marked)
 
 
 def _key(spec: WorldSpec, cache: WorldCache, body: int, frame: int, gaze: Gaze | None) -> tuple[Key, Floats]:
     """A body's key at a frame, and the map from its coordinates to the camera's then.
 
     Its window is as wide as the picture again on all sides together, and more where a gaze goes."""
-    pose, camera = spec.pose(body, frame), spec.pinhole(frame)
-    view = np.linalg.inv(camera.pose) @ pose
     margin = max(spec.shape) // 2
     if gaze is not None:
-        margin += -(-int(np.abs([*gaze.start, *gaze.stop]).max()) // GAZE_MARGIN) * GAZE_MARGIN
-    box = extent(cache.probe(spec, body).extreme, view[None], spec.focal, np.asarray([spec.centre]))[0]
-    window = window_around(box, spec.shape, margin)
+        margin += -(-int(max(map(abs, (*gaze.start, *gaze.stop)))) // GAZE_MARGIN) * GAZE_MARGIN
+    seen = cache.sights.get((body, frame, margin), lambda: _sight(spec, cache, body, frame, margin))
     surface = spec.bodies[body].surface
     key = cache.keys.get(
-        (body, pose.tobytes(), camera.pose.tobytes(), window),
-        lambda: render_key(spec.drawing, surface, pose, camera, spec.lighting, window, spec.light),
+        (body, seen.pose.tobytes(), seen.camera.pose.tobytes(), seen.window),
+        lambda: render_key(spec.drawing, surface, seen.pose, seen.camera, spec.lighting, seen.window, spec.light),
     )
-    return key, view
+    return key, seen.view
+
+
+def _sight(spec: WorldSpec, cache: WorldCache, body: int, frame: int, margin: int) -> Sight:
+    pose, camera = spec.pose(body, frame), spec.pinhole(frame)
+    view = np.linalg.inv(camera.pose) @ pose
+    box = extent(cache.probe(spec, body).extreme, view[None], spec.focal, np.asarray([spec.centre]))[0]
+    return Sight(pose, camera, view, window_around(box, spec.shape, margin))
 
 
 # -- composition -----------------------------------------------------------------------------------------------

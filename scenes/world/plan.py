@@ -1,7 +1,8 @@
 """The plan of a block of frames: what follows from the motion in it alone.
 
-How often each body is rendered (`scenes.layers` carries it in between), how often light is given, and the order in
-which bodies are laid over each other.  So a key's time and light depend on nothing but the world.
+How often light is given and the order in which bodies are laid over each other (`plan_block`), and how often each body
+is rendered (`pace_of`; `scenes.layers` carries it in between).  So a key's time and light depend on nothing but the
+world.  A body's pace takes longer to find than all the rest, and ground truth does without it.
 """
 
 from __future__ import annotations
@@ -48,18 +49,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BlockPlan:
-    """What follows from the motion in a block.
+    """What follows from the motion in a block, of all bodies together.
 
-    steps    frames between the keys of each body
-    solid    bodies whose keys are carried by depth
+    block    its number
     speed    fastest point in the picture [pixels/frame]
     order    bodies from the back to the front
     tested   bodies whose depth is compared with what lies there;  marked: those that are compared with
     still    camera and backdrops do not move
     """
 
-    steps: tuple[int, ...]
-    solid: frozenset[int]
+    block: int
     speed: float
     order: tuple[int, ...]
     tested: frozenset[int]
@@ -94,19 +93,35 @@ def key_frames(light_steps: Mapping[int, int], start: int, stop: int, with_ends:
     return grid[np.searchsorted(grid, start, "right") - 1 : np.searchsorted(grid, stop) + 1]
 
 
+@dataclass(frozen=True)
+class Pace:
+    """Of a body in a block.  step: frames between its keys; solid: whether these are carried by depth."""
+
+    step: int
+    solid: bool
+
+
+def pace_of(spec: WorldSpec, body: int, probe: Probe, block: int) -> Pace:
+    """Pace of a body in frames block * BLOCK .. (block + 1) * BLOCK."""
+    frames = _instants(block)
+    return Pace(*_key_step(probe, spec.view(body, frames), spec.focal, spec.lighting, spec.pose(body, frames)))
+
+
+def _instants(block: int) -> Floats:
+    """At which a block's motion is looked at (NODES + 1,)."""
+    return np.asarray(block * BLOCK + np.linspace(0.0, BLOCK, NODES + 1, dtype=np.float64))
+
+
 @dataclass(frozen=True, eq=False)
 class _Motion:
     """A body in a block.
 
-    step, solid   see `BlockPlan`
     depths        nearest and farthest that it comes to the camera's plane
     box           of pixels, all that it is seen in: top, left, bottom, right
     speed         fastest in the picture [pixels/frame]
     rests         it does not move before the camera
     """
 
-    step: int
-    solid: bool
     depths: tuple[float, float]
     box: tuple[int, ...]
     speed: float
@@ -115,7 +130,7 @@ class _Motion:
 
 def plan_block(spec: WorldSpec, probes: Sequence[Probe], block: int) -> BlockPlan:
     """BlockPlan frames block * BLOCK .. (block + 1) * BLOCK; probes: one a body."""
-    frames: Floats = block * BLOCK + np.linspace(0.0, BLOCK, NODES + 1, dtype=np.float64)
+    frames = _instants(block)
     sky_speed = _sky_speed(spec, frames)
     motions = [_motion(spec, body, probe, frames) for body, probe in enumerate(probes)]
     bodies = [body for body in range(len(motions)) if not spec.bodies[body].backdrop]
@@ -127,8 +142,7 @@ def plan_block(spec: WorldSpec, probes: Sequence[Probe], block: int) -> BlockPla
         if _may_cross(motions[back], motions[front])
     ]
     return BlockPlan(
-        steps=tuple(motion.step for motion in motions),
-        solid=frozenset(body for body, motion in enumerate(motions) if motion.solid),
+        block=block,
         speed=max([sky_speed, *(motion.speed for motion in motions)]),
         order=(*spec.backdrops, *bodies),
         tested=frozenset(front for _, front in pairs),
@@ -139,14 +153,11 @@ def plan_block(spec: WorldSpec, probes: Sequence[Probe], block: int) -> BlockPla
 
 def _motion(spec: WorldSpec, body: int, probe: Probe, frames: Floats) -> _Motion:
     view = spec.view(body, frames)
-    step, solid = _key_step(probe, view, spec.focal, spec.lighting, spec.pose(body, frames))
     pixels, depth = project(view, probe.extreme, spec.focal, (0.0, 0.0))
     box = extent(probe.extreme, view, spec.focal, np.broadcast_to(spec.centre, (len(frames), 2)))
     seen = (box[:, 0] < spec.shape[0]) & (box[:, 2] > 0) & (box[:, 1] < spec.shape[1]) & (box[:, 3] > 0)
     moved = np.linalg.norm(np.diff(pixels, axis=0), axis=-1)[seen[:-1] | seen[1:]]
     return _Motion(
-        step=step,
-        solid=solid,
         depths=(depth.min(), depth.max()),
         box=(*box[:, :2].min(0), *box[:, 2:].max(0)),
         speed=float(moved.max(initial=0.0)) * NODES / BLOCK,
@@ -185,8 +196,12 @@ def _key_step(probe: Probe, view: Floats, focal: float, lighting: Lighting, pose
         pieces = [slice(a, a + stride + 1) for a in range(0, NODES, stride)]
         shortest = stride * BLOCK // NODES <= SHORTEST_KEY_STEP
         if shortest or all(_middle_is_lit_like_the_ends(facing[p], depth[p], shade[p]) for p in pieces):
-            off = [_misplaced(pixels[p], depth[p], facing[p], sight[p]) for p in pieces]
-            if shortest or max(left for _, left in off) <= BLUR:
+            off = []
+            for p in pieces:
+                off.append(_misplaced(pixels[p], depth[p], facing[p], sight[p]))
+                if not shortest and off[-1][1] > BLUR:
+                    break
+            else:
                 return stride * BLOCK // NODES, max(flat for flat, _ in off) > FLAT
         stride //= 2
 

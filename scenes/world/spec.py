@@ -97,9 +97,13 @@ class WorldSpec:
         """Body to world (..., 4, 4) at frames."""
         return self.bodies[body].trajectory.pose(np.asarray(frames, np.float64) / self.frame_rate_hz)
 
+    def to_camera(self, frames: Floats) -> Floats:
+        """World to camera (n, 4, 4) at frames."""
+        return np.asarray(np.linalg.inv(self.camera.pose(frames / self.frame_rate_hz)))
+
     def view(self, body: int, frames: Floats) -> Floats:
         """Body to camera (n, 4, 4) at frames."""
-        return np.linalg.inv(self.camera.pose(frames / self.frame_rate_hz)) @ self.pose(body, frames)
+        return self.to_camera(frames) @ self.pose(body, frames)
 
     def gaze_centres(self, gaze: Gaze | None, frames: Floats) -> Floats:
         """(n, 2): where the camera's axis is seen at frames [pixels], which a gaze shifts."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from scenes.protocol import Gaze, Truth
 from scenes.trajectories import Still
@@ -100,4 +100,4 @@ def _displaced(spec: WorldSpec, seen: Seen, frame: float, by: float, gaze: Gaze 
 
 
 def _pose_numbers(pose: Floats) -> tuple[float, ...]:
-    return (*map(float, pose[:3, 3]), *map(float, Rotation.from_matrix(pose[:3, :3]).as_quat()))
+    return (*map(float, pose[:3, 3]), *map(float, scipy.spatial.transform.Rotation.from_matrix(pose[:3, :3]).as_quat()))

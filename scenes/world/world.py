@@ -100,7 +100,9 @@ class World(WorldSpec):
 
     def lit(self, gain: float) -> World:
         """The same world with `gain` times its light."""
-        return dataclasses.replace(self, light=self.light * gain)
+        other = dataclasses.replace(self, light=self.light * gain)
+        other.cache.take_motion(self.cache)
+        return other
 
     def plan(self, block: int) -> BlockPlan:
         """What follows from the motion in frames block * BLOCK .. (block + 1) * BLOCK."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from spikecam_env.robust import UPPER
 from spikecam_env.sensor import CATALOGUE, Circuit, Effect, SensorModel
@@ -37,7 +37,7 @@ def pixel_flags(gain: Array, dark: Array, chi2: Array, freedom: NDArray[np.int64
     flags[dead] |= FLAGS["dead"]
     live = ~unknown & ~dead
     flags[live & (np.nan_to_num(dark) > hot_limit(dark[live]))] |= FLAGS["hot"]
-    p = stats.chi2.sf(chi2 / max(excess, 1.0) * freedom, np.maximum(freedom, 1))
+    p = scipy.stats.chi2.sf(chi2 / max(excess, 1.0) * freedom, np.maximum(freedom, 1))
     flags[live & (freedom > 0) & (p < _MISFIT_P)] |= FLAGS["misfit"]
     return flags
 
@@ -64,8 +64,8 @@ def dark_law(dark: Array) -> DarkLaw:
     if sd <= 0 or dark.min() <= 0:
         return DarkLaw("normal", mean, sd)
     logs = np.log(dark)
-    normal = stats.norm.logpdf(dark, mean, sd).sum()
-    log_normal = (stats.norm.logpdf(logs, logs.mean(), logs.std()) - logs).sum()
+    normal = scipy.stats.norm.logpdf(dark, mean, sd).sum()
+    log_normal = (scipy.stats.norm.logpdf(logs, logs.mean(), logs.std()) - logs).sum()
     if log_normal > normal:
         return DarkLaw("log-normal", float(np.exp(logs.mean())), float(logs.std()))
     return DarkLaw("normal", mean, sd)

@@ -8,7 +8,6 @@ import numpy as np
 
 from spikecam_env.calibration.findings import findings
 from spikecam_env.calibration.population import FLAGS, fitted_model
-from spikecam_env.calibration.report import report
 from spikecam_env.calibration.snee import Calibration
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams.whole_hdf5 import WholeHDF5
@@ -26,6 +25,8 @@ def save_calibration(calibration: Calibration, folder: str | Path) -> list[Path]
     >>> [path.name for path in save_calibration(calibrate(campaign), "calibrated")]
     ['model.toml', 'maps.h5', 'report.html']
     """
+    from spikecam_env.calibration.report import report  # draws by matplotlib, which who denoises does not need
+
     target = Path(folder)
     paths = [target / name for name in ("model.toml", "maps.h5", "report.html")]
     with made_folder(target):

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from spikecam_env.calibration.flat_maps import DIM_LUX, FRAMES, LUX, FlatMaps
 from spikecam_env.robust import scatter
@@ -67,7 +67,7 @@ def two_levels(maps: FlatMaps) -> TwoLevels:
     smooth_lit, smooth_dim = split_shading(lit)[0], split_shading(dim)[0]
     r, s = lit / smooth_lit - 1.0, dim / smooth_dim - 1.0
     logs = np.log(np.maximum(maps.dark, 0.5 / FRAMES))
-    logs = logs - ndimage.gaussian_filter(logs, _SMOOTH)
+    logs = logs - scipy.ndimage.gaussian_filter(logs, _SMOOTH)
     good = maps.counted & (maps.dark < _HOT) & (np.abs(r) < _ODD) & (np.abs(s) < _ODD)
     a, b = 1.0 / smooth_lit[good], 1.0 / smooth_dim[good]
     r, s, logs = r[good], s[good], logs[good]
@@ -104,6 +104,6 @@ def _correlation(a: Array, b: Array) -> float:
 
 def split_shading(light: Array) -> tuple[Array, float]:
     """The smooth part (H, W) of a response map, and the pixels' relative spread around it (robust: dust, edges)."""
-    smooth = ndimage.gaussian_filter(ndimage.median_filter(light, 5), _SMOOTH, mode="nearest")
+    smooth = scipy.ndimage.gaussian_filter(scipy.ndimage.median_filter(light, 5), _SMOOTH, mode="nearest")
     rest = light / smooth - 1.0
     return smooth, scatter(rest)

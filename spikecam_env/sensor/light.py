@@ -285,25 +285,27 @@ def cuts(times: NDArray[np.float64], start: int, stop: int) -> NDArray[np.int64]
     """
     rows = np.empty((16, 6), np.int64)
     used, at = 0, start
-    after = np.searchsorted(times, at, side="right")
+    after = int(np.searchsorted(times, at, side="right"))
     while at < stop:
         while after < times.size and times[after] <= at:
             after += 1
         if used == len(rows):
             rows = np.concatenate((rows, np.empty_like(rows)))
         if after < times.size and times[after] < at + 1:
-            rows[used] = -1, -1, at, 0, 0, 1
+            key0, key1, begin, length, first, count = -1, -1, at, 0, 0, 1
         elif after == 0 or after == times.size:
             key, until = (0, min(stop, int(np.floor(times[0])))) if after == 0 else (after - 1, stop)
-            rows[used] = key, key, at, MAX_SEGMENT, 0, min(MAX_SEGMENT, until - at)
+            key0, key1, begin, length, first, count = key, key, at, MAX_SEGMENT, 0, min(MAX_SEGMENT, until - at)
         else:
             begin, end = int(np.ceil(times[after - 1])), int(np.floor(times[after]))
             begin += (at - begin) // MAX_SEGMENT * MAX_SEGMENT
             end = min(end, begin + MAX_SEGMENT)
             key0 = after - 1 if times[after - 1] == begin else -1
             key1 = after if times[after] == end else -1
-            rows[used] = key0, key1, begin, end - begin, at - begin, min(stop, end) - at
-        at += rows[used, COUNT]
+            length, first, count = end - begin, at - begin, min(stop, end) - at
+        row = rows[used]  # number by number: numba compiles a tuple for a row 4 s longer, for its message of shapes
+        row[KEY0], row[KEY1], row[BEGIN], row[LENGTH], row[FIRST], row[COUNT] = key0, key1, begin, length, first, count
+        at += count
         used += 1
     return rows[:used]
 

@@ -33,8 +33,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from spikecam_env.streams.packing import BitOrder, packed_bytes
 
@@ -210,9 +210,9 @@ def frame_length(bits: NDArray[np.uint8]) -> int | None:
     size = len(flow)
     if size < 256 or not 0 < rate < 1:
         return None
-    padded = fft.next_fast_len(2 * size, real=True)
-    spectrum = fft.rfft(flow.astype(np.float32) - np.float32(rate), padded)
-    together = fft.irfft(spectrum.real**2 + spectrum.imag**2, padded)[: size * 3 // 4]
+    padded = scipy.fft.next_fast_len(2 * size, real=True)
+    spectrum = scipy.fft.rfft(flow.astype(np.float32) - np.float32(rate), padded)
+    together = scipy.fft.irfft(spectrum.real**2 + spectrum.imag**2, padded)[: size * 3 // 4]
     lags = np.arange(64, len(together) - 8, 8)
     about = np.min([(together[lags - d] + together[lags + d]) / 2 for d in range(1, 9)], axis=0)
     pairs = size - lags

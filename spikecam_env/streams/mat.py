@@ -10,8 +10,8 @@ from typing import Any
 
 import h5py
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import io
 
 from spikecam_env.checked import checked_memory
 from spikecam_env.errors import InputError, shown
@@ -51,10 +51,10 @@ def _from_hdf5(source: Path, key: str | None) -> tuple[str, NDArray[Any]]:
 
 def _from_old(source: Path, key: str | None) -> tuple[str, NDArray[Any]]:
     try:
-        names = {name: _Listed(shape, kind) for name, shape, kind in io.whosmat(source)}
+        names = {name: _Listed(shape, kind) for name, shape, kind in scipy.io.whosmat(source)}
         name = stream_key(names, key, source)
         checked_memory(names[name].bytes, f"{source}: {name} of shape {names[name].shape}")
-        return name, np.asarray(io.loadmat(source, variable_names=[name])[name])
+        return name, np.asarray(scipy.io.loadmat(source, variable_names=[name])[name])
     except InputError:
         raise
     except Exception as error:  # struct, zlib, MatReadError, MemoryError, ...: as a damaged file fails

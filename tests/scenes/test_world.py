@@ -20,7 +20,7 @@ from scenes.renderers.protocol import Lighting, Pinhole, Window
 from scenes.textures import blobs, dead_leaves
 from scenes.trajectories import AT_REST, Ballistic, Path, Shake, Spinning, Still, Trajectory, Vibrating
 from scenes.world import Body, World
-from scenes.world.plan import BLOCK
+from scenes.world.plan import BLOCK, pace_of
 from spikecam_env.errors import InputError
 
 SHAPE = (60, 96)
@@ -230,7 +230,7 @@ def test_depth_halves_what_a_polynomial_misplaces_on_a_box(renderer: Embree, mon
     def off() -> float:
         box_alone = Body("box", assemble(*box((1, 1, 1), faces)), turning)
         world = World((100, 160), (box_alone,), Camera((0, 0, 3)), background=0.3, renderer=renderer)
-        step = world.plan(0).steps[0]
+        step = pace_of(world, 0, world.cache.probe(world, 0), 0).step
         at, truth = step // 2, world.truth(step / 2)
         return rms((world.radiance(at, at + 1).radiance[0] - truth.radiance)[truth.object_id > 0])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from typing import Any
 
@@ -14,7 +15,7 @@ from scenes.renderers.protocol import Sprite, Surface
 from scenes.trajectories import Ballistic, Spinning
 from scenes.world import Body, World
 from scenes.world.cache import PLANS, Recent, WorldCache
-from scenes.world.plan import BLOCK, SHORTEST_KEY_STEP
+from scenes.world.plan import BLOCK, SHORTEST_KEY_STEP, pace_of
 
 BODIES = 6
 
@@ -61,8 +62,17 @@ def test_recent_keeps_the_entries_asked_for_last() -> None:
 
 def test_the_limits_are_those_that_the_docstring_states() -> None:
     cache = WorldCache.of(6)
-    limits = {name: getattr(cache, name).most for name in ("plans", "probes", "keys", "backdrops", "tile", "base")}
-    assert limits == {"plans": 64, "probes": 6, "keys": 4 * 6 + 8, "backdrops": 2 * 6, "tile": 1, "base": 1}
+    limits = {field.name: getattr(cache, field.name).most for field in dataclasses.fields(cache)}
+    assert limits == {
+        "plans": 64,
+        "paces": 64 * 6,
+        "probes": 6,
+        "sights": 4 * 6 + 8,
+        "keys": 4 * 6 + 8,
+        "backdrops": 2 * 6,
+        "tile": 1,
+        "base": 1,
+    }
     assert WorldCache.of(0).probes.most == 1
 
 
@@ -70,7 +80,7 @@ def test_the_limits_are_those_that_the_docstring_states() -> None:
 def test_a_stream_read_in_order_renders_no_key_twice(call: int) -> None:
     renderer = Counting()
     world = fast_balls(renderer)
-    assert set(world.plan(0).steps) == {SHORTEST_KEY_STEP}
+    assert {pace_of(world, n, world.cache.probe(world, n), 0).step for n in range(BODIES)} == {SHORTEST_KEY_STEP}
     for start in range(0, 2 * BLOCK, call):
         world.radiance(start, min(start + call, 2 * BLOCK))
     print(f"{len(renderer.asked)} keys, rendered {max(renderer.asked.values())} time(s)")
@@ -86,3 +96,16 @@ def test_a_dropped_entry_comes_back_bit_for_bit() -> None:
         world.radiance(block * BLOCK, block * BLOCK + 1)
     assert len(world.cache.plans) == PLANS
     np.testing.assert_array_equal(world.radiance(0, 8).radiance, light)
+
+
+def test_ground_truth_asks_for_no_pace_and_a_lit_world_for_no_plan() -> None:
+    """Both take longer than the pictures of a small world; a scene is exposed before each episode."""
+    world = fast_balls(Counting())
+    world.truth(3.0)
+    assert (len(world.cache.plans), len(world.cache.paces)) == (1, 0)
+    world.radiance(0, 8)
+    lit = world.lit(2.0)
+    assert (len(lit.cache.plans), len(lit.cache.paces), len(lit.cache.probes)) == (1, BODIES, BODIES)
+    assert len(lit.cache.keys) == len(lit.cache.sights) == 0
+    alone = dataclasses.replace(world, light=2.0)
+    np.testing.assert_array_equal(lit.radiance(0, 40).radiance, alone.radiance(0, 40).radiance)

@@ -24,9 +24,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import label
-from scipy.special import ndtri
 
 from spikecam_env.gap.observe.conditions import STEADY, Condition
 from spikecam_env.gap.observe.observation import TIME_BLOCKS, Observation
@@ -239,7 +238,7 @@ def _deviations(
 
 def least_deviate(tests: int, limits: Baseline) -> float:
     """Deviate, of either sign, that one of so many windows exceeds by chance of `false_alarm` (Bonferroni)."""
-    return -float(ndtri(limits.false_alarm / (2 * max(tests, 1))))
+    return -float(scipy.special.ndtri(limits.false_alarm / (2 * max(tests, 1))))
 
 
 def beyond(
@@ -312,7 +311,7 @@ def _union(windows: list[_Window], shape: tuple[int, int]) -> Mask:
 def _described(condition: Condition, found: list[_Window], seen: Observation, frames: int) -> Motion:
     """The largest connected region, and when its windows are off."""
     moving = _union(found, seen.shape)
-    regions, _ = label(moving)
+    regions, _ = scipy.ndimage.label(moving)
     largest = int(np.argmax(np.bincount(regions.ravel())[1:])) + 1
     row, column = np.nonzero(regions == largest)
     mine = [w for w in found if regions[w.row, w.column] == largest]

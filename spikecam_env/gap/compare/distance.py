@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special, stats
 
 from spikecam_env.gap.compare.prediction import Null, Prediction, total_variance
 from spikecam_env.gap.statistics import Key
@@ -39,11 +39,11 @@ def normal_deviates(null: Null, t: Array, predicted: Prediction | None = None) -
     if predicted is not None:
         known, freedom = predicted.spread**2 + predicted.error**2, freedom_of(null, predicted)
     freedom = freedom * np.minimum(1.0 + null.floor**2 / np.maximum(known, 1e-300), 100.0) ** 2
-    log_p = np.maximum(stats.t.logsf(np.abs(t), freedom), -800.0)
+    log_p = np.maximum(scipy.stats.t.logsf(np.abs(t), freedom), -800.0)
     if predicted is not None and predicted.units is not None:
         apart = (predicted.units - predicted.mean) / np.sqrt(total_variance(null, predicted))
         log_p = np.maximum(log_p, np.log(np.maximum(share_beyond(t, apart), 1e-300)))
-    return np.asarray(np.sign(t) * -special.ndtri_exp(log_p))
+    return np.asarray(np.sign(t) * -scipy.special.ndtri_exp(log_p))
 
 
 def share_beyond(t: Array, apart: Array) -> Array:
@@ -82,7 +82,7 @@ def of_all_recordings(keys: Sequence[Key], z: Array, group: str) -> Array:
 
 def adjusted(z: Array) -> Array:
     """(S,) two-sided p-values, adjusted by Holm's step-down for the number of statistics."""
-    p = 2.0 * special.ndtr(-np.abs(z))
+    p = 2.0 * scipy.special.ndtr(-np.abs(z))
     order = np.argsort(p)
     stepped = np.maximum.accumulate(p[order] * (p.size - np.arange(p.size)))
     out = np.empty_like(p)

@@ -11,9 +11,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
-from scipy.optimize import brentq
 
 from spikecam_env.gap.statistics import Key, floor_family
 
@@ -40,7 +39,7 @@ def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Ar
         if variances[i] > 0 and several[key.group, key.name] > 1:
             families.setdefault(floor_family(key), []).append(i)
     logs = np.log(np.where(variances > 0, variances, 1.0)) - bias(freedom)
-    chance = float(special.polygamma(1, freedom / 2))
+    chance = float(scipy.special.polygamma(1, freedom / 2))
     for of in families.values():
         kinds, recordings = one_of_each([keys[i].name for i in of]), one_of_each([keys[i].recording for i in of])
         found = [shrunk(logs[of], like, chance) for like in (kinds, np.hstack([kinds, recordings]))]
@@ -71,11 +70,12 @@ def shrunk(logs: Array, like: Array, chance: float) -> tuple[Array, float]:
 
 def bias(freedom: float) -> float:
     """Mean of the logarithm of a sample variance, less the logarithm of the variance."""
-    return float(special.digamma(freedom / 2) - np.log(freedom / 2))
+    return float(scipy.special.digamma(freedom / 2) - np.log(freedom / 2))
 
 
 def freedom_of_variance(variance: float) -> float:
     """Degrees of freedom of a sample variance of which the logarithm has so much variance; MOST_FREEDOM at most."""
-    if variance <= special.polygamma(1, MOST_FREEDOM / 2):
+    if variance <= scipy.special.polygamma(1, MOST_FREEDOM / 2):
         return MOST_FREEDOM
-    return 2.0 * float(np.exp(brentq(lambda x: np.log(special.polygamma(1, np.exp(x)) / variance), -20.0, 10.0)))
+    log_half = scipy.optimize.brentq(lambda x: np.log(scipy.special.polygamma(1, np.exp(x)) / variance), -20.0, 10.0)
+    return 2.0 * float(np.exp(log_half))

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import Observation
@@ -136,7 +136,7 @@ def scaled_by_twins(sd: Array, difference: Array | None) -> Array:
     if known.sum() < 3:
         return sd
     square = float(np.sum((difference[known] / sd[known]) ** 2))
-    scaled: Array = sd * np.sqrt(square / stats.chi2.ppf(0.1, int(known.sum()) - 1))
+    scaled: Array = sd * np.sqrt(square / scipy.stats.chi2.ppf(0.1, int(known.sum()) - 1))
     return scaled
 
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, own_variance, with_change_scaled
@@ -45,7 +45,7 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
     by_chance = [lead(null, np.where(known, middle + n, np.nan), best, other) for n in noise]
     above = observed - np.mean(by_chance)
     sd = np.std(by_chance, ddof=1) * np.sqrt(1 + 1 / len(noise))
-    return bool(stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > null.settings.judging.least_chance)
+    return bool(scipy.stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > null.settings.judging.least_chance)
 
 
 def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:

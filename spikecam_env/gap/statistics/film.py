@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import BIN
@@ -76,7 +76,7 @@ def film_features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, ND
     kinds = [x, x * x, -change, -change * row]
     for tau in (16.0, 64.0, 256.0, 2000.0):
         kept = np.exp(-BIN / tau)
-        late, _ = lfilter([1.0 - kept], [1.0, -kept], x, axis=0, zi=kept * x[:1])
+        late, _ = scipy.signal.lfilter([1.0 - kept], [1.0, -kept], x, axis=0, zi=kept * x[:1])
         kinds.append(late.astype(np.float32) - x)
     padded = np.pad(film, ((0, 0), (1, 1), (1, 1)), mode="edge")
     around = (padded[:, :-2, 1:-1] + padded[:, 2:, 1:-1] + padded[:, 1:-1, :-2] + padded[:, 1:-1, 2:]) / 4

@@ -7,8 +7,8 @@ column_fixed_pattern (lags along one axis and not the other).
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from spikecam_env.gap.statistics.reading import log
 from spikecam_env.robust import LOWER, UPPER, scatter
@@ -41,7 +41,7 @@ def statistics(rate: Array) -> dict[str, float]:
     relative = rate / middle - 1.0
     lower, upper = np.quantile(relative, [LOWER, UPPER])
     clipped = np.clip(relative, 3 * lower - 2 * upper, 3 * upper - 2 * lower)
-    around = ndimage.uniform_filter(clipped, _WINDOW, mode="nearest")
+    around = scipy.ndimage.uniform_filter(clipped, _WINDOW, mode="nearest")
     grain = relative - around
     width = max(scatter(grain), 1e-9)
     found = {"fine": log(width), "smooth": log(float(around.std()))}

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import candidate, expected_events
@@ -71,7 +71,7 @@ class Score:
     def likely_sds(self) -> float:
         """Standard deviations by which a refuted strength is likely to lie above what is seen: Student's quantile of
         CONFIDENCE for so many campaigns without the effect, 1.8 of eleven."""
-        return float(stats.t.ppf(CONFIDENCE, len(self.without) - 1))
+        return float(scipy.stats.t.ppf(CONFIDENCE, len(self.without) - 1))
 
     @property
     def effect_size(self) -> float:
@@ -183,13 +183,13 @@ class TwinProbe(EffectProbe):
         if self.random_course:
             sd = float(scores.std(ddof=1)) * np.sqrt(1 + 1 / count)
             return StrengthTest(
-                float(scores.mean()) - score.mean, sd, float(stats.t.ppf(CONFIDENCE, count - 1)), events
+                float(scores.mean()) - score.mean, sd, float(scipy.stats.t.ppf(CONFIDENCE, count - 1)), events
             )
         change, n = scores - without, len(score.without)
         excess = float(change.mean())
         own2 = self.score_variance(score, scores, excess, events)
         sd = float(np.sqrt(own2 * (1 + 1 / n) + np.var(change, ddof=1) / count + score.error**2))
-        return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, n - 1)), events)
+        return StrengthTest(excess, sd, float(scipy.stats.t.ppf(CONFIDENCE, n - 1)), events)
 
 
 class UnitProbe(EffectProbe):
@@ -215,7 +215,7 @@ class UnitProbe(EffectProbe):
         scores = np.array([score.of(v) for v in units])
         excess, n = float(scores.mean()) - score.mean, len(units)
         sd = float(np.sqrt(self.score_variance(score, scores, excess, events) * (1 + 1 / n) + score.error**2))
-        return StrengthTest(excess, sd, float(stats.t.ppf(CONFIDENCE, n - 1)), events)
+        return StrengthTest(excess, sd, float(scipy.stats.t.ppf(CONFIDENCE, n - 1)), events)
 
     def _units(self, model: SensorModel) -> Array:
         units = with_drawn_pattern(self.case, model, self.null, self.null.prediction).units

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
-from scipy.optimize import brentq
 
 from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
@@ -41,8 +40,8 @@ class OpticalBlur(Effect):
         if self.sigma_pixels < _NO_BLUR:
             return radiance
         kernel = gaussian_weights(self.sigma_pixels)
-        columns: NDArray[np.float32] = convolve1d(radiance, kernel, axis=0, mode="nearest")
-        blurred: NDArray[np.float32] = convolve1d(columns, kernel, axis=1, mode="nearest")
+        columns: NDArray[np.float32] = scipy.ndimage.convolve1d(radiance, kernel, axis=0, mode="nearest")
+        blurred: NDArray[np.float32] = scipy.ndimage.convolve1d(columns, kernel, axis=1, mode="nearest")
         return blurred
 
 
@@ -52,7 +51,7 @@ def gaussian_weights(sigma: float) -> NDArray[np.float64]:
     reach = int(np.ceil(5.0 * sigma)) + 1
     square = np.arange(-reach, reach + 1, dtype=np.float64) ** 2
     weights = lambda v: np.exp(-square / (2.0 * v)) / np.exp(-square / (2.0 * v)).sum()  # noqa: E731
-    v = brentq(lambda v: float(weights(v) @ square) - sigma**2, 1e-3, sigma**2 + 1.0)  # type: ignore[no-untyped-call]
+    v = scipy.optimize.brentq(lambda v: float(weights(v) @ square) - sigma**2, 1e-3, sigma**2 + 1.0)  # type: ignore[no-untyped-call]
     found = np.asarray(weights(v), np.float64)  # type: ignore[no-untyped-call]
     found.setflags(write=False)  # kept, and given to whoever asks again
     return found

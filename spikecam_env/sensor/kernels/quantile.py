@@ -13,9 +13,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
-from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -36,7 +35,7 @@ def charge_cdf(z: Array, electrons: float, kappa: float) -> Array:
     Gil-Pelaez: F(z) = 1/2 - (1/pi) integral_0^inf Im(exp(-i w z) phi(w)) / w dw, by trapezia; to 1e-10 for N >= 20.
     """
     if np.isinf(electrons):
-        return np.asarray(special.ndtr(z))
+        return np.asarray(scipy.special.ndtr(z))
     w = np.arange(1, 161) * 0.1
     x = w / np.sqrt(1.0 / electrons + kappa**2) / electrons  # u / N
     log = np.log1p(-1j * x)
@@ -65,7 +64,7 @@ def fitted_polynomial(electrons: float, kappa: float) -> tuple[np.float32, ...]:
     """
     x, probability = bell_cdf()
     used = (probability > _USED) & (probability < 1.0 - _USED)
-    x, normal = x[used][::4], special.ndtri(probability[used][::4])
+    x, normal = x[used][::4], scipy.special.ndtri(probability[used][::4])
     target = _quantile(electrons, kappa)(normal)
     density = np.exp(-0.5 * normal**2) / np.sqrt(2.0 * np.pi)
     weight = density + 1e-4
@@ -77,10 +76,10 @@ def fitted_polynomial(electrons: float, kappa: float) -> tuple[np.float32, ...]:
     return tuple(np.float32(c) for c in power)
 
 
-def _quantile(electrons: float, kappa: float) -> CubicSpline:
+def _quantile(electrons: float, kappa: float) -> scipy.interpolate.CubicSpline:
     """Quantile of the law against that of the normal law: nearly a straight line, so a spline follows it."""
     z = np.linspace(-8.0, 9.0, 341)
     probability = charge_cdf(z, electrons, kappa)
     sure = (probability > 1e-11) & (probability < 1.0 - 1e-11)
-    normal = special.ndtri(probability[sure])
-    return CubicSpline(normal, z[sure])
+    normal = scipy.special.ndtri(probability[sure])
+    return scipy.interpolate.CubicSpline(normal, z[sure])

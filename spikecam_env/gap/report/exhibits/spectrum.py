@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from spikecam_env.gap.report.panels import Array, Panel, largest, takes
 from spikecam_env.gap.result import Evidence
@@ -48,7 +48,7 @@ def _local_scatter(log_ratio: Array) -> Array:
     their scatter shows it, and sees neither a few lines nor a broad rise.
     """
     jumps = np.abs(np.diff(log_ratio))
-    local = ndimage.median_filter(jumps, 21, mode="nearest") * 1.4826 / np.sqrt(2)
+    local = scipy.ndimage.median_filter(jumps, 21, mode="nearest") * 1.4826 / np.sqrt(2)
     return np.append(local, local[-1])
 
 
