@@ -7,6 +7,8 @@ among temporary files, and where there is none it is compiled anew by every proc
 Processes that start together, as environments of a vector or workers of a dataset do, need the same functions at the
 same moment.  One compiles a function, and the others wait and read what it has kept: to compile the sensor's loop takes
 a processor up to a minute.
+
+With NUMBA_DISABLE_JIT functions stay Python; those of the fast engine and of painting cannot, and say so when called.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Compiled], Compile
 
     def decorate(function: Compiled) -> Compiled:
         dispatcher: Compiled = numba.njit(**options)(function)
-        if cache:
+        if cache and not config.DISABLE_JIT:  # type: ignore[attr-defined]
             _keep(dispatcher)
         return dispatcher
 

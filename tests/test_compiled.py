@@ -172,3 +172,16 @@ def test_all_compiled_code_is_decorated_in_one_place() -> None:
     files = [f for name in PACKAGES for f in (ROOT / name).rglob("*.py") if f.name != "compiled.py"]
     others = re.compile(r"numba\.(njit|jit)\b|from numba import .*\bn?jit\b|cache=True.*\bvectorize")
     assert not [str(f.relative_to(ROOT)) for f in files if others.search(f.read_text(encoding="utf-8"))]
+
+
+def test_without_compiling_the_sensor_s_specification_runs_and_the_fast_engine_says_why_it_cannot() -> None:
+    code = (
+        "import numpy as np; from spikecam_env.sensor import SensorModel, SpikeSensor\n"
+        "model, light = SensorModel.preset('scsim'), np.full((4, 4), 0.3)\n"
+        "print(int(SpikeSensor(model, (4, 4), engine='reference').step(light, frames=20).sum()) > 0)\n"
+        "try: SpikeSensor(model, (4, 4), engine='fast').step(light, frames=20)\n"
+        "except NotImplementedError as error: print(error)"
+    )
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=120)
+    assert done.stdout.startswith("True\n") and "not usable in pure-python" in done.stdout, done.stderr

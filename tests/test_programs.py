@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -16,6 +18,22 @@ PROGRAMS = sorted(f"{room}.{path.stem}" for room in ROOMS for path in (ROOT / ro
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_program_imports(name: str) -> None:
     assert import_module(name)
+
+
+@pytest.mark.parametrize(
+    ("module", "spared"),
+    [
+        ("spikecam_env.sensor", ("torch", "matplotlib", "scipy.stats", "scipy.interpolate", "cv2")),
+        ("scenes", ("torch", "matplotlib", "scipy.stats", "trimesh", "OpenGL")),
+        ("denoiser", ("matplotlib", "scipy.stats", "trimesh", "OpenGL", "openvino")),
+        ("spikecam_env.calibration", ("torch", "matplotlib", "scipy.stats")),
+    ],
+)
+def test_an_import_spares_what_only_some_calls_need(module: str, spared: tuple[str, ...]) -> None:
+    """They take up to seconds, in each process that a vector or a dataset starts."""
+    code = f"import sys, {module}; print(sorted({set(spared)!r} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.strip() == "[]"
 
 
 @pytest.mark.parametrize("room", NOT_INSTALLED)

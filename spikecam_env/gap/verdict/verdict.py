@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.off_nominal import off_nominal, with_strengths
+from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal, with_strengths
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
@@ -22,6 +22,7 @@ from spikecam_env.gap.result import Conclusion, NamedEffect, Remainder, Statisti
 from spikecam_env.gap.search.forward import SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of, usable_floor
 from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, patched_model
@@ -109,11 +110,10 @@ def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str,
     """
     if not rounds or comparison.missing:
         return comparison.off.parameters
-    last = rounds[-1]
-    model = with_patterns_of(comparison.tested, last.model)
-    off = off_nominal(comparison.case, model, last.base).parameters
+    case, tested, last = comparison.case, comparison.tested, rounds[-1]
+    off = off_beside(case, tested, last, last.base).parameters
     refits = [d.refit for d in last.prediction.draws if d.refit is not None]
-    as_read = [off_nominal(comparison.case, model, refit).parameters for refit in refits[-1:]] if off else []
+    as_read = [off_beside(case, tested, last, refit).parameters for refit in refits[-1:]] if off else []
     return {name: row for name, row in off.items() if not any(is_scattered(name, row, read) for read in as_read)}
 
 
@@ -131,9 +131,11 @@ def is_scattered(name: str, unit: Mapping[str, float], as_read: Mapping[str, Map
     return abs(math.log(read / unit["ratio"])) >= abs(math.log(unit["ratio"]))
 
 
-def with_patterns_of(model: SensorModel, found: SensorModel) -> SensorModel:
-    """The model with those effects of another that make pixels differ: what they explain, its own spreads do not."""
-    return reduce(SensorModel.with_effect, (e for e in found.effects if candidate(e.name).is_pattern), model)
+def off_beside(case: Case, tested: SensorModel, last: Round, unit: BaseFit) -> OffNominal:
+    """What a unit has in another amount than the tested model, beside the patterns that the search ended with: what
+    these effects that make pixels differ explain, its own spreads do not."""
+    patterns = (e for e in last.model.effects if candidate(e.name).is_pattern)
+    return off_nominal(case, reduce(SensorModel.with_effect, patterns, tested), unit)
 
 
 def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> bool:
@@ -175,7 +177,7 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
     null, values, found = problem.null, problem.values, {e.name for e in last.model.effects}
     if found <= {e.name for e in tested.effects} or not explains(null, values, last.prediction):
         return list(rounds)
-    off = off_nominal(problem.case, with_patterns_of(tested, last.model), last.base)
+    off = off_beside(problem.case, tested, last, last.base)
     count = problem.settings.twins.in_the_end
     cost = count * len(problem.case.conditions)
     if not off.parameters or not problem.allows("parameters as given", cost, needed=True):
