@@ -21,6 +21,7 @@ none may lead further than the polynomial is off where it is worst.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -68,6 +69,11 @@ class Key:
     points: Floats
     texels: Floats
     lens: Floats
+
+    @cached_property
+    def to_directions(self) -> Floats:
+        """(3, 3) texels to directions."""
+        return np.asarray(np.linalg.inv(self.lens))
 
 
 def render_key(
@@ -298,14 +304,17 @@ def carry(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats
     return Carried(key, reference.astype(np.float32), coefficients.astype(np.float32), rigid.astype(np.float32))
 
 
+_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
+"""A camera that looks along -z with y up, to one that looks along z with y down."""
+
+
 def _rigid(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Floats:
     """See `Carried`."""
-    flip = np.diag([1.0, -1.0, -1.0, 1.0])
-    now = flip @ view @ np.linalg.inv(key_view) @ flip
+    now = _FLIP @ view @ np.linalg.inv(key_view) @ _FLIP
     back = np.linalg.inv(now)
     unlens = np.broadcast_to(np.diag([1 / focal, 1 / focal, 1.0]), (len(view), 3, 3)).copy()
     unlens[:, :2, 2] = -centre / focal
-    depth = np.concatenate([now[:, 2:3, :3] @ np.linalg.inv(key.lens), now[:, 2:3, 3:]], -1)
+    depth = np.concatenate([now[:, 2:3, :3] @ key.to_directions, now[:, 2:3, 3:]], -1)
     texel = np.concatenate([key.lens @ back[:, :3, :3] @ unlens, key.lens @ back[:, :3, 3:]], -1)
     return np.concatenate([depth[:, 0], texel.reshape(-1, 12)], -1)
 
