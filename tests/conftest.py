@@ -5,6 +5,8 @@ one that waits spins, on the other's core.  A solve of 128 equations then takes 
 cores.  What sets torch's threads for a while sets them back: one test that did not would slow all that come after.
 
 Files with slow tests come first: two processes that take file after file end together, not one with a long file last.
+The very first takes a minute and needs no compiled code, which the other process compiles meanwhile: two that need the
+same function at once wait for each other.
 """
 
 from __future__ import annotations
@@ -20,9 +22,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # read by OpenBLAS, MKL and torch
 os.environ.setdefault("GOMP_SPINCOUNT", "10000")  # as the command has it: what is tested with two threads waits asleep
 
 
+FIRST = "test_site.py"
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    items.sort(key=lambda item: (item.path.name != FIRST, item.path not in slow))
 
 
 @pytest.fixture(autouse=True)
