@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from scenes.keys import side_by_side
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import random_texture
 from spikecam_env.checked import checked_number, checked_shape
+from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 
@@ -80,14 +82,15 @@ class Collage:
         light = np.empty((len(frame), *self.shape), np.float32)
 
         def paint(key: int) -> None:
-            light[key] = self._picture(float(frame[key]), gaze)[0]
+            self._paint(light[key], float(frame[key]), _offset(float(frame[key]), gaze))
 
         side_by_side(paint, len(frame))
         return Keyframes(frame.astype(np.float64), light)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Radiance, flow [pixels/frame] and object number (0: background, then the shapes from the back)."""
-        radiance, owner = self._picture(frame, gaze)
+        radiance, owner = np.empty(self.shape, np.float32), np.zeros(self.shape, np.int32)
+        self._paint(radiance, frame, _offset(frame, gaze), owner)
         flow = np.empty((*self.shape, 2), np.float32)
         for number, layer in enumerate((self._background, *self._shapes)):
             mine = owner == number
@@ -105,13 +108,20 @@ class Collage:
         offset = _offset(frame, gaze)
         return {f"shape-{n}": layer.pose(frame, offset, self.shape)[:2] for n, layer in enumerate(self._shapes, 1)}
 
-    def _picture(self, frame: float, gaze: Gaze | None) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        offset = _offset(frame, gaze)
-        picture = self._background.tiled(frame, offset, self.shape)
-        owner = np.zeros(self.shape, np.int32)
+    def _paint(
+        self,
+        picture: NDArray[np.float32],
+        frame: float,
+        offset: tuple[float, float],
+        owner: NDArray[np.int32] | None = None,
+    ) -> None:
+        """The picture (H, W) at a frame, in place; owner (H, W): where that is given, which shape is seen."""
+        self._background.tile(picture, frame, offset)
         for number, layer in enumerate(self._shapes, 1):
-            layer.paint(picture, owner, number, frame, offset)
-        return picture, owner
+            place, sprite = layer.shown(frame, offset, self.shape)
+            lay_over(picture[place], sprite)
+            if owner is not None:
+                owner[place][sprite[..., 1] > 0.5] = number
 
 
 @dataclass(frozen=True)
@@ -146,34 +156,31 @@ class _Layer:
         vx, vy = self.velocity[0] - self.spin * (rows - y), self.velocity[1] + self.spin * (columns - x)
         return np.stack([vx, vy], axis=-1).astype(np.float32)
 
-    def tiled(self, frame: float, offset: tuple[float, float], shape: tuple[int, int]) -> NDArray[np.float32]:
-        """The sprite's light repeated over the whole picture."""
+    def tile(self, picture: NDArray[np.float32], frame: float, offset: tuple[float, float]) -> None:
+        """The sprite's light repeated over the whole picture, in place."""
         x = self.centre[0] + self.velocity[0] * frame - offset[0]
         y = self.centre[1] + self.velocity[1] * frame - offset[1]
         matrix = self._to_sprite(x, y, self.angle)
-        return _warp(self.sprite[..., 0], matrix, shape, cv2.BORDER_WRAP)
+        _warp(self._light, matrix, (picture.shape[0], picture.shape[1]), cv2.BORDER_WRAP, picture)
 
-    def paint(
-        self,
-        picture: NDArray[np.float32],
-        owner: NDArray[np.int32],
-        number: int,
-        frame: float,
-        offset: tuple[float, float],
-    ) -> None:
-        """Composite over the picture: out = sprite + (1 - coverage) * picture."""
-        x, y, angle = self.pose(frame, offset, (picture.shape[0], picture.shape[1]))
+    @cached_property
+    def _light(self) -> NDArray[np.float32]:
+        return np.ascontiguousarray(self.sprite[..., 0])
+
+    def shown(
+        self, frame: float, offset: tuple[float, float], shape: tuple[int, int]
+    ) -> tuple[tuple[slice, slice], NDArray[np.float32]]:
+        """The rows and columns of the picture that the sprite may reach, and the sprite there, (h, w, 2)."""
+        x, y, angle = self.pose(frame, offset, shape)
         reach = self.radius + 2
         left, top = max(int(x - reach), 0), max(int(y - reach), 0)
-        right, bottom = min(int(x + reach) + 1, picture.shape[1]), min(int(y + reach) + 1, picture.shape[0])
+        right, bottom = min(int(x + reach) + 1, shape[1]), min(int(y + reach) + 1, shape[0])
         if left >= right or top >= bottom:
-            return
+            return np.s_[0:0, 0:0], np.empty((0, 0, 2), np.float32)
         matrix = self._to_sprite(x - left, y - top, angle)
-        warped = _warp(self.sprite, matrix, (bottom - top, right - left), cv2.BORDER_CONSTANT)
-        patch = picture[top:bottom, left:right]
-        patch *= 1 - warped[..., 1]
-        patch += warped[..., 0]
-        owner[top:bottom, left:right][warped[..., 1] > 0.5] = number
+        return np.s_[top:bottom, left:right], _warp(
+            self.sprite, matrix, (bottom - top, right - left), cv2.BORDER_CONSTANT
+        )
 
     def _to_sprite(self, x: float, y: float, angle: float) -> NDArray[np.float64]:
         """2 x 3 map from picture (x, y) to sprite, whose middle is shown at (x, y)."""
@@ -182,12 +189,25 @@ class _Layer:
         return np.array([[cos, sin, middle - cos * x - sin * y], [-sin, cos, middle + sin * x - cos * y]])
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def lay_over(picture: NDArray[np.float32], sprite: NDArray[np.float32]) -> None:
+    """Lay a sprite (h, w, 2) over a picture (h, w), in place: out = light + (1 - coverage) x picture."""
+    one = np.float32(1)
+    for row in range(picture.shape[0]):
+        for x in range(picture.shape[1]):
+            picture[row, x] = picture[row, x] * (one - sprite[row, x, 1]) + sprite[row, x, 0]
+
+
 def _warp(
-    image: NDArray[np.float32], matrix: NDArray[np.float64], shape: tuple[int, int], border: int
+    image: NDArray[np.float32],
+    matrix: NDArray[np.float64],
+    shape: tuple[int, int],
+    border: int,
+    into: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """The image at matrix (x, y, 1) for every pixel (x, y) of a picture of `shape`, bilinear."""
+    """The image at matrix (x, y, 1) for every pixel (x, y) of a picture of `shape`, bilinear; into: such a picture."""
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    return np.asarray(cv2.warpAffine(image, matrix, shape[::-1], flags=flags, borderMode=border), np.float32)
+    return np.asarray(cv2.warpAffine(image, matrix, shape[::-1], into, flags, border), np.float32)
 
 
 def _draw_layer(

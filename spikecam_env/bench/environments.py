@@ -1,4 +1,4 @@
-"""Steps a second of environments, alone and as vectors, and where the processor's time of a step goes.
+"""Steps a second of environments, alone and as vectors, where the processor's time of a step goes, and episodes.
 
 spikecam bench env
 
@@ -32,6 +32,10 @@ COUNTS = (1, 16, 64)
 MODES = {"sync": "sync", "async": "async", "native": "vector_entry_point"}
 CASES = (("RotatingDisk-v0", "spikes"), ("Track-v1", "tfp"), ("RotatingDisk-v0", "rate"))
 """(id, observation): without the denoiser, a task, and with the denoiser."""
+KINDS = ("RotatingDisk-v0", "Track-v1", "Collage-v0", "Tumble-v0", "Scene-v0")
+"""Ids of which episodes are timed: flat scenes, a task, a collage, a world, and a world drawn anew every episode."""
+EPISODES, STEPS = 6, 8
+"""Episodes of each that are timed, and steps in each, beside a first episode of each."""
 PARTS = ("light, %", "camera, %", "beside both, %")
 """Of the processor's time of a step."""
 ROUNDS = 7
@@ -61,7 +65,48 @@ class Contestant:
         return elapsed / steps, (cpu_seconds(self.processes) - busy) / steps
 
 
-def bench_environments(
+def bench_environments() -> dict[str, list[dict[str, Any]]]:
+    """Tables by title: `bench_vectors` and `bench_episodes`."""
+    return {"one camera and many": bench_vectors(), "episodes of one camera": bench_episodes()}
+
+
+def bench_episodes(
+    kinds: tuple[str, ...] = KINDS, episodes: int = EPISODES, steps: int = STEPS
+) -> list[dict[str, Any]]:
+    """How long episodes take to begin, and steps of 40 frames of 64 x 64 pixels by a camera that does not turn.
+
+    Columns: id; begin ms, of `reset`, and step ms, medians by the clock; frames/s of the steps, x real time.
+    """
+    rows = []
+    for name in tqdm(kinds, desc="bench", unit="id", leave=False):
+        env = gymnasium.make(f"spikecam_env/{name}", **OPTIONS, obs="tfp")
+        timed = [_episode(env, seed, steps) for seed in range(episodes + 1)][1:]
+        env.close()
+        begin = float(np.median([first for first, _ in timed]))
+        step = float(np.median([each for _, of_steps in timed for each in of_steps]))
+        rate = OPTIONS["frames_per_step"] / step
+        rows.append(
+            {"id": name, "begin ms": 1e3 * begin, "step ms": 1e3 * step, "frames/s": rate, "x real time": rate / 40_000}
+        )
+    return rows
+
+
+def _episode(env: gymnasium.Env[Any, Any], seed: int, steps: int) -> tuple[float, list[float]]:
+    """Seconds by the clock of an episode's beginning, and of each of its steps, so many at most."""
+    still = np.zeros(env.action_space.shape or (), np.float32)
+    ends = [time.perf_counter()]
+    env.reset(seed=seed)
+    ends.append(time.perf_counter())
+    for _ in range(steps):
+        *_, terminated, truncated, _ = env.step(still)
+        ends.append(time.perf_counter())
+        if terminated or truncated:
+            break
+    first, *of_steps = np.diff(ends).tolist()
+    return first, of_steps
+
+
+def bench_vectors(
     counts: tuple[int, ...] = COUNTS,
     cases: tuple[tuple[str, str], ...] = CASES,
     seconds: float = 0.4,

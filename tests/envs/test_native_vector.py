@@ -11,7 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 
-from spikecam_env.bench.environments import bench_environments
+from spikecam_env.bench.environments import bench_episodes, bench_vectors
 from spikecam_env.envs.observations import OBSERVATIONS
 from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS, register
 from spikecam_env.envs.rotating_disk import RotatingDiskEnv
@@ -157,7 +157,7 @@ def test_bad_calls_are_named() -> None:
 
 
 def test_the_bench_has_a_row_for_each_way() -> None:
-    rows = bench_environments(counts=(1, 2), cases=(("Track-v1", "tfp"),), seconds=0.01, rounds=1)
+    rows = bench_vectors(counts=(1, 2), cases=(("Track-v1", "tfp"),), seconds=0.01, rounds=1)
     assert [(row["how"], row["environments"]) for row in rows] == [
         ("single", 1),
         *((how, count) for count in (1, 2) for how in ("sync", "async", "native")),
@@ -173,6 +173,12 @@ def test_the_bench_has_a_row_for_each_way() -> None:
             assert row[parts[0]] > 0 and row[parts[1]] > 0 and sum(row[part] for part in parts) == pytest.approx(100)
         else:
             assert [row[part] for part in parts] == ["", "", ""]
+
+
+def test_the_bench_times_episodes() -> None:
+    (row,) = bench_episodes(kinds=("Track-v1",), episodes=2, steps=3)
+    assert row["id"] == "Track-v1" and row["begin ms"] > 0
+    assert row["frames/s"] == pytest.approx(40_000 / row["step ms"])
 
 
 def test_an_environment_with_a_step_of_its_own_is_refused() -> None:
