@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from importlib import import_module
@@ -34,6 +35,23 @@ def test_an_import_spares_what_only_some_calls_need(module: str, spared: tuple[s
     code = f"import sys, {module}; print(sorted({set(spared)!r} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("package", ["spikecam_env", "scenes", "denoiser"])
+def test_what_a_package_offers_is_not_lost_to_a_module_of_that_name(package: str) -> None:
+    """When a module is first imported, it becomes an attribute of its package, over whatever has the same name there:
+    `from package import name` would depend on what was imported before."""
+    lost = []
+    for init in (ROOT / package).rglob("__init__.py"):
+        inside = {path.stem for path in init.parent.iterdir() if path.suffix == ".py" or path.is_dir()}
+        home = ".".join(init.parent.relative_to(ROOT).parts)
+        for node in ast.walk(ast.parse(init.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                names = {alias.asname or alias.name for alias in node.names} & inside
+                lost += [
+                    f"{home}.{name} of {node.module}" for name in names if node.module not in (home, f"{home}.{name}")
+                ]
+    assert not lost
 
 
 @pytest.mark.parametrize("room", NOT_INSTALLED)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from denoiser.evaluate.judge import COLUMNS, PLANE, Record
-from denoiser.evaluate.summary import best_picture
+from denoiser.evaluate.table_summary import best_picture
 
 Figure = dict[str, Any]
 Group = dict[str, Any]

@@ -27,9 +27,9 @@ from denoiser.evaluate.exposed import CLASSICAL, Case
 from denoiser.evaluate.figures import figures
 from denoiser.evaluate.judge import COLUMNS, Record
 from denoiser.evaluate.page import write_page
-from denoiser.evaluate.report import report
 from denoiser.evaluate.rows import BEFORE, ROWS, Weights, parameters, why_not
-from denoiser.evaluate.summary import groups
+from denoiser.evaluate.table_report import report
+from denoiser.evaluate.table_summary import groups
 from denoiser.evaluate.work import Results, tasks, undone, work
 from scenes.catalogue import SCENES
 from spikecam_env.checked import checked_count, checked_memory, checked_shape

@@ -65,7 +65,7 @@ class Making:
 
     def show(self, table: str, **options: Any) -> None:
         """Make a table and print it."""
-        from denoiser.evaluate.report import report
+        from denoiser.evaluate.table_report import report
         from denoiser.evaluate.tables import Asked, evaluate_table
 
         asked = Asked(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)

@@ -15,9 +15,9 @@ from denoiser.evaluate import exposed, still, tables, work
 from denoiser.evaluate.exposed import Case
 from denoiser.evaluate.figures import figures
 from denoiser.evaluate.judge import Record, Score
-from denoiser.evaluate.report import report
 from denoiser.evaluate.rows import ROWS, Weights, why_not
-from denoiser.evaluate.summary import groups, mean_and_spread
+from denoiser.evaluate.table_report import report
+from denoiser.evaluate.table_summary import groups, mean_and_spread
 from denoiser.evaluate.tables import TABLES, Asked, evaluate_table
 from denoiser.pixel_map import PixelMap
 from spikecam_env.datasets import build, phm_n

@@ -82,18 +82,20 @@ def _measures(group: dict[str, Any], rows: Sequence[str]) -> list[str]:
     return ["\n".join(lines)]
 
 
-def _figures(found: Sequence[dict[str, Any]]) -> str:
+def _figures(promised: Sequence[dict[str, Any]]) -> str:
+    """Those found beside those wanted, and how many could not be."""
     words = {True: "yes", False: "NO", None: "-"}
-    width = max(len(f["what"]) for f in found)
-    wanted = max(len(f["wanted"]) for f in found)
-    lines = [f"{'figure':{width}} | {'wanted':{wanted}} |    found | holds | interval, speed"]
+    found = [f for f in promised if f["found"] is not None]
+    width = max((len(f["what"]) for f in found), default=0)
+    wanted = max((len(f["wanted"]) for f in found), default=0)
+    lines = [f"{'figure':{width}} | {'wanted':{wanted}} |    found | holds | interval, speed"] if found else []
     for f in found:
-        number = "-" if f["found"] is None else f"{f['found']:g}"
         group = f"{f['interval']:g}, {f['speed']:g}" if f["interval"] else ""
         lines.append(
-            f"{f['what']:{width}} | {f['wanted']:{wanted}} | {number:>8} | {words[f['holds']]:5} | {group}".rstrip()
+            f"{f['what']:{width}} | {f['wanted']:{wanted}} | {f['found']:8g} | {words[f['holds']]:5} | {group}".rstrip()
         )
-    return "\n".join(lines)
+    left = len(promised) - len(found)
+    return "\n".join([*lines, *([f"figures that need rows or columns not in this table: {left}"] if left else [])])
 
 
 def _cell(score: dict[str, float | None] | None) -> str:
