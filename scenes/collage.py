@@ -119,7 +119,7 @@ class Collage:
         self._background.tile(picture, frame, offset)
         for number, layer in enumerate(self._shapes, 1):
             place, sprite = layer.shown(frame, offset, self.shape)
-            lay_over(picture[place], sprite)
+            _lay(picture[place], sprite)
             if owner is not None:
                 owner[place][sprite[..., 1] > 0.5] = number
 
@@ -190,7 +190,7 @@ class _Layer:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def lay_over(picture: NDArray[np.float32], sprite: NDArray[np.float32]) -> None:
+def _lay(picture: NDArray[np.float32], sprite: NDArray[np.float32]) -> None:
     """Lay a sprite (h, w, 2) over a picture (h, w), in place: out = light + (1 - coverage) x picture."""
     one = np.float32(1)
     for row in range(picture.shape[0]):

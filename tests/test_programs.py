@@ -1,4 +1,7 @@
-"""Programs of a checkout take minutes and are run by hand; these tests say that they still find what they import."""
+"""Imports: what programs find, what packages spare and offer, and what no library may import.
+
+Programs of a checkout take minutes and are run by hand; these tests say that they still find what they import.
+"""
 
 from __future__ import annotations
 

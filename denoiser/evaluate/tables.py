@@ -107,10 +107,11 @@ class Asked:
 def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = False) -> dict[str, Any]:
     """A table of `TABLES`; `report` shows the result as text.
 
-    Returns table, title, rows, settings, groups (see `summary.groups`), scenes (every record), missing (why rows,
+    Returns table, title, rows, settings, groups (see `table_summary.groups`), scenes (every record), missing (why rows,
     columns or recordings are not there), parameters (weights of the rows' networks) and figures (see
     `figures.figures`).
-    Raises InputError for unknown names, too few frames, and a folder that holds results of other settings.
+    Raises InputError for unknown names, too few frames, a folder of recordings that is not there, and a folder that
+    holds results of other settings.
     """
     if name not in TABLES:
         raise unknown_name("table", name, TABLES)
@@ -152,6 +153,8 @@ def _rows(table: Table, asked: Asked) -> list[str]:
 def _cases(table: Table, asked: Asked) -> tuple[list[Case], dict[str, str]]:
     """The cases, and by name why others are not there."""
     if table.kind == "real":
+        if asked.real != real.FOLDER and not asked.real.is_dir():
+            raise InputError(f"there is no folder {asked.real}; give the folder of the recordings")
         paths = [asked.real / name for name in real.RECORDINGS]
         missing = {path.name: f"there is no recording {path}" for path in paths if not path.is_file()}
         return [case for path in paths if path.is_file() for case in real.real_cases(path)], missing

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from scenes.layers import Carried, Key, carry, lay, render_key
 from scenes.protocol import Gaze
-from scenes.world.cache import Sight, WorldCache
-from scenes.world.extent import extent, window_around
+from scenes.world.cache import WorldCache
+from scenes.world.extent import extent
 from scenes.world.plan import BLOCK, BlockPlan, pace_of
 from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets
-from scenes.world.sprites import TRUTH_RAYS, body_sprite, lay_over
+from scenes.world.sprites import TRUTH_RAYS, body_sprite, lay_over, sight_of
 from spikecam_env.threads import as_many, pool
 
 PIECE = 64
@@ -151,20 +151,15 @@ def _key(spec: WorldSpec, cache: WorldCache, body: int, frame: int, gaze: Gaze |
     margin = max(spec.shape) // 2
     if gaze is not None:
         margin += -(-int(max(map(abs, (*gaze.start, *gaze.stop)))) // GAZE_MARGIN) * GAZE_MARGIN
-    seen = cache.sights.get((body, frame, margin), lambda: _sight(spec, cache, body, frame, margin))
+    seen = cache.sights.get(
+        (body, frame, margin), lambda: sight_of(spec, cache, body, frame, spec.pinhole(frame), margin)
+    )
     surface = spec.bodies[body].surface
     key = cache.keys.get(
         (body, seen.pose.tobytes(), seen.camera.pose.tobytes(), seen.window),
         lambda: render_key(spec.drawing, surface, seen.pose, seen.camera, spec.lighting, seen.window, spec.light),
     )
     return key, seen.view
-
-
-def _sight(spec: WorldSpec, cache: WorldCache, body: int, frame: int, margin: int) -> Sight:
-    pose, camera = spec.pose(body, frame), spec.pinhole(frame)
-    view = np.linalg.inv(camera.pose) @ pose
-    box = extent(cache.probe(spec, body).extreme, view[None], spec.focal, np.asarray([spec.centre]))[0]
-    return Sight(pose, camera, view, window_around(box, spec.shape, margin))
 
 
 # -- composition -----------------------------------------------------------------------------------------------

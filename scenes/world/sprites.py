@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scenes.protocol import Gaze
 from scenes.renderers.protocol import Pinhole, Sprite, Window
-from scenes.world.cache import WorldCache
+from scenes.world.cache import Sight, WorldCache
 from scenes.world.extent import extent, window_around
 from scenes.world.spec import WorldSpec, gaze_offsets
 
@@ -24,21 +24,27 @@ def body_sprite(spec: WorldSpec, cache: WorldCache, body: int, frame: float, gaz
     offset = gaze_offsets(gaze, np.array([float(frame)]))[0]
     rest = spec.pinhole(frame)
     camera = Pinhole(rest.focal, (rest.centre[0] - offset[0], rest.centre[1] - offset[1]), rest.pose)
-    pose = spec.pose(body, frame)
-    view = np.linalg.inv(camera.pose) @ pose
-    box = extent(cache.probe(spec, body).extreme, view[None], spec.focal, np.asarray([camera.centre]))[0]
-    window = window_around(box, spec.shape, 0)
-    if not (window.rows and window.columns):
+    seen = sight_of(spec, cache, body, frame, camera, margin=0)
+    if not (seen.window.rows and seen.window.columns):
         nothing = np.zeros((0, 0), np.float32)
         return Sprite(Window(0, 0, 0, 0), nothing, nothing, nothing)
 
     def drawn() -> Sprite:
-        sprite = spec.drawing.render(spec.bodies[body].surface, pose, camera, spec.lighting, window, rays)
+        surface = spec.bodies[body].surface
+        sprite = spec.drawing.render(surface, seen.pose, camera, spec.lighting, seen.window, rays)
         return dataclasses.replace(sprite, radiance=sprite.radiance * np.float32(spec.light))
 
     if not spec.bodies[body].backdrop:
         return drawn()
-    return cache.backdrops.get((body, pose.tobytes(), camera.centre, camera.pose.tobytes(), rays), drawn)
+    return cache.backdrops.get((body, seen.pose.tobytes(), camera.centre, camera.pose.tobytes(), rays), drawn)
+
+
+def sight_of(spec: WorldSpec, cache: WorldCache, body: int, frame: float, camera: Pinhole, margin: int) -> Sight:
+    """A body before a camera at a frame; its window goes beyond the picture by `margin` pixels at most."""
+    pose = spec.pose(body, frame)
+    view = np.linalg.inv(camera.pose) @ pose
+    box = extent(cache.probe(spec, body).extreme, view[None], spec.focal, np.asarray([camera.centre]))[0]
+    return Sight(pose, camera, view, window_around(box, spec.shape, margin))
 
 
 def lay_over(picture: Array, sprite: Sprite, depth: Array) -> NDArray[np.bool_]:

@@ -13,6 +13,7 @@ import ctypes
 import os
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -79,9 +80,8 @@ def bench_episodes(
     """
     rows = []
     for name in tqdm(kinds, desc="bench", unit="id", leave=False):
-        env = gymnasium.make(f"spikecam_env/{name}", **OPTIONS, obs="tfp")
-        timed = [_episode(env, seed, steps) for seed in range(episodes + 1)][1:]
-        env.close()
+        with closing(gymnasium.make(f"spikecam_env/{name}", **OPTIONS, obs="tfp")) as env:
+            timed = [_episode(env, seed, steps) for seed in range(episodes + 1)][1:]
         begin = float(np.median([first for first, _ in timed]))
         step = float(np.median([each for _, of_steps in timed for each in of_steps]))
         rate = OPTIONS["frames_per_step"] / step

@@ -24,10 +24,9 @@ class Bench:
     """sensor: pixel-steps a second of numpy, reference and fast.  effects: cost of each effect over the base model.
     online: denoised frames a second.  live: pictures a second of a live stream, frames lost, latency, and the error of
     skipping passes (some minutes).  loop: scene to denoised rates, each stage and the whole.  env: steps a second of
-    1, 16 and 64 environments, by each way to step them; how long episodes take to begin.  scenes: frames of light a
-    second and their error, renderers,
-    scene to spikes, and the error of the flow (some minutes).  renderers: speed and error of each back-end of this
-    machine.  dataset: frames a second into files."""
+    1, 16 and 64 environments, by each way to step them, and how long an episode takes to begin (some minutes).
+    scenes: frames of light a second and their error, renderers, scene to spikes, and the error of the flow (some
+    minutes).  renderers: speed and error of each back-end of this machine.  dataset: frames a second into files."""
     out: Path | None = None
     """File for the figures, as JSON."""
     json: bool = False

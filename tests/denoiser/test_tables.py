@@ -219,6 +219,9 @@ def test_real_recordings_are_judged_by_niqe_or_named_as_absent(tmp_path: Path) -
     assert "helicopter_low_light.npz" in found["missing"] and "there is no recording" in report(found)
     with pytest.raises(InputError, match="true light"):
         evaluate_table("table2", replace(SMALL, rows=("clean",), real=tmp_path))
+    with pytest.raises(InputError, match=r"there is no folder .*nowhere; give the folder of the recordings"):
+        evaluate_table("table4", replace(SMALL, rows=("noisy",), real=tmp_path / "nowhere", out=tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
 
 
 def test_at_rest_the_mean_of_clean_frames_is_the_light_and_that_of_noisy_ones_has_the_fixed_pattern() -> None:
