@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import subprocess
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -22,11 +23,25 @@ CRF = 10
 
 @contextmanager
 def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
-    """A function that adds a picture, (rows, columns, 3) uint8, even sizes; the film is whole at the end of the block.
+    """Encode a film; it is whole at the end of the block.
 
-    shape: (rows, columns).  Raises OSError where ffmpeg fails, at once or at the end.
+    The colours of H.264 that every player shows are stored for 2 x 2 pixels, so the film has even sides.  A picture
+    with an odd side is repeated at its last row or column, and a warning states the film's size.
+
+    Args:
+        path: file to write; its name's ending sets the container.
+        shape: (rows, columns) of a picture.
+        fps: pictures a second.
+
+    Returns:
+        A function that adds a picture, (rows, columns, 3) uint8.
+
+    Raises:
+        OSError: ffmpeg fails, at once or at the end.
     """
-    source = ("-f", "rawvideo", "-vcodec", "rawvideo", "-s", f"{shape[1]}x{shape[0]}", "-pix_fmt", "rgb24")
+    beyond = [n % 2 for n in shape]
+    even = [n + more for n, more in zip(shape, beyond, strict=True)]
+    source = ("-f", "rawvideo", "-vcodec", "rawvideo", "-s", f"{even[1]}x{even[0]}", "-pix_fmt", "rgb24")
     rate = ("-r", str(Fraction(fps).limit_denominator()))
     coded = ("-an", "-vcodec", "libx264", "-pix_fmt", "yuv420p", "-crf", str(CRF), "-v", "error")
     command = [get_ffmpeg_exe(), "-y", *source, *rate, "-i", "-", *coded, os.fspath(path)]
@@ -44,7 +59,7 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable
 
     def add(picture: NDArray[np.uint8]) -> None:
         try:
-            pipe.write(np.ascontiguousarray(picture).data)
+            pipe.write(np.pad(picture, ((0, beyond[0]), (0, beyond[1]), (0, 0)), mode="edge").data)
         except BrokenPipeError:
             _end(process)
             raise OSError("ffmpeg ended before the film did") from None
@@ -55,6 +70,13 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Callable
     finally:
         process.kill()
         process.communicate()
+    if any(beyond):
+        added = " and ".join(name for name, more in zip(("row", "column"), beyond, strict=True) if more)
+        warnings.warn(
+            f"the film has {even[0]} x {even[1]} pixels, not {shape[0]} x {shape[1]}, as H.264 needs even sides; "
+            f"it repeats the last {added}",
+            stacklevel=1,
+        )
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -40,7 +40,8 @@ def compose(panels: Sequence[Panel], white: float, corner: str = "") -> NDArray[
     height, width = panels[0].picture.shape
     scale = panel_scale(width)
     h, w = height * scale, width * scale
-    canvas = Image.new("RGB", (len(panels) * (w + MARGIN) + MARGIN, h + 2 * MARGIN + CAPTION + 26), BACKGROUND)
+    across, down = len(panels) * (w + MARGIN) + MARGIN, h + 2 * MARGIN + CAPTION + 26
+    canvas = Image.new("RGB", (across + across % 2, down + down % 2), BACKGROUND)
     draw = ImageDraw.Draw(canvas)
     for i, panel in enumerate(panels):
         x = MARGIN + i * (w + MARGIN)
@@ -51,8 +52,7 @@ def compose(panels: Sequence[Panel], white: float, corner: str = "") -> NDArray[
     if corner:
         right, low = canvas.size[0] - MARGIN, canvas.size[1] - 8
         draw.text((right, low), corner, INK, font(14), anchor="rd")
-    even = canvas.crop((0, 0, canvas.size[0] // 2 * 2, canvas.size[1] // 2 * 2))
-    return np.asarray(even)
+    return np.asarray(canvas)
 
 
 def panel_scale(width: int) -> int:

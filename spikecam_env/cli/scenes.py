@@ -85,8 +85,7 @@ class Scenes:
         for frame in at:
             light = scene.radiance(frame, frame + 1).at(frame)
             white = white or _white(light)
-            rows, columns = (n // 2 * 2 for n in light.shape)
-            yield np.repeat(display(light[:rows, :columns], white)[..., None], 3, axis=2)
+            yield np.repeat(display(light, white)[..., None], 3, axis=2)
 
     def _write_sheet(self, path: Path) -> None:
         from tqdm import tqdm

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import imageio.v2 as imageio
@@ -8,6 +9,7 @@ import pytest
 
 from scenes.catalogue import SCENES
 from spikecam_env.cli.main import run
+from spikecam_env.cli.panels import BACKGROUND, MARGIN, Panel, compose, write_film
 from spikecam_env.streams import read_recording
 
 SIZE = ("--size", "24", "40")
@@ -72,3 +74,40 @@ def test_record_takes_any_scene(tmp_path: Path, capsys) -> None:
     assert "unknown scene 'dise'" in capsys.readouterr().err
     assert spikecam("record", "--scene", "dice", "--rpm", 5, "--out", tmp_path / "a.h5", *small) == 2
     assert "--rpm 5 is the disk's speed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("asked", "written"), [((101, 63), (102, 64)), ((24, 63), (24, 64)), ((9, 8), (10, 8)), ((24, 40), (24, 40))]
+)
+def test_a_film_of_odd_size_is_padded_never_cut(asked: tuple, written: tuple, tmp_path: Path, capsys) -> None:
+    """The GIF holds the size asked for, so it has the light of the last row and column."""
+    for name in ("a.mp4", "a.gif"):
+        assert spikecam("scenes", "ball", "--film", tmp_path / name, "--frames", 64, "--size", *asked) == 0
+    film, plain = (imageio.mimread(tmp_path / name)[0][..., :3].astype(int) for name in ("a.mp4", "a.gif"))
+    assert film.shape == (*written, 3) and plain.shape[:2] == asked
+    for seen, light in ((film[asked[0] - 1, : asked[1]], plain[-1]), (film[: asked[0], asked[1] - 1], plain[:, -1])):
+        print(worst := np.abs(seen - light).max())
+        assert worst <= 8  # 64 greys of the GIF are 4 apart, and lossy coding adds as much
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("spikecam: warning:")]
+    size = f"the film has {written[0]} x {written[1]} pixels, not {asked[0]} x {asked[1]}"
+    assert len(said) == (asked != written) and all(size in line for line in said)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (3, 5), (2, 2), (7, 300)])
+def test_a_film_of_any_size_has_every_pixel(shape: tuple[int, int], tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    grey = np.repeat(rng.integers(0, 256, (*shape, 1)), 3, axis=2).astype(np.uint8)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        write_film(tmp_path / "a.mp4", [grey] * 3)
+    film = imageio.mimread(tmp_path / "a.mp4")
+    assert len(film) == 3 and film[0].shape[:2] == tuple(n + n % 2 for n in shape)
+    assert np.abs(film[0][: shape[0], : shape[1]].astype(int) - grey).max() <= 12
+    assert len(said) == any(n % 2 for n in shape)
+
+
+@pytest.mark.parametrize("width", [1, 7, 31, 63])
+def test_panels_have_even_sides_and_room_for_their_margin(width: int) -> None:
+    white = compose([Panel(np.ones((width, width)), "")], 1.0)
+    assert white.shape[0] % 2 == white.shape[1] % 2 == 0
+    assert (white[:, -MARGIN:] == BACKGROUND).all()
