@@ -1,18 +1,18 @@
 """What a mesh says of its own reflection, as grey albedo: colours of vertices or faces, materials.
 
-Linear or not: pictures are sRGB.  Colours of vertices and faces are sRGB, but linear in glTF.  Factors (glTF's base
-colour, Kd of MTL) are linear.  Source: glTF 2.0, 3.7.2.1 and 3.9.2.
+Linear or not: pictures and colours of vertices and faces are sRGB, factors (Kd of MTL) are linear.  glTF has rules of
+its own (`scenes.gltf`).
 """
 
 from __future__ import annotations
 
-import json
-import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from PIL import Image
 
 from scenes.pictures import check_size
 from scenes.transfer import Array, grey, linear_from_srgb
@@ -20,88 +20,82 @@ from spikecam_env.errors import InputError
 
 UNSTATED_ALBEDO = 0.7
 """Of a mesh that says nothing: light grey paint."""
-GLTF_COLOURS = "_COLOR_0"
-"""Name of the vertices' attribute that holds glTF's colours, linear, as `gltf_colours_kept` has it."""
+TRANSPARENCY = "transparency (drawn opaque)"
+"""Name of what a surface that lets light through lacks here."""
 UNSTATED_DIFFUSE = (102, 102, 102, 255)
 """That trimesh gives to a material without one."""
 
 
-def own_albedo(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, float | Array]:
-    """The mesh, and its albedo: one value, one for each vertex (V,), or a texture (h, w).
+def own_albedo(mesh: trimesh.Trimesh, without: Callable[[str], None]) -> tuple[trimesh.Trimesh, float | Array]:
+    """A mesh as trimesh read it, and its albedo: one value, one for each vertex (V,), or a texture (h, w).
 
-    Faces of several colours have corners of their own.
-    Warns of transparency, and of colours that a texture hides.
-    Errors: InputError for colours and factors out of 0 to full scale, and several materials in one mesh.
+    Faces of several colours get corners of their own.
+
+    Args:
+        mesh: with its colours or its material; its texture coordinates change where a material moves its picture.
+        without: is called with the name of each part of the material that no surface shows.
+
+    Raises:
+        InputError: colours or factors are out of 0 to full scale, or the mesh has several materials in one.
     """
     visual: Any = mesh.visual
     kind, material = getattr(visual, "kind", None), getattr(visual, "material", None)
     if hasattr(material, "materials"):
         raise InputError("the mesh has several materials in one; export it with one material a mesh")
     factor, picture = (_factor(material), _picture(material)) if material is not None else (None, None)
-    linear: Any = mesh.vertex_attributes.get(GLTF_COLOURS)
     if str(getattr(material, "alphaMode", None) or "OPAQUE") != "OPAQUE":
-        _warn_of_transparency()
+        without(TRANSPARENCY)
     if picture is not None and getattr(visual, "uv", None) is not None:
-        light = linear_from_srgb(picture) * _or_one(factor)
-        if linear is not None and (linear != linear[0]).any():
-            warnings.warn("the mesh has a texture and colours of vertices; its texture alone is taken", stacklevel=4)
-        elif linear is not None:
-            light *= _linear_rgb(linear[:1], is_linear=True)
-        return mesh, grey(light)
-    if linear is not None:
-        return _coloured(mesh, linear, "vertex", True, _or_one(factor))
+        return mesh, grey(linear_from_srgb(picture) * (1.0 if factor is None else factor))
     if kind in ("vertex", "face"):
         _check_ply(mesh, kind)
         colours = visual.vertex_colors if kind == "vertex" else visual.face_colors
-        return _coloured(mesh, np.asarray(colours), kind)
+        return _coloured(mesh, np.asarray(colours), kind, without)
     return mesh, UNSTATED_ALBEDO if factor is None else float(grey(factor[None, None])[0, 0])
 
 
-def gltf_colours_kept(data: bytes, kind: str) -> bytes:
-    """A glTF file, kind "gltf" or "glb", with its COLOR_0 under the name GLTF_COLOURS.
+def colour_of(values: Any) -> Array:
+    """A factor as (3,) linear red, green, blue.
 
-    trimesh leaves the numbers of that one as they are.  Of COLOR_0 it keeps the lower 8 of 16 bits, and nothing beside
-    a material.  What is no glTF comes back as it was.
+    Args:
+        values: one or more numbers, red, green, blue first: in 0..1, or whole ones of 255.
+
+    Raises:
+        InputError: they are out of 0 to full scale.
     """
-    head = 20 if kind == "glb" else 0
-    try:
-        size = int.from_bytes(data[12:16], "little") if head else len(data)
-        tree = json.loads(data[head : head + size])
-        for primitive in (p for mesh in tree.get("meshes", ()) for p in mesh["primitives"]):
-            attributes = primitive["attributes"]
-            if "COLOR_0" in attributes:
-                attributes[GLTF_COLOURS] = attributes.pop("COLOR_0")
-        text = json.dumps(tree).encode()
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return data
-    if not head:
-        return text
-    text += b" " * (-len(text) % 4)
-    rest = data[head + size :]
-    whole = (head + len(text) + len(rest)).to_bytes(4, "little")
-    return data[:8] + whole + len(text).to_bytes(4, "little") + data[16:20] + text + rest
+    stated = np.asarray(values)
+    rgb = np.broadcast_to(stated[:3] if stated.ndim else stated, 3).astype(np.float32)
+    rgb = rgb / np.float32(255) if stated.dtype.kind == "u" else rgb
+    if not (rgb.min() >= 0 and rgb.max() <= 1):
+        raise InputError(f"a material's colour is {stated}; a surface reflects 0 to 1 of the light")
+    return rgb
+
+
+def pixels_of(image: Image.Image) -> tuple[Array, Array]:
+    """Colours (h, w, 3), encoded as they are stored, and alpha (h, w) of an open picture, both in 0..1.
+
+    Raises:
+        InputError: it has more than MOST_PICTURE_PIXELS.
+    """
+    check_size(image.width, image.height, "a texture of the mesh")
+    if image.mode.startswith("I") or image.mode == "F":
+        values = np.asarray(image, np.float32) / np.float32(1 if image.mode == "F" else 65535)
+        return np.repeat(values[..., None], 3, axis=2), np.ones_like(values)
+    values = np.asarray(image.convert("RGBA"), np.float32) / np.float32(255)
+    return values[..., :3], values[..., 3]
 
 
 def _coloured(
-    mesh: trimesh.Trimesh, colours: NDArray[Any], kind: str, is_linear: bool = False, factor: Array | float = 1.0
+    mesh: trimesh.Trimesh, colours: NDArray[Any], kind: str, without: Callable[[str], None]
 ) -> tuple[trimesh.Trimesh, Array]:
-    """The mesh and the albedo of its vertices; colours (V or F, 3 or 4) are whole numbers of full scale or 0..1."""
+    """The mesh and the albedo of its vertices; colours (V or F, 3 or 4) uint8."""
     if len(colours) != (len(mesh.vertices) if kind == "vertex" else len(mesh.faces)):
         raise InputError(f"the mesh has {len(colours)} colours of {kind}s; it needs one for each")
-    albedo = grey(_linear_rgb(colours, is_linear)[None] * factor)[0].clip(0, 1)
-    return (mesh, albedo) if kind == "vertex" else (_apart(mesh), np.repeat(albedo, 3))
-
-
-def _linear_rgb(colours: NDArray[Any], is_linear: bool) -> Array:
-    """(N, 3) of colours (N, 3 or 4)."""
-    values = colours.astype(np.float32)
-    if colours.dtype.kind in "iu":
-        values /= np.float32(np.iinfo(colours.dtype).max)
-    if not (values.min() >= 0 and values.max() <= 1):
-        raise InputError(f"colours run from {values.min():g} to {values.max():g}; they must lie in 0 to full scale")
+    values = colours.astype(np.float32) / np.float32(255)
     if values.shape[1] == 4 and values[:, 3].min() < 1:
-        _warn_of_transparency()
-    return values[:, :3] if is_linear else linear_from_srgb(values[:, :3])
+        without(TRANSPARENCY)
+    albedo = grey(linear_from_srgb(values[None, :, :3]))[0].clip(0, 1)
+    return (mesh, albedo) if kind == "vertex" else (_apart(mesh), np.repeat(albedo, 3))
 
 
 def _check_ply(mesh: trimesh.Trimesh, kind: str) -> None:
@@ -137,26 +131,10 @@ def _factor(material: Any) -> Array | None:
         stated = diffuse
     if stated is None:
         return None
-    values = np.asarray(stated)
-    rgb = np.broadcast_to(values[:3] if values.ndim else values, 3).astype(np.float32)
-    rgb = rgb / np.float32(255) if values.dtype.kind in "iu" else rgb
-    if not (rgb.min() >= 0 and rgb.max() <= 1):
-        raise InputError(f"a material's colour is {values}; a surface reflects 0 to 1 of the light")
-    return rgb
-
-
-def _or_one(factor: Array | None) -> Array | float:
-    return 1.0 if factor is None else factor
+    return colour_of(stated)
 
 
 def _picture(material: Any) -> Array | None:
     """(h, w, 3) sRGB in 0..1, where the material has one."""
     image = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
-    if image is None:
-        return None
-    check_size(image.width, image.height, "a texture of the mesh")
-    return np.asarray(np.asarray(image.convert("RGB"), np.float32) / np.float32(255))
-
-
-def _warn_of_transparency() -> None:
-    warnings.warn("the mesh is transparent in places; surfaces are rendered opaque", stacklevel=5)
+    return None if image is None else pixels_of(image)[0]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
@@ -14,12 +15,14 @@ import trimesh
 from PIL import Image
 
 from scenes.assembly import Albedo, Part, Points, assemble
-from scenes.materials import GLTF_COLOURS, gltf_colours_kept, own_albedo
+from scenes.gltf import KINDS, Piece, read_gltf
+from scenes.materials import own_albedo
 from scenes.pictures import SUFFIXES, check_size, read_picture
 from scenes.renderers.protocol import Surface
 from scenes.renderers.view import check_albedo, check_mesh
 from scenes.textures import Texture
 from scenes.transfer import grey, light_of
+from scenes.wrapping import unrolled
 from spikecam_env.errors import InputError
 
 SMALLEST, LARGEST = 1e-3, 1e6
@@ -30,40 +33,43 @@ precision, in which some files and OpenGL hold them, knows a place at 1e6 to 0.0
 def from_file(
     path: str | PathLike[str], texture: str | PathLike[str] | Texture | None = None, size: float | None = None
 ) -> Surface:
-    """A mesh file that trimesh reads (obj, stl, ply, glb, ...), with the texture given, or its own reflection.
+    """A mesh file (obj, stl, ply, glb, ...), with the texture given, or its own reflection.
 
-    Its own: colours of vertices and faces, factors and pictures of materials, as grey (`scenes.materials`); 0.7 where
-    it says nothing.  Several meshes in one file become one surface.
+    Its own: colours of vertices and faces, factors and pictures of materials, as grey; 0.7 where it says nothing.
+    Several meshes in one file become one surface.  One warning names what the file has and the surface does not show.
 
-    size   of its longest side, the middle at the origin; default: as it is in the file
-    Warns of transparency, and of a texture that is not there or is no picture.
-    Errors: InputError where there is no such file, no triangle in it, it is damaged, or out of range (`from_mesh`).
+    Args:
+        path: a glTF file, or of a format that trimesh reads.
+        texture: (h, w) linear grey in [0, 1], or a picture's path; default: the file's own.
+        size: of its longest side, the middle at the origin; default: as it is in the file.
 
-    >>> import trimesh
-    >>> written = trimesh.creation.box((1.0, 1.0, 2.0)).export("box.stl")
-    >>> from_file("box.stl", size=4.0).mesh.extents.round(6).tolist()
-    [2.0, 2.0, 4.0]
+    Returns:
+        The file's mesh with its albedo, and its emission where that is the same all over.
+
+    Raises:
+        InputError: there is no such file or no triangle in it, it is damaged, out of range (`from_mesh`), or needs a
+            glTF extension that is not read.
+
+    Example:
+        >>> import trimesh
+        >>> written = trimesh.creation.box((1.0, 1.0, 2.0)).export("box.stl")
+        >>> from_file("box.stl", size=4.0).mesh.extents.round(6).tolist()
+        [2.0, 2.0, 4.0]
     """
     source = Path(path)
     if not _is_file(source):
         raise InputError(f"no mesh file {path}; give the path of an obj, stl, ply or glb file")
-    kind = source.suffix[1:].lower()
-    beside = Beside(str(source))
+    beside, unread = Beside(str(source)), dict[str, None]()
     try:
-        data = source.read_bytes()
-        data = gltf_colours_kept(data, kind) if kind in ("glb", "gltf") else data
-        with np.errstate(all="ignore"):
-            scene: Any = trimesh.load(BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False)
-            meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh) and len(m.faces)]
-    except Exception as error:
-        raise InputError(f"{path} cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
-    for name, fault in beside.faults.items():
-        warnings.warn(f"{path} names {name}, which {fault}; its surface is without it", stacklevel=2)
-    try:
-        meshes = [_merged(mesh) for mesh in _sized(meshes, size)]
-        return _one_surface(meshes, texture)
+        pieces = _sized(_pieces(source, beside, unread, texture is None), size)
+        surface = _one_surface([_merged(piece) for piece in pieces], texture, unread)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+    lacks = [f"has {', '.join(unread)}"] if unread else []
+    lacks += [f"names {name}, which {fault}" for name, fault in beside.faults.items()]
+    if lacks:
+        warnings.warn(f"{path} {'; it '.join(lacks)}; its surface is without", stacklevel=2)
+    return surface
 
 
 def from_mesh(
@@ -71,14 +77,27 @@ def from_mesh(
 ) -> Surface:
     """A trimesh mesh; without texture coordinates of its own a texture is wrapped around its vertical axis.
 
-    Errors: InputError for a mesh without triangles or area, vertices that are not finite, faces of vertices that it
-    does not have, a longest side out of 0.001 to 1e6 where no size is given, and albedo out of 0 to 1.
+    Normals that were given to the mesh are kept.  A warning names what its material has and the surface does not show.
 
-    >>> import trimesh
-    >>> from_mesh(trimesh.creation.box((1.0, 1.0, 2.0)), size=4.0).mesh.extents.round(6).tolist()
-    [2.0, 2.0, 4.0]
+    Args:
+        mesh: with faces; it is copied.
+        texture: (h, w) linear grey in [0, 1], or a picture's path; default: the mesh's own.
+        size: of its longest side, the middle at the origin; default: as it is.
+
+    Raises:
+        InputError: the mesh has no triangles or no area, vertices that are not finite, faces of vertices that it does
+            not have, a longest side out of 0.001 to 1e6 where no size is given, or albedo out of 0 to 1.
+
+    Example:
+        >>> import trimesh
+        >>> from_mesh(trimesh.creation.box((1.0, 1.0, 2.0)), size=4.0).mesh.extents.round(6).tolist()
+        [2.0, 2.0, 4.0]
     """
-    return _one_surface(_sized([mesh], size), texture)
+    unread = dict[str, None]()
+    surface = _one_surface(_sized([Piece(mesh)], size), texture, unread)
+    if unread:
+        warnings.warn(f"the mesh has {', '.join(unread)}; its surface is without", stacklevel=2)
+    return surface
 
 
 def picture(path: str | PathLike[str]) -> Texture:
@@ -126,19 +145,61 @@ class Beside(trimesh.resolvers.FilePathResolver):
         return data
 
 
+def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) -> list[Piece]:
+    """The meshes of a file; their albedos where it is a glTF file, which has them in its own way.
+
+    Raises InputError where it cannot be read.
+    """
+    kind = source.suffix[1:].lower()
+    try:
+        data = source.read_bytes()
+        if kind in KINDS:
+            pieces, names = read_gltf(data, beside.get, own)
+            unread.update(dict.fromkeys(names))
+            return pieces
+        with np.errstate(all="ignore"):
+            scene: Any = trimesh.load(BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False)
+            return [Piece(mesh) for mesh in _placed(scene)]
+    except InputError:
+        raise
+    except Exception as error:  # the many ways in which a damaged mesh fails
+        raise InputError(f"it cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
+
+
+def _placed(scene: trimesh.Scene) -> Iterator[trimesh.Trimesh]:
+    """The meshes of a scene where they are; unlike those of `Scene.dump` they keep the normals that they were given."""
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        mesh: Any = scene.geometry[name]
+        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+            yield mesh.copy(include_cache=True).apply_transform(transform)
+
+
 def _one_surface(
-    meshes: Sequence[trimesh.Trimesh],
-    texture: str | PathLike[str] | Texture | None,
+    pieces: Sequence[Piece], texture: str | PathLike[str] | Texture | None, unread: dict[str, None]
 ) -> Surface:
-    """Meshes in one space as one rigid surface."""
+    """Meshes in one space as one rigid surface; adds to `unread` what it does not show."""
+    emissions = {piece.emission for piece in pieces}
+    if len(emissions) > 1:
+        unread["emission of some parts"] = None
+    emission = emissions.pop() if len(emissions) == 1 else 0.0
+    return replace(_reflecting(pieces, texture, unread), emission=emission)
+
+
+def _reflecting(
+    pieces: Sequence[Piece], texture: str | PathLike[str] | Texture | None, unread: dict[str, None]
+) -> Surface:
     if texture is not None:
-        return _textured(_together(meshes), _texture(texture))
-    owned = [own_albedo(mesh) for mesh in meshes]
+        return _textured(_together([piece.mesh for piece in pieces]), _texture(texture))
+    owned = [
+        own_albedo(piece.mesh, unread.setdefault) if piece.albedo is None else (piece.mesh, piece.albedo)
+        for piece in pieces
+    ]
     if len(owned) == 1:
         return _textured(*owned[0])
     albedos = [albedo for _, albedo in owned]
     if all(np.ndim(albedo) == 0 and albedo == albedos[0] for albedo in albedos):
-        return Surface(_together(meshes), albedos[0])
+        return Surface(_together([mesh for mesh, _ in owned]), albedos[0])
     return assemble(*(_as_part(_textured(mesh, albedo)) for mesh, albedo in owned))
 
 
@@ -156,16 +217,16 @@ def _textured(mesh: trimesh.Trimesh, albedo: Albedo) -> Surface:
     return Surface(mesh, albedo)
 
 
-def _sized(meshes: Sequence[trimesh.Trimesh], size: float | None) -> list[trimesh.Trimesh]:
+def _sized(pieces: Sequence[Piece], size: float | None) -> list[Piece]:
     """Copies, checked; their longest side as asked, their middle at the origin."""
-    if not any(len(getattr(mesh, "faces", ())) for mesh in meshes):
+    if not any(len(getattr(piece.mesh, "faces", ())) for piece in pieces):
         raise InputError("the mesh has no triangles; a cloud of points has no surface to render")
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"size is {size}; it must be positive and finite")
-    for mesh in meshes:
-        check_mesh(mesh)
-    meshes = [mesh.copy() for mesh in meshes]
-    bounds = np.stack([mesh.bounds for mesh in meshes])
+    for piece in pieces:
+        check_mesh(piece.mesh)
+    pieces = [replace(piece, mesh=piece.mesh.copy(include_cache=True)) for piece in pieces]
+    bounds = np.stack([piece.mesh.bounds for piece in pieces])
     bounds = np.stack([bounds[:, 0].min(0), bounds[:, 1].max(0)])
     longest = np.ptp(bounds, axis=0).max()
     if not 0 < longest < np.inf:
@@ -173,24 +234,42 @@ def _sized(meshes: Sequence[trimesh.Trimesh], size: float | None) -> list[trimes
     if size is None:
         if not SMALLEST <= longest <= LARGEST:
             raise InputError(f"the mesh is {longest:g} units long, not {SMALLEST:g} to {LARGEST:g}; give its size")
-        return meshes
-    for mesh in meshes:
-        mesh.apply_translation(-bounds.mean(0))
-        mesh.apply_scale(size / longest)
-    return meshes
+        return pieces
+    for piece in pieces:
+        piece.mesh.apply_translation(-bounds.mean(0))
+        piece.mesh.apply_scale(size / longest)
+    return pieces
 
 
-def _merged(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """With one vertex where several lie; those with colours of their own share the normal alone."""
-    if getattr(mesh.visual, "kind", None) != "vertex" and GLTF_COLOURS not in mesh.vertex_attributes:
+def _merged(piece: Piece) -> Piece:
+    """With one vertex where several lie, and so smooth normals; meshes keep normals of their own.
+
+    Vertices that have colours of their own share the normal alone.
+    """
+    mesh = piece.mesh
+    if piece.albedo is not None or _has_normals(mesh):
+        return piece
+    if getattr(mesh.visual, "kind", None) != "vertex":
         mesh.process()
-        return mesh
-    if "vertex_normals" in mesh._cache:
-        return mesh
+        return piece
     first, place = trimesh.grouping.unique_rows(mesh.vertices)
     whole = trimesh.Trimesh(mesh.vertices[first], place[mesh.faces], process=False)
     mesh.vertex_normals = whole.vertex_normals[place]  # type: ignore[method-assign]  # a property, which caches
-    return mesh
+    return piece
+
+
+def _has_normals(mesh: trimesh.Trimesh) -> bool:
+    """Whether it was given normals that have a direction; others are dropped."""
+    cache: Any = mesh._cache.cache
+    given = cache.get("vertex_normals")
+    if given is None:
+        return False
+    lengths = np.linalg.norm(given, axis=1)
+    if not (np.isfinite(lengths).all() and lengths.all()):
+        del cache["vertex_normals"]
+        return False
+    mesh.vertex_normals = given / lengths[:, None]  # type: ignore[method-assign]
+    return True
 
 
 def _as_part(surface: Surface) -> Part:
@@ -199,14 +278,7 @@ def _as_part(surface: Surface) -> Part:
     albedo = surface.albedo
     uv = np.zeros((len(mesh.vertices), 2))
     if np.ndim(albedo) == 2:
-        uv = np.array(mesh.visual.uv, np.float64)[:, :2]
-        low = np.floor(uv.min(0) + 1e-6)
-        times = np.maximum(1, np.ceil(uv.max(0) - 1e-6) - low).astype(int)
-        if times.max() > 1:
-            tiled = np.shape(albedo) * times[::-1]
-            check_size(int(tiled[1]), int(tiled[0]), f"a texture that repeats {times[0]} x {times[1]} times")
-            albedo = np.tile(np.asarray(albedo), times[::-1])
-        uv = (uv - low) / times
+        albedo, uv = unrolled(np.asarray(albedo), np.array(mesh.visual.uv, np.float64)[:, :2])
     return Part(np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals), uv, np.asarray(mesh.faces), albedo)
 
 

@@ -97,16 +97,17 @@ def test_a_factor_multiplies_a_texture(tmp_path: Path) -> None:
 
 def test_a_texture_is_multiplied_by_one_colour_of_all_vertices_and_hides_several(tmp_path: Path) -> None:
     mesh = box()
-    image = Image.fromarray(np.full((4, 4, 3), 255, np.uint8))
+    image = Image.fromarray(np.uint8([[[255] * 3, [0] * 3]] * 2))
     mesh.visual = TextureVisuals(RNG.random((8, 2)), PBRMaterial(baseColorTexture=image))
-    for colours, albedo in ((np.full((8, 4), 102, np.uint8), 0.4), (RNG.integers(0, 256, (8, 4)), 1.0)):
+    for colours, white in ((np.full((8, 4), 102, np.uint8), 0.4), (RNG.integers(0, 256, (8, 4)), 1.0)):
         colours[:, 3] = 255
         mesh.visual.vertex_attributes["color"] = colours.astype(np.uint8)
         mesh.export(tmp_path / "m.glb")
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
-            np.testing.assert_allclose(from_file(tmp_path / "m.glb").albedo, albedo, rtol=1e-3)
-        assert len(said) == (albedo == 1.0)
+            np.testing.assert_allclose(from_file(tmp_path / "m.glb").albedo, [[white, 0.0]] * 2, rtol=1e-3)
+        assert len(said) == (white == 1.0)
+        assert all("m.glb has colours of vertices beside a texture" in str(w.message) for w in said)
 
 
 def glb(colours: np.ndarray, factor: list[float] | None = None) -> bytes:
