@@ -153,11 +153,11 @@ def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) ->
     kind = source.suffix[1:].lower()
     try:
         data = source.read_bytes()
-        if kind in KINDS:
-            pieces, names = read_gltf(data, beside.get, own)
-            unread.update(dict.fromkeys(names))
-            return pieces
         with np.errstate(all="ignore"):
+            if kind in KINDS:
+                pieces, names = read_gltf(data, beside.get, own)
+                unread.update(dict.fromkeys(names))
+                return pieces
             scene: Any = trimesh.load(BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False)
             return [Piece(mesh) for mesh in _placed(scene)]
     except InputError:
