@@ -16,6 +16,8 @@ from PIL import Image
 
 from scenes.pictures import check_size
 from scenes.transfer import Array, grey, linear_from_srgb
+from scenes.wavefront import PLACE, unread_of
+from scenes.wrapping import CLAMP, unrolled
 from spikecam_env.errors import InputError
 
 UNSTATED_ALBEDO = 0.7
@@ -45,8 +47,13 @@ def own_albedo(mesh: trimesh.Trimesh, without: Callable[[str], None]) -> tuple[t
     factor, picture = (_factor(material), _picture(material)) if material is not None else (None, None)
     if str(getattr(material, "alphaMode", None) or "OPAQUE") != "OPAQUE":
         without(TRANSPARENCY)
+    for name in unread_of(getattr(material, "kwargs", {})):
+        without(name)
     if picture is not None and getattr(visual, "uv", None) is not None:
-        return mesh, grey(linear_from_srgb(picture) * (1.0 if factor is None else factor))
+        light = grey(linear_from_srgb(picture) * (1.0 if factor is None else factor))
+        return mesh, _laid_out(mesh, light, getattr(material, "kwargs", {}).get(PLACE))
+    if picture is not None:
+        without("a texture without coordinates")
     if kind in ("vertex", "face"):
         _check_ply(mesh, kind)
         colours = visual.vertex_colors if kind == "vertex" else visual.face_colors
@@ -132,6 +139,19 @@ def _factor(material: Any) -> Array | None:
     if stated is None:
         return None
     return colour_of(stated)
+
+
+def _laid_out(mesh: trimesh.Trimesh, light: Array, place: list[str] | None) -> Array:
+    """A picture (h, w), and the coordinates of the mesh changed, as MTL's options have it."""
+    if place is None:
+        return light
+    visual: Any = mesh.visual
+    across, up, wide, high, clamped = (float(value) for value in place[:5])
+    uv = np.array(visual.uv, np.float64)[:, :2] * (wide, high) + (across, up)
+    if clamped:
+        light, uv = unrolled(light, uv, CLAMP, CLAMP)
+    visual.uv = uv
+    return light
 
 
 def _picture(material: Any) -> Array | None:

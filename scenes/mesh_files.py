@@ -17,14 +17,18 @@ from PIL import Image
 from scenes.assembly import Albedo, Part, Points, assemble
 from scenes.gltf import KINDS, Piece, read_gltf
 from scenes.materials import own_albedo
+from scenes.mesh_properties import unread_properties
 from scenes.pictures import SUFFIXES, check_size, read_picture
 from scenes.renderers.protocol import Surface
 from scenes.renderers.view import check_albedo, check_mesh
 from scenes.textures import Texture
 from scenes.transfer import grey, light_of
+from scenes.wavefront import materials_used, plain_mtl, plain_obj
 from scenes.wrapping import unrolled
 from spikecam_env.errors import InputError
 
+ARCHIVES = ("zip", "gz", "bz2", "tar")
+"""Endings of files in which trimesh would look for meshes."""
 SMALLEST, LARGEST = 1e-3, 1e6
 """Longest side of a mesh [units of the world].  trimesh takes corners less than 1e-8 apart for one, and single
 precision, in which some files and OpenGL hold them, knows a place at 1e6 to 0.06."""
@@ -65,10 +69,10 @@ def from_file(
         surface = _one_surface([_merged(piece) for piece in pieces], texture, unread)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-    lacks = [f"has {', '.join(unread)}"] if unread else []
-    lacks += [f"names {name}, which {fault}" for name, fault in beside.faults.items()]
+    lacks = [_unshown(unread)] if unread else []
+    lacks += [f"names {name}, which {fault}; its surface is without it" for name, fault in beside.faults.items()]
     if lacks:
-        warnings.warn(f"{path} {'; it '.join(lacks)}; its surface is without", stacklevel=2)
+        warnings.warn(f"{path} {'; it '.join(lacks)}", stacklevel=2)
     return surface
 
 
@@ -96,7 +100,7 @@ def from_mesh(
     unread = dict[str, None]()
     surface = _one_surface(_sized([Piece(mesh)], size), texture, unread)
     if unread:
-        warnings.warn(f"the mesh has {', '.join(unread)}; its surface is without", stacklevel=2)
+        warnings.warn(f"the mesh {_unshown(unread)}", stacklevel=2)
     return surface
 
 
@@ -119,11 +123,16 @@ def picture(path: str | PathLike[str]) -> Texture:
 
 
 class Beside(trimesh.resolvers.FilePathResolver):
-    """Files that a mesh file names, in its folder; `faults` says of each what is wrong with it."""
+    """Files that a mesh file names, in its folder.
+
+    faults     says of each what is wrong with it
+    materials  names of those that its material libraries (MTL) have
+    """
 
     def __init__(self, source: str) -> None:
         super().__init__(source)
         self.faults: dict[str, str] = {}
+        self.materials: set[str] = set()
 
     def get(self, name: str) -> Any:
         """The bytes of a file; raises what trimesh expects where there are none."""
@@ -142,6 +151,9 @@ class Beside(trimesh.resolvers.FilePathResolver):
             except Exception:
                 self.faults[name] = "is no picture, or damaged"
                 raise
+        if Path(name).suffix.lower() == ".mtl":
+            data, names = plain_mtl(data)
+            self.materials |= names
         return data
 
 
@@ -158,12 +170,27 @@ def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) ->
                 pieces, names = read_gltf(data, beside.get, own)
                 unread.update(dict.fromkeys(names))
                 return pieces
-            scene: Any = trimesh.load(BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False)
-            return [Piece(mesh) for mesh in _placed(scene)]
+            return [Piece(mesh) for mesh in _by_trimesh(kind, data, beside, unread)]
     except InputError:
         raise
     except Exception as error:  # the many ways in which a damaged mesh fails
         raise InputError(f"it cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
+
+
+def _by_trimesh(kind: str, data: bytes, beside: Beside, unread: dict[str, None]) -> list[trimesh.Trimesh]:
+    """The meshes of a file that is no glTF; adds to `unread` what they do not show."""
+    if kind in ARCHIVES:
+        raise InputError("it is an archive; unpack it, and give the mesh file in it")
+    if kind == "obj":
+        data, names = plain_obj(data)
+        unread.update(dict.fromkeys(names))
+    scene: Any = trimesh.load(BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False)
+    meshes = list(_placed(scene))
+    unread.update(dict.fromkeys(unread_properties(kind, data, meshes)))
+    if kind == "obj" and beside.materials:
+        absent = sorted(materials_used(data) - beside.materials)
+        unread.update({f"the material {name}, which its library does not have": None for name in absent})
+    return meshes
 
 
 def _placed(scene: trimesh.Scene) -> Iterator[trimesh.Trimesh]:
@@ -280,6 +307,10 @@ def _as_part(surface: Surface) -> Part:
     if np.ndim(albedo) == 2:
         albedo, uv = unrolled(np.asarray(albedo), np.array(mesh.visual.uv, np.float64)[:, :2])
     return Part(np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals), uv, np.asarray(mesh.faces), albedo)
+
+
+def _unshown(unread: dict[str, None]) -> str:
+    return f"has {', '.join(unread)}, which its surface does not show"
 
 
 def _is_file(path: Path) -> bool:

@@ -64,7 +64,7 @@ class Looks:
         Raises:
             InputError: a colour is out of 0 to full scale, or coordinates are not finite.
         """
-        material = self._file.item("materials", primitive["material"]) if "material" in primitive else {}
+        material = self._material(primitive)
         base, info = _base(material)
         uv = self._coordinates(whole, info)
         number = None if info is None or uv is None else self._source(info)
@@ -89,6 +89,13 @@ class Looks:
         elif colours is not None:
             shade = shade * np.float32(colours[0, :3])
         return Look(*unrolled(self._texture(number, shade), uv, *self._wraps(info)), emission)
+
+    def is_two_sided(self, primitive: Tree) -> bool:
+        """Whether the backs of a primitive reflect like its fronts."""
+        return bool(self._material(primitive).get("doubleSided", False))
+
+    def _material(self, primitive: Tree) -> Tree:
+        return self._file.item("materials", primitive["material"]) if "material" in primitive else {}
 
     def _coordinates(self, whole: Shape, info: Tree | None) -> Table | None:
         """(V, 2) of the picture, v upwards; without a picture those of the first set."""
@@ -120,18 +127,30 @@ class Looks:
     def _opened(self, number: int) -> tuple[Array, Array] | None:
         """Colours (h, w, 3) and alpha (h, w) of an image; None, with a note, where it is not there or damaged."""
         if number not in self._pixels:
-            image = self._file.item("images", number)
-            try:
-                data = self._file.view(image["bufferView"]) if "bufferView" in image else self._file.at(image["uri"])
-                with Image.open(BytesIO(data)) as picture:
-                    self._pixels[number] = pixels_of(picture)
-            except InputError:
-                raise
-            except Exception:  # the many ways in which a damaged picture fails
-                self._pixels[number] = None
-                if "uri" not in image or image["uri"].startswith("data:"):
+            self._pixels[number] = None
+            if (data := self._bytes(number)) is not None:
+                try:
+                    with Image.open(BytesIO(data)) as picture:
+                        self._pixels[number] = pixels_of(picture)
+                except InputError:
+                    raise
+                except Exception:  # the many ways in which a damaged picture fails
                     self._file.without(f"image {number} (damaged, or in no known format)")
         return self._pixels[number]
+
+    def _bytes(self, number: int) -> bytes | None:
+        """Of an image; None where it cannot be had, which `beside` notes of other files."""
+        image = self._file.item("images", number)
+        if "bufferView" in image:
+            return self._file.view(image["bufferView"])
+        try:
+            return self._file.at(image["uri"])
+        except (OSError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            if image["uri"].startswith("data:"):
+                self._file.without(f"image {number} (damaged, or in no known format)")
+            return None
 
     def _decoded(self, number: int) -> tuple[Array, Array]:
         pixels = self._opened(number)

@@ -68,8 +68,11 @@ def _parts(file: File, node: Tree, looks: Looks) -> Iterator[tuple[Shape, Look]]
         if whole is None or not len(whole.faces):
             continue
         look = looks.of(whole, primitive)
-        if look is not None:
-            yield whole, look
+        if look is None:
+            continue
+        if looks.is_two_sided(primitive) and not trimesh.Trimesh(whole.tables["POSITION"], whole.faces).is_watertight:
+            file.without("two-sided parts (shaded by their front)")
+        yield whole, look
 
 
 def _piece(file: File, at: Shape, look: Look) -> Piece:

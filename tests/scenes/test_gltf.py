@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from gltf_files import COMPONENTS, CORNERS, GREYS, TWO_TRIANGLES, UPRIGHT, Gltf, encoded, pictured, seen
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -437,7 +438,8 @@ def test_alpha_hides_a_part_that_is_all_transparent_and_is_named_where_it_hides_
         ),
         ({"extensions": {"KHR_materials_variants": {"variants": [{"name": "red"}]}}}, "KHR_materials_variants"),
         ({"extensions": {"VENDOR_future": {}}}, "VENDOR_future"),
-        ({"samplers": [{"magFilter": 9728}]}, "sharp texels"),
+        ({"materials": [{"doubleSided": True}]}, "two-sided parts (shaded by their front)"),
+        ({"samplers": [{"magFilter": 9728}]}, "sharp texels (NEAREST)"),
     ],
 )
 def test_what_a_file_has_and_no_surface_shows_is_named(change: dict, name: str, tmp_path: Path) -> None:
@@ -446,7 +448,14 @@ def test_what_a_file_has_and_no_surface_shows_is_named(change: dict, name: str, 
         file.tree[key] = value
     if "materials" in change:
         file.tree["extensionsRequired"] = [key for m in change["materials"] for key in m.get("extensions", {})]
-    assert f"m.glb has {name}" in named(file, tmp_path) and "its surface is without" in named(file, tmp_path)
+    assert f"m.glb has {name}, which its surface does not show" in named(file, tmp_path)
+
+
+def test_the_backs_of_a_closed_mesh_are_not_seen_and_not_named(tmp_path: Path) -> None:
+    file = Gltf()
+    cube = trimesh.creation.box()
+    file.part(np.float32(cube.vertices), cube.faces.ravel(), material=file.material(doubleSided=True))
+    read(file, tmp_path)
 
 
 def test_all_of_it_is_named_in_one_line(tmp_path: Path) -> None:
@@ -455,7 +464,11 @@ def test_all_of_it_is_named_in_one_line(tmp_path: Path) -> None:
     file.tree["images"] = [{"uri": "none.png"}]
     line = named(file, tmp_path)
     print(line)
-    assert "m.glb has animations, cameras, VENDOR_a, VENDOR_b; it names none.png, which is not there" in line
+    has, names = (
+        "m.glb has animations, cameras, VENDOR_a, VENDOR_b, which its surface does not show",
+        "it names none.png",
+    )
+    assert f"{has}; {names}, which is not there" in line
 
 
 @pytest.mark.parametrize(
@@ -475,6 +488,13 @@ def test_what_is_there_beside_a_compressed_copy_is_read(tmp_path: Path) -> None:
     view["extensions"] = {"EXT_meshopt_compression": {"buffer": 0}}
     file.tree["textures"][0]["extensions"] = {"KHR_texture_basisu": {"source": 0}}
     np.testing.assert_allclose(seen(read(file, tmp_path)), LIGHT, rtol=1e-5)
+
+
+def test_a_picture_in_an_unknown_format_beside_the_mesh_is_named(tmp_path: Path) -> None:
+    file = pictured()
+    file.tree["images"] = [{"uri": "wood.ktx2"}]
+    (tmp_path / "wood.ktx2").write_bytes(b"hello")
+    assert "has image 0 (damaged, or in no known format)" in named(file, tmp_path)
 
 
 @pytest.mark.parametrize(
