@@ -14,9 +14,9 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from scenes.assembly import Albedo, Part, Points, assemble
+from scenes.assembly import Albedo, Part, Points, assemble, joined
 from scenes.gltf import KINDS, Piece, read_gltf
-from scenes.materials import own_albedo
+from scenes.materials import UNSTATED_ALBEDO, own_albedo
 from scenes.mesh_properties import unread_properties
 from scenes.pictures import SUFFIXES, check_size, read_picture
 from scenes.renderers.protocol import Surface
@@ -231,15 +231,29 @@ def _reflecting(
 
 
 def _together(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
-    whole: Any = meshes[0] if len(meshes) == 1 else trimesh.util.concatenate(meshes)
-    return whole  # type: ignore[no-any-return]
+    """As one; with texture coordinates where all of them have some, unchanged (trimesh would pack them)."""
+    if len(meshes) == 1:
+        return meshes[0]
+    parts = [_as_part(Surface(mesh, UNSTATED_ALBEDO)) for mesh in meshes]
+    given = [uv for mesh in meshes if (uv := _coordinates(mesh)) is not None]
+    have_all = len(given) == len(meshes)
+    whole = joined(parts, given if have_all else [part.uv for part in parts], UNSTATED_ALBEDO)
+    mesh = trimesh.Trimesh(whole.vertices, whole.faces, vertex_normals=whole.normals, process=False)
+    if have_all:
+        mesh.visual = trimesh.visual.TextureVisuals(uv=whole.uv)
+    return mesh
+
+
+def _coordinates(mesh: trimesh.Trimesh) -> Points | None:
+    """(V, 2) of a mesh that has texture coordinates."""
+    uv = getattr(mesh.visual, "uv", None)
+    return None if uv is None or len(uv) != len(mesh.vertices) else np.array(uv, np.float64)[:, :2]
 
 
 def _textured(mesh: trimesh.Trimesh, albedo: Albedo) -> Surface:
     """With texture coordinates around its vertical axis, where it needs some and has none."""
     check_albedo(albedo, "the mesh's own albedo")
-    uv = getattr(mesh.visual, "uv", None)
-    if np.ndim(albedo) == 2 and (uv is None or len(uv) != len(mesh.vertices)):
+    if np.ndim(albedo) == 2 and _coordinates(mesh) is None:
         mesh.visual = trimesh.visual.TextureVisuals(uv=_around(np.asarray(mesh.vertices)))
     return Surface(mesh, albedo)
 

@@ -112,6 +112,20 @@ def test_own_textures_lie_at_the_coordinates_of_the_file(tmp_path: Path) -> None
     np.testing.assert_allclose(seen(surface, 2, 4), LIGHT[:2], rtol=1e-5)
 
 
+def test_own_textures_lie_on_every_part_at_its_coordinates(tmp_path: Path) -> None:
+    """Two squares, each with the whole picture; where one has no coordinates it goes around both."""
+    file = Gltf()
+    for place in (0, 3):
+        file.part(CORNERS + np.float32([place, 0, 0]), attributes={"TEXCOORD_0": file.table(UPRIGHT)})
+    surface = read(file, tmp_path, texture=LIGHT)
+    assert len(surface.mesh.vertices) == 2 * 6
+    np.testing.assert_allclose(seen(surface), LIGHT, rtol=1e-5)
+    np.testing.assert_allclose(surface.mesh.visual.uv[:6], surface.mesh.visual.uv[6:])
+    del file.tree["meshes"][0]["primitives"][1]["attributes"]["TEXCOORD_0"]
+    around = read(file, tmp_path, texture=LIGHT).mesh
+    np.testing.assert_allclose(around.visual.uv[:, 1], around.vertices[:, 1], atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("pixels", "form"),
     [
