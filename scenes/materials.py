@@ -16,14 +16,13 @@ from PIL import Image
 
 from scenes.pictures import check_size
 from scenes.transfer import Array, grey, linear_from_srgb
+from scenes.unshown import NO_COORDINATES, TRANSPARENCY
 from scenes.wavefront import PLACE, unread_of
 from scenes.wrapping import CLAMP, unrolled
 from spikecam_env.errors import InputError
 
 UNSTATED_ALBEDO = 0.7
 """Of a mesh that says nothing: light grey paint."""
-TRANSPARENCY = "transparency (drawn opaque)"
-"""Name of what a surface that lets light through lacks here."""
 UNSTATED_DIFFUSE = (102, 102, 102, 255)
 """That trimesh gives to a material without one."""
 
@@ -53,7 +52,7 @@ def own_albedo(mesh: trimesh.Trimesh, without: Callable[[str], None]) -> tuple[t
         light = grey(linear_from_srgb(picture) * (1.0 if factor is None else factor))
         return mesh, _laid_out(mesh, light, getattr(material, "kwargs", {}).get(PLACE))
     if picture is not None:
-        without("a texture without coordinates")
+        without(NO_COORDINATES)
     if kind in ("vertex", "face"):
         _check_ply(mesh, kind)
         colours = visual.vertex_colors if kind == "vertex" else visual.face_colors

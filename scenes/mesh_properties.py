@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import trimesh
 
 PLY_READ = {
@@ -29,7 +30,7 @@ def unread_properties(kind: str, data: bytes, meshes: list[trimesh.Trimesh]) -> 
         return [
             f"the property {name}" for name in dict.fromkeys(names) if name not in PLY_READ and OF_LOOKS.search(name)
         ]
-    if kind == "stl" and any("stl" in mesh.face_attributes and mesh.face_attributes["stl"].any() for mesh in meshes):
+    if kind == "stl" and any(np.any(mesh.face_attributes.get("stl", 0)) for mesh in meshes):
         return ["colours of faces (attribute bytes)"]
     return _of_off(data.decode("ascii", "replace").split("\n")) if kind == "off" else []
 

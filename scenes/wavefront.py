@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes.unshown import EMISSION, GLOSS, LINES, METAL, NORMAL_MAPS, TRANSPARENCY
 from spikecam_env.errors import InputError
 
 PLACE = "map_kd_place"
@@ -25,11 +26,10 @@ NUMBERS = ("-o", "-s", "-t", "-mm")
 """Options whose values are numbers, of which the last may be left out."""
 HARMLESS = ("-blendu", "-blendv", "-boost", "-cc", "-texres")
 """Options that do not change the light of a picture that is averaged over pixels."""
-UNREAD_STATEMENTS = {
-    r"^[lp] ": "points and lines",
-    r"^(curv2?|surf) ": "curves and surfaces",
-    r"^mtllib [^\n]*\n(?=.*^mtllib )": "further material libraries",
-}
+UNREAD_STATEMENTS = {"l": LINES, "p": LINES} | dict.fromkeys(("curv", "curv2", "surf"), "curves and surfaces")
+"""Names of what OBJ's statements give, and no surface shows."""
+COUNTS_BACK = re.compile(r"\n *f [ \d/]*-")
+IS_COLOURED = re.compile(r"\n *v(?: +[^ \n]+){6}")
 
 
 def plain_obj(data: bytes) -> tuple[bytes, list[str]]:
@@ -39,9 +39,11 @@ def plain_obj(data: bytes) -> tuple[bytes, list[str]]:
         InputError: colours of vertices are out of 0 to 1, or an index counts back beyond the first line.
     """
     text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", " ").replace("\t", " ")
-    unread = [name for pattern, name in UNREAD_STATEMENTS.items() if re.search(pattern, text, re.M | re.S)]
-    unread += _of_vertices(text)
-    if re.search(r"^ *f .*-", text, re.M):
+    text = f"\n{text}"
+    unread = [name for statement, name in UNREAD_STATEMENTS.items() if f"\n{statement} " in text]
+    unread += ["further material libraries"] if text.count("\nmtllib ") > 1 else []
+    unread += _of_vertices(text) if IS_COLOURED.search(text) else []
+    if COUNTS_BACK.search(text):
         text = "\n".join(_counted(text.split("\n")))
     return text.encode(), unread
 
@@ -73,29 +75,26 @@ def unread_of(material: dict[str, Any]) -> Iterator[str]:
         return max((float(v) for v in np.atleast_1d(values) if _is_number(v)), default=0.0)
 
     if most("ke") > 0 or "map_ke" in material:
-        yield "emission"
+        yield EMISSION
     if ("d" in material and most("d") < 1) or most("tr") > 0 or "map_d" in material:
-        yield "transparency (drawn opaque)"
+        yield TRANSPARENCY
     if most("pm") > 0 or "map_pm" in material:
-        yield "metal"
+        yield METAL
     if most("ks") > 0 or "map_ks" in material:
-        yield "gloss"
+        yield GLOSS
     if {"bump", "map_bump", "norm", "map_kn", "disp", "map_disp"} & set(material):
-        yield "normal maps"
+        yield NORMAL_MAPS
     yield from (f"the option {option} of a texture" for option in material.get(PLACE, [])[5:])
 
 
 def _of_vertices(text: str) -> list[str]:
-    """What is left out of the colours of vertices: `v x y z red green blue`."""
+    """Names of what is left out where vertices have colours: `v x y z red green blue`."""
     rows = [line.split() for line in re.findall(r"^ *v (.*)$", text, re.M)]
     coloured = [row[3:6] for row in rows if len(row) >= 6]
-    if coloured:
-        values = np.array(coloured, np.float64)
-        if not (values.min() >= 0 and values.max() <= 1):
-            raise InputError(
-                f"colours of vertices run from {values.min():g} to {values.max():g}; they must lie in 0 to 1"
-            )
-    return ["colours of some vertices"] if 0 < len(coloured) < len(rows) else []
+    values = np.array(coloured, np.float64)
+    if not (values.min() >= 0 and values.max() <= 1):
+        raise InputError(f"colours of vertices run from {values.min():g} to {values.max():g}; they must lie in 0 to 1")
+    return ["colours of some vertices"] if len(coloured) < len(rows) else []
 
 
 def _counted(lines: list[str]) -> Iterator[str]:

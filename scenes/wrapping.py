@@ -45,7 +45,7 @@ def unrolled(picture: Texture, uv: Points, along_u: str = REPEAT, along_v: str =
     )
     high = np.maximum(high, low + 1)
     rows, columns = picture.shape
-    size = [int(side * times) for side, times in zip((columns, rows), high - low, strict=True)]
+    size = int(columns * (high[0] - low[0])), int(rows * (high[1] - low[1]))
     check_size(*size, f"a texture that is laid out over {high[0] - low[0]:g} x {high[1] - low[1]:g} times its size")
     across = _texels(columns, int(low[0] * columns), size[0], along_u)
     up = _texels(rows, int(low[1] * rows), size[1], along_v)

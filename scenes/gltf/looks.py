@@ -21,6 +21,7 @@ from scenes.gltf.nodes import extension
 from scenes.gltf.shapes import Shape, Table
 from scenes.materials import UNSTATED_ALBEDO, colour_of, pixels_of
 from scenes.transfer import Array, grey, linear_from_srgb
+from scenes.unshown import ALPHA_MASK, NO_COORDINATES, TRANSPARENCY
 from scenes.wrapping import CLAMP, KEEP, MIRROR, unrolled
 from spikecam_env.errors import InputError
 
@@ -69,8 +70,8 @@ class Looks:
         uv = self._coordinates(whole, info)
         number = None if info is None or uv is None else self._source(info)
         colours = _checked(whole.tables.get("COLOR_0"))
-        alphas = [np.ones(1) if base is None else np.asarray(base[3:4], np.float64)]
-        alphas += [] if number is None else [self._decoded(number)[1]]
+        alphas = [np.array([1.0] if base is None else base[3:4] or [1.0])]
+        alphas += [] if number is None else [self._decoded(number)[1].astype(np.float64)]
         alphas += [] if colours is None else [colours[:, 3]]
         if self._hidden(material, alphas):
             return None
@@ -80,15 +81,25 @@ class Looks:
         factor = None if base is None else colour_of(base[:3])
         if info is None or uv is None or number is None:
             return Look(_plain(factor, colours), uv, emission)
+        texture, colours = self._shaded(number, factor, colours)
+        if colours is not None:
+            return Look(_plain(texture, colours), uv, emission)
+        return Look(*unrolled(texture, uv, *self._wraps(info)), emission)
+
+    def _shaded(self, number: int, factor: Array | None, colours: Table | None) -> tuple[Array, Table | None]:
+        """A picture times all colours, (h, w).
+
+        Where it has one colour and the vertices several: that colour (3,), and those of the vertices.
+        """
         shade = np.ones(3, np.float32) if factor is None else factor
         if colours is not None and np.ptp(colours[:, :3], axis=0).any():
             rgb = self._decoded(number)[0]
             if not np.ptp(rgb, axis=(0, 1)).any():
-                return Look(_plain(shade * linear_from_srgb(rgb[0, 0]), colours), uv, emission)
+                return shade * linear_from_srgb(rgb[0, 0]), colours
             self._file.without("colours of vertices beside a texture")
         elif colours is not None:
             shade = shade * np.float32(colours[0, :3])
-        return Look(*unrolled(self._texture(number, shade), uv, *self._wraps(info)), emission)
+        return self._texture(number, shade), None
 
     def is_two_sided(self, primitive: Tree) -> bool:
         """Whether the backs of a primitive reflect like its fronts."""
@@ -104,7 +115,7 @@ class Looks:
         uv = whole.tables.get(f"TEXCOORD_{number}")
         if uv is None:
             if info is not None:
-                self._file.without("a texture without coordinates")
+                self._file.without(NO_COORDINATES)
             return None
         turn = transform.get("rotation", 0.0)
         rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
@@ -178,12 +189,14 @@ class Looks:
         if mode == "OPAQUE":
             return False
         least, most = (float(np.prod([side(alpha) for alpha in alphas])) for side in (np.min, np.max))
-        limit = material.get("alphaCutoff", 0.5) if mode == "MASK" else 1.0
-        if most < limit if mode == "MASK" else most <= 0:
-            return True
-        if least < limit:
-            self._file.without("an alpha mask (drawn opaque)" if mode == "MASK" else "transparency (drawn opaque)")
-        return False
+        if mode == "MASK":
+            cutoff = material.get("alphaCutoff", 0.5)
+            hidden, name, some = most < cutoff, ALPHA_MASK, least < cutoff
+        else:
+            hidden, name, some = most <= 0, TRANSPARENCY, least < 1
+        if some and not hidden:
+            self._file.without(name)
+        return bool(hidden)
 
     def _emission(self, material: Tree) -> float:
         """Of a material that emits one colour; notes where a picture says how much."""
@@ -193,7 +206,7 @@ class Looks:
         if "emissiveTexture" in material:
             self._file.without("an emissive texture")
             return 0.0
-        strength = extension(material, STRENGTH).get("emissiveStrength", 1.0)
+        strength = float(extension(material, STRENGTH).get("emissiveStrength", 1.0))
         light = float(grey(factor[None, None])[0, 0]) * strength
         if not 0 <= light < np.inf:
             raise InputError(f"a material emits {light:g}; it must be 0 or more, and finite")
@@ -226,4 +239,4 @@ def _plain(factor: Array | None, colours: Table | None) -> Albedo:
     shade = np.ones(3, np.float32) if factor is None else factor
     if colours is None:
         return float(grey(shade[None, None])[0, 0])
-    return grey((np.float32(colours[:, :3]) * shade)[None])[0].clip(0, 1)
+    return np.asarray(grey((np.float32(colours[:, :3]) * shade)[None])[0].clip(0, 1))

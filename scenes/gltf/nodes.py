@@ -73,9 +73,10 @@ def _roots(file: File) -> list[Any]:
 
 def _own(node: Tree) -> Matrix:
     """(4, 4) of a node to its parent."""
-    if "matrix" in node:
-        return np.array(node["matrix"], np.float64).reshape(4, 4).T
     matrix = np.eye(4)
+    if "matrix" in node:
+        matrix[:] = np.array(node["matrix"], np.float64).reshape(4, 4).T
+        return matrix
     x, y, z, w = node.get("rotation", (0, 0, 0, 1))
     turn = quaternion_matrix((w, x, y, z))
     matrix[:3, :3] = turn[:3, :3] * np.array(node.get("scale", (1, 1, 1)), np.float64)

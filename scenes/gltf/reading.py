@@ -64,7 +64,7 @@ def _parts(file: File, node: Tree, looks: Looks) -> Iterator[tuple[Shape, Look]]
     """The shapes of a node's mesh that can be seen, in the coordinates of the mesh."""
     mesh = file.item("meshes", node["mesh"])
     for primitive in mesh["primitives"]:
-        whole = shape(file, primitive, node.get("weights", mesh.get("weights", [])))
+        whole = shape(file, primitive, node.get("weights") or mesh.get("weights") or [])
         if whole is None or not len(whole.faces):
             continue
         look = looks.of(whole, primitive)

@@ -20,6 +20,7 @@ from scenes.assembly import unit_vectors
 from scenes.gltf.accessors import numbers, wholes
 from scenes.gltf.container import File, Tree
 from scenes.gltf.nodes import Matrix, instances
+from scenes.unshown import LINES
 from spikecam_env.errors import InputError
 
 Table = NDArray[np.float64]
@@ -54,7 +55,7 @@ def shape(file: File, primitive: Tree, weights: list[float]) -> Shape | None:
     """
     mode, names = primitive.get("mode", TRIANGLES), primitive["attributes"]
     if mode not in (TRIANGLES, STRIP, FAN):
-        file.without("points and lines")
+        file.without(LINES)
         return None
     if "POSITION" not in names:
         file.without("parts without positions")
@@ -136,7 +137,7 @@ def _of_joints(file: File, whole: Shape, skin: Tree, worlds: dict[int, Matrix]) 
     if len(joints) and joints.max() >= len(at):
         raise InputError(f"a vertex hangs on joint {joints.max()}, its skin has {len(at)}; export the file again")
     shares = weights / np.maximum(weights.sum(1, keepdims=True), np.finfo(np.float64).tiny)
-    return np.einsum("vj,vjab->vab", shares, at[joints])
+    return np.asarray(np.einsum("vj,vjab->vab", shares, at[joints]))
 
 
 def _moved(whole: Shape, matrix: Matrix) -> Shape:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from scenes.gltf.container import File, Tree
+from scenes.unshown import GLOSS, METAL, NORMAL_MAPS
 from spikecam_env.errors import InputError
 
 READ = (
@@ -46,11 +47,11 @@ def _of_material(material: Tree) -> Iterator[str]:
     """Names of properties that matter to light, where the material states them."""
     rough = material.get("pbrMetallicRoughness", {})
     if rough.get("metallicFactor", 0) > 0 or "metallicRoughnessTexture" in rough:
-        yield "metal"
+        yield METAL
     if rough.get("roughnessFactor", 1) < 1 or "metallicRoughnessTexture" in rough:
-        yield "gloss"
+        yield GLOSS
     if "normalTexture" in material:
-        yield "normal maps"
+        yield NORMAL_MAPS
     if "occlusionTexture" in material:
         yield "occlusion"
 
