@@ -76,7 +76,8 @@ def unread_of(material: dict[str, Any]) -> Iterator[str]:
 
     if most("ke") > 0 or "map_ke" in material:
         yield EMISSION
-    if ("d" in material and most("d") < 1) or most("tr") > 0 or "map_d" in material:
+    opaque = most("d") if "d" in material else 1 - most("tr") % 1  # Tr 1 alone: files in which it stands for opaque
+    if opaque < 1 or "map_d" in material:
         yield TRANSPARENCY
     if most("pm") > 0 or "map_pm" in material:
         yield METAL

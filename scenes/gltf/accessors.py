@@ -69,8 +69,7 @@ def _rows(file: File, place: Tree, kind: np.dtype[Any], columns: int, count: int
             f"{count} rows of {width} bytes, {stride} apart from byte {start}, do not fit into bufferView "
             f"{place['bufferView']} of {len(data)} bytes; the file is cut off or damaged"
         )
-    rows: NDArray[Any] = np.ndarray((count, columns), kind, data, start, (stride, kind.itemsize))
-    return rows.copy()
+    return np.array(np.ndarray((count, columns), kind, data, start, (stride, kind.itemsize)))
 
 
 def _with_replaced(file: File, values: NDArray[Any], sparse: Tree) -> NDArray[Any]:

@@ -89,8 +89,10 @@ def test_what_a_material_states_and_no_surface_shows_is_named(mtl: str, name: st
     assert f"m.obj has {name}, which its surface does not show" in named(obj(tmp_path, mtl=mtl))
 
 
-def test_a_material_that_changes_nothing_is_not_named(tmp_path: Path) -> None:
-    read(obj(tmp_path, mtl="Ka 1 1 1\nKd 0.5 0.5 0.5\nKs 0 0 0\nKe 0 0 0\nd 1.0\nTr 0\nNs 250\nNi 1.45\nillum 2"))
+@pytest.mark.parametrize("opaque", ["d 1.0\nTr 0", "d 1", "Tr 0", "Tr 1", "d 1\nTr 1"])
+def test_a_material_that_changes_nothing_is_not_named(opaque: str, tmp_path: Path) -> None:
+    """Some programs write Tr 1 for opaque, others Tr 0."""
+    read(obj(tmp_path, mtl=f"Ka 1 1 1\nKd 0.5 0.5 0.5\nKs 0 0 0\nKe 0 0 0\n{opaque}\nNs 250\nNi 1.45\nillum 2"))
 
 
 def test_indices_count_back_from_their_line(tmp_path: Path) -> None:
