@@ -29,6 +29,8 @@ from spikecam_env.errors import InputError
 
 ARCHIVES = ("zip", "gz", "bz2", "tar")
 """Endings of files in which trimesh would look for meshes."""
+MOST_WORDS = 200
+"""Characters of another library's error in ours."""
 SMALLEST, LARGEST = 1e-3, 1e6
 """Longest side of a mesh [units of the world].  trimesh takes corners less than 1e-8 apart for one, and single
 precision, in which some files and OpenGL hold them, knows a place at 1e6 to 0.06."""
@@ -174,7 +176,8 @@ def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) ->
     except InputError:
         raise
     except Exception as error:  # the many ways in which a damaged mesh fails
-        raise InputError(f"it cannot be read as a mesh ({error}); give an obj, stl, ply or glb file") from error
+        why = " ".join(str(error).split())[:MOST_WORDS]
+        raise InputError(f"it cannot be read as a mesh ({why}); give an obj, stl, ply or glb file") from error
 
 
 def _by_trimesh(kind: str, data: bytes, beside: Beside, unread: dict[str, None]) -> list[trimesh.Trimesh]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.gltf.container import File, Tree
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, shown
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -50,7 +50,9 @@ def _stored(file: File, index: Any) -> NDArray[Any]:
     kind, columns = np.dtype(COMPONENTS[accessor["componentType"]]), COLUMNS[accessor["type"]]
     count = accessor["count"]
     if not 0 <= count * columns <= MOST_ITEMS:
-        raise InputError(f"accessor {index} has {count} rows of {columns}; at most {MOST_ITEMS} numbers are read")
+        raise InputError(
+            f"accessor {index} has {shown(count)} rows of {columns}; at most {MOST_ITEMS} numbers are read"
+        )
     if "bufferView" in accessor:
         values = _rows(file, accessor, kind, columns, count)
     else:
@@ -65,9 +67,9 @@ def _rows(file: File, place: Tree, kind: np.dtype[Any], columns: int, count: int
     if count == 0:
         return np.zeros((0, columns), kind)
     if start < 0 or stride < width or start + (count - 1) * stride + width > len(data):
+        rows = f"{shown(count)} rows of {width} bytes, {shown(stride)} apart from byte {shown(start)},"
         raise InputError(
-            f"{count} rows of {width} bytes, {stride} apart from byte {start}, do not fit into bufferView "
-            f"{place['bufferView']} of {len(data)} bytes; the file is cut off or damaged"
+            f"{rows} do not fit into bufferView {place['bufferView']} of {len(data)} bytes; the file is cut off or damaged"
         )
     return np.array(np.ndarray((count, columns), kind, data, start, (stride, kind.itemsize)))
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
 
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, shown
 
 Tree = dict[str, Any]
 MAGIC, JSON_CHUNK, BIN_CHUNK = b"glTF", b"JSON", b"BIN\0"
@@ -46,7 +46,7 @@ class File:
         """
         entries = self.tree.get(kind, [])
         if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(entries):
-            raise InputError(f"the file names {kind} {index}, and has {len(entries)}; export it again")
+            raise InputError(f"the file names {kind} {shown(index)}, and has {len(entries)}; export it again")
         return dict(entries[index])
 
     def without(self, name: str) -> None:
@@ -63,9 +63,9 @@ class File:
         start, length = view.get("byteOffset", 0), view["byteLength"]
         data = self._buffer(view["buffer"])
         if not 0 <= start <= start + length <= len(data):
+            extent = f"bytes {shown(start)} to {shown(start + length)}"
             raise InputError(
-                f"bufferView {index} is of bytes {start} to {start + length}, its buffer has {len(data)}; the file is "
-                "cut off or damaged"
+                f"bufferView {index} is of {extent}, its buffer has {len(data)}; the file is cut off or damaged"
             )
         return data[start : start + length]
 
@@ -107,7 +107,7 @@ def opened(data: bytes, beside: Callable[[str], bytes]) -> File:
     tree = json.loads(data)
     version = str(tree["asset"]["version"])
     if version.partition(".")[0] != "2":
-        raise InputError(f"the file is glTF {version}; version 2 is read, export it again")
+        raise InputError(f"the file is glTF {shown(version)}; version 2 is read, export it again")
     return File(tree, body, beside)
 
 
