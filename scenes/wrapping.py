@@ -12,6 +12,8 @@ from spikecam_env.errors import InputError
 Points = NDArray[np.float64]
 REPEAT, MIRROR, CLAMP, KEEP = "repeat", "mirror", "clamp", "keep"
 """What is seen beyond a side of a picture; KEEP leaves that axis as it is, to a renderer that repeats."""
+FARTHEST = 1e6
+"""Coordinate, in pictures, at which single precision, in which files and OpenGL hold it, is off by 0.06 pictures."""
 NEAR = 1e-6
 """Of a picture's side, by which a coordinate may miss its edge."""
 
@@ -29,15 +31,16 @@ def unrolled(picture: Texture, uv: Points, along_u: str = REPEAT, along_v: str =
         The picture, itself where it reaches far enough, and its coordinates (V, 2).
 
     Raises:
-        InputError: coordinates are not finite, or the picture would have more than MOST_PICTURE_PIXELS.
+        InputError: coordinates are beyond FARTHEST, or the picture would have more than MOST_PICTURE_PIXELS.
 
     Example:
         >>> wide, uv = unrolled(np.float32([[0.0, 1.0]]), np.array([[0.0, 0.0], [2.0, 1.0]]), along_u=MIRROR)
         >>> wide.tolist(), uv.tolist()
         ([[0.0, 1.0, 1.0, 0.0]], [[0.0, 0.0], [1.0, 1.0]])
     """
-    if not np.isfinite(uv).all():
-        raise InputError("texture coordinates of the mesh hold NaN or infinity; they must be finite")
+    farthest = np.abs(uv).max(initial=0.0)
+    if not farthest <= FARTHEST:
+        raise InputError(f"texture coordinates of the mesh run to {farthest:g}; they must lie within {FARTHEST:g}")
     ways = (along_u, along_v)
     low, high = (
         np.where([way == KEEP for way in ways], kept, side)

@@ -69,7 +69,7 @@ def _rows(file: File, place: Tree, kind: np.dtype[Any], columns: int, count: int
     if start < 0 or stride < width or start + (count - 1) * stride + width > len(data):
         rows = f"{shown(count)} rows of {width} bytes, {shown(stride)} apart from byte {shown(start)},"
         raise InputError(
-            f"{rows} do not fit into bufferView {place['bufferView']} of {len(data)} bytes; the file is cut off or damaged"
+            f"{rows} do not fit into the {len(data)} bytes of their bufferView; the file is cut off or damaged"
         )
     return np.array(np.ndarray((count, columns), kind, data, start, (stride, kind.itemsize)))
 
