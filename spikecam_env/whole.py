@@ -202,8 +202,8 @@ def _check_free(path: str | Path, target: Path, replace: bool) -> None:
     if not target.exists() or (replace and target.is_dir()):
         return
     if not target.is_dir() or not all(map(is_unfinished, target.iterdir())):
-        kind = "folder" if replace else "empty folder"
-        raise WriteError(f"{path} is there already, and is no {kind}; remove it or choose another name")
+        kind = "a folder" if replace else "an empty folder"
+        raise WriteError(f"{path} is there already, and is not {kind}; remove it or choose another name")
 
 
 @contextmanager

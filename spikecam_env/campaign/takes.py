@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -87,7 +88,7 @@ def record_takes(
     _check(takes, shape)
     target = Path(folder)
     plan = _plan(takes, shape, seed, engine)
-    if (target / "campaign.json").exists():
+    if os.path.exists(target / "campaign.json"):
         if _same_simulation(target, model, plan):
             return read_campaign(target)
         raise InputError(f"{target} holds a campaign already; remove it or choose another folder")

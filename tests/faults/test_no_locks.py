@@ -45,7 +45,7 @@ def without_locks(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., sub
     (folder / "flock.c").write_text(NO_FLOCK)
     subprocess.run(["gcc", "-shared", "-fPIC", "-o", "flock.so", "flock.c"], cwd=folder, check=True)
 
-    def python(
+    def started(
         *words: str, number: int = errno.ENOLCK, folder_of_work: Path, **more: str
     ) -> subprocess.CompletedProcess:
         environment = os.environ | {"LD_PRELOAD": str(folder / "flock.so"), "LOCK_ERRNO": str(number)} | more

@@ -48,10 +48,10 @@ def write_new_effect(name: str, folder: Path, *, force: bool = False) -> tuple[P
     """
     check_new_name(name)
     effect, test = folder / f"{name}.py", folder / f"test_{name}.py"
-    for path in (effect, test):
-        if path.exists() and not force:
-            raise InputError(f"{path} is there already; give another name, or --force to replace it")
     with whole_folder(folder, replace=True) as beside:
+        for path in (effect, test):
+            if path.exists() and not force:
+                raise InputError(f"{path} is there already; give another name, or --force to replace it")
         write_text_whole(beside / effect.name, _renamed(f"{BEGUN}.py", name))
         write_text_whole(beside / test.name, _renamed(f"test_{BEGUN}.py", name))
     return effect, test
