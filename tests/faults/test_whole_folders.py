@@ -175,3 +175,13 @@ def test_bits_and_the_file_that_says_their_size_are_both_there_or_neither(
     capsys.readouterr()
     assert run(["record", "--out", str(path), "--frames", "100000000", "--size", "8", "16"]) == 2
     assert "x.dat.json" in capsys.readouterr().err and tree(tmp_path) == {"x.dat.json"}
+
+
+def test_a_film_is_not_begun_where_the_picture_beside_it_cannot_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "in the way.png").mkdir()
+    for picture in ("picture.txt", "in the way.png"):
+        words = ["scenes", "disk", "--film", str(tmp_path / "film.gif"), "--out", str(tmp_path / picture)]
+        assert run([*words, "--size", "24", "40", "--frames", "64"]) == 2
+        assert picture in capsys.readouterr().err and tree(tmp_path) == {"in the way.png"}
