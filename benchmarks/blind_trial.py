@@ -16,10 +16,10 @@ from typing import Any, Literal
 import tyro
 
 from spikecam_env import stopping
-from spikecam_env.cli.files import out_folder
 from spikecam_env.cli.main import run_parsed
 from spikecam_env.cli.options import Count, Workers
 from spikecam_env.errors import InputError
+from spikecam_env.run_folder import run_folder
 from spikecam_env.whole import reason
 from tests.hidden_world import record, trial
 from tests.hidden_world.cases import cases
@@ -59,7 +59,7 @@ class BlindTrial:
     """module:function that is tried: (campaign, model, out, seed, exclude, threads) -> what diagnosis.json holds."""
 
     def run(self) -> None:
-        with out_folder(self.out):
+        with run_folder(self.out, "a trial"):
             self._go_on()
 
     def _go_on(self) -> None:

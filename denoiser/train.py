@@ -36,6 +36,7 @@ from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, pretrained_path, save_weights
 from spikecam_env.errors import InputError
+from spikecam_env.run_folder import run_folder
 from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.torch_settings import torch_settings
 
@@ -134,15 +135,14 @@ class TrainConfig:
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
     """Train, or go on training; returns the path of the weights.
 
-    Raises InputError where `out` holds the run of another mode, or a damaged one, and where `start` is of another
-    network.
+    Raises InputError where another run is at work in `out`, or it holds the run of another mode, or a damaged one, and
+    where `start` is of another network.
     """
-    with torch_settings(config.threads, config.seed):
+    with run_folder(config.out, "a run of training"), torch_settings(config.threads, config.seed):
         return _trained(config, progress)
 
 
 def _trained(config: TrainConfig, progress: bool) -> Path:
-    config.out.mkdir(parents=True, exist_ok=True)
     recipe = replace(recipe_of(config.mode), refine=config.refine)
     recipe = recipe if config.channels is None else replace(recipe, channels=config.channels)
     device = torch.device(config.device)

@@ -110,7 +110,7 @@ def checked_memory(size: int, what: str) -> None:
 def checked_disk(size: int, path: str | Path, what: str) -> None:
     """Raises InputError where so many bytes are more than is free where `path` is or will be."""
     place = Path(path).absolute()
-    while not place.exists() and place != place.parent:
+    while not os.path.exists(place) and place != place.parent:  # False too for a name that is too long
         place = place.parent
     free = shutil.disk_usage(place).free
     if size > free:

@@ -23,9 +23,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from filelock import FileLock, Timeout
 from numba import config
 from numba.core.compiler_lock import global_compiler_lock
+
+from spikecam_env.locks import lock
 
 Compiled = TypeVar("Compiled", bound=Callable[..., Any])
 
@@ -93,14 +94,16 @@ def _take_turns(dispatcher: Any) -> None:
 
 @contextmanager
 def _alone(turn: Path) -> Iterator[None]:
-    """No other process is within, with this file; without a place for the file, or after a long wait, at once."""
-    lock = FileLock(turn)
-    with suppress(OSError, NotImplementedError, Timeout):
-        lock.acquire(timeout=LONGEST_WAIT_S)
+    """No other process is within, with this file; without a place for it or a lock, or after a long wait, at once."""
+    handle: int | None = None
+    with suppress(OSError):
+        turn.touch()
+        handle = lock(turn, LONGEST_WAIT_S)
     try:
         yield
     finally:
-        lock.release()
+        if handle is not None:
+            os.close(handle)
 
 
 @lru_cache(maxsize=1)

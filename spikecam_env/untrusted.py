@@ -13,9 +13,11 @@ Whatever is wrong is an InputError that names the file, the entry, its value and
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
 import math
+import os
 import sys
 import zipfile
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -29,6 +31,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory
 from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.locks import warn_without_locks
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -193,11 +196,19 @@ def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[st
 
 
 def open_hdf5(path: str | Path) -> h5py.File:
-    """An HDF5 file, open for reading; raises InputError where it is missing, truncated or none."""
+    """An HDF5 file, open for reading, without a lock where the file system has none.
+
+    Raises InputError where it is missing, truncated or none, or another program has it locked.
+    """
     source = existing_file(path)
     try:
-        return h5py.File(source, "r")
+        return _hdf5(source)
     except (OSError, RuntimeError, ValueError) as error:
+        if _is_of_a_lock(error):
+            raise InputError(
+                f"{source} cannot be locked for reading ({_short(error)}); if no other program writes to it, set "
+                "HDF5_USE_FILE_LOCKING=FALSE"
+            ) from error
         raise InputError(f"{source} is truncated or not an HDF5 file ({_short(error)})") from error
 
 
@@ -307,6 +318,22 @@ def _selected(shape: tuple[int, ...], part: Any) -> list[int]:
     parts = part if isinstance(part, tuple) else (part,)
     cut = [len(range(*p.indices(n))) if isinstance(p, slice) else n for p, n in zip(parts, shape, strict=False)]
     return [*cut, *shape[len(cut) :]]
+
+
+def _hdf5(source: Path) -> h5py.File:
+    try:
+        return h5py.File(source, "r")
+    except OSError as error:
+        if not _is_of_a_lock(error) or isinstance(error, BlockingIOError):
+            raise
+        file = h5py.File(source, "r", locking=False)
+        warn_without_locks(os.strerror(error.errno or errno.ENOLCK))
+        return file
+
+
+def _is_of_a_lock(error: Exception) -> bool:
+    """Whether HDF5 could open a file, and not lock it."""
+    return "unable to lock file" in str(error)
 
 
 def _plain(value: Any) -> Any:

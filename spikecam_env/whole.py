@@ -3,7 +3,7 @@
 What is being written is hidden, `.NAME.PID.HOST-RANDOM.partial.SUFFIX`, and locked by the process that writes it.  The
 system lifts the lock when that process ends, however it ends.  So what a killed one left is known, and the next that
 writes into the folder removes it.  Some shared file systems lock for one machine only: what another machine began is
-removed when nobody has touched it for a day.
+removed when nobody has touched it for a day.  On those without locks it stays.
 """
 
 from __future__ import annotations
@@ -21,12 +21,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from spikecam_env.errors import InputError, WriteError
+from spikecam_env.locks import NoLocksError, lock, warn_without_locks
 from spikecam_env.stopping import when_stopped
-
-try:
-    import fcntl
-except ImportError:  # Windows: nothing is locked, and nothing cleared
-    fcntl = None  # type: ignore[assignment]
 
 LONGEST_NAME = 255
 """Bytes of a file's name that file systems take."""
@@ -52,22 +48,33 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def whole_folder(path: str | Path) -> Iterator[Path]:
-    """A new folder to fill; on leaving without an exception it becomes `path`.
+def whole_folder(path: str | Path, use: str = "results", *, replace: bool = False) -> Iterator[Path]:
+    """A new folder to fill; on leaving without an exception its files are in `path`, all of them or none.
 
-    Errors: WriteError if `path` is there and not an empty folder, the folder it is to be in does not exist, or writing
-    fails.
+    A `path` that is not there appears at once, and folders above it are made.  Files go one by one into a `path` that
+    is there, after the last of them is written; those of the same names are put back if one cannot be moved.
+
+    Args:
+        path: of the folder.
+        use: of the folder, for messages.
+        replace: whether `path` may hold files, of which those of the same names are replaced.
+
+    Yields:
+        The folder to fill, hidden in or beside `path`.  Errors about it name `path` instead.
+
+    Raises:
+        WriteError: where the folder cannot be made, takes no new files, or writing fails; unless `replace`, where
+            `path` is there and not an empty folder.
     """
-    target = _resolved(path)
-    _check_parent(path, target)
+    unusable = _unusable(path, use)
+    target = _resolved(path, unusable)
     with said_of(path):
-        if target.exists() and not (target.is_dir() and not any(target.iterdir())):
-            raise WriteError(f"{path} is there already, and is not an empty folder; remove it or choose another name")
-        with _beside(target, os.mkdir) as beside:
+        _check_free(path, target, replace)
+    place = target / "results" if target.is_dir() else target
+    with _folders_made(place.parent, unusable), said_of(path), _beside(place, os.mkdir) as beside:
+        with _named(beside, path):
             yield beside
-            if target.exists():
-                target.rmdir()
-            os.replace(beside, target)
+        _move(beside, target, path)
 
 
 @contextmanager
@@ -77,32 +84,10 @@ def made_folder(path: str | Path, use: str = "results") -> Iterator[Path]:
 
     Errors: WriteError where it cannot be made, or takes no new files.
     """
-    made: list[Path] = []
-
-    def remove() -> None:
-        for folder in reversed(made):
-            with suppress(OSError):
-                folder.rmdir()
-
-    unusable = f"cannot use {_shown(path)} as a folder for {use}"
+    unusable = _unusable(path, use)
     target = _resolved(path, unusable)
-    with when_stopped(remove):
-        try:
-            try:
-                for folder in (*reversed(target.parents), target):
-                    if not folder.is_dir():
-                        folder.mkdir()
-                        made.append(folder)
-                with _beside(target / "results", _new_file):
-                    pass
-            except InputError:
-                raise
-            except OSError as error:
-                raise WriteError(f"{unusable}: {reason(error)}") from error
-            yield Path(path)
-        except BaseException:
-            remove()
-            raise
+    with _folders_made(target, unusable):
+        yield Path(path)
 
 
 def check_file(path: str | Path) -> None:
@@ -112,7 +97,7 @@ def check_file(path: str | Path) -> None:
     is too long, or links lead in a loop.
     """
     target = _file_at(path)
-    with said_of(path), _beside(target, _new_file):
+    with said_of(path), _beside(target, _new_file, locked=False):
         pass
 
 
@@ -143,23 +128,6 @@ def reason(error: OSError) -> str:
     return words.get(error.errno or 0) or error.strerror or (str(error).splitlines() or [type(error).__name__])[0]
 
 
-@contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """A lock on a folder, for a run of several processes; the system lifts it when this process ends, however it ends.
-
-    Whatever is half written in the folder within the block is by this run, or left by one that was killed.
-    Errors: InputError where another run has the lock, or the file system has none.
-    """
-    try:
-        handle = _lock(folder)
-    except OSError as error:
-        raise InputError(f"another run is at work in {folder}; wait for it, or choose another folder") from error
-    try:
-        yield
-    finally:
-        os.close(handle)
-
-
 def is_unfinished(path: Path) -> bool:
     """Whether a file or folder is half written, by its name."""
     return PARTIAL.fullmatch(path.name) is not None
@@ -174,8 +142,6 @@ def clear_unfinished(folder: Path) -> None:
 
 def clear_abandoned(folder: Path) -> None:
     """Remove what killed processes left half written in a folder."""
-    if fcntl is None:
-        return
     try:
         found = [match for match in map(PARTIAL.fullmatch, os.listdir(folder)) if match]
     except OSError:
@@ -185,7 +151,7 @@ def clear_abandoned(folder: Path) -> None:
         with suppress(OSError):  # somebody is at work on it, or it is not ours to remove
             if match["host"] != _host() and time.time() - (folder / name).stat().st_mtime < ABANDONED_S:
                 continue
-            handle = _lock(folder / name)
+            handle = lock(folder / name)
             try:
                 _remove(folder / name)
             finally:
@@ -215,6 +181,11 @@ def _resolved(path: str | Path, unusable: str = "") -> Path:
         raise WriteError(f"{unusable or f'cannot write {_shown(path)}'}: {why}; choose another name") from error
 
 
+def _unusable(path: str | Path, use: str) -> str:
+    """The beginning of an error."""
+    return f"cannot use {_shown(path)} as a folder for {use}"
+
+
 def _shown(path: str | Path) -> str:
     text = str(path)
     return text if len(text) <= LONGEST_NAME else f"{text[:40]}...{text[-20:]}"
@@ -226,14 +197,111 @@ def _check_parent(path: str | Path, target: Path) -> None:
         raise WriteError(f"cannot write {path}: there is no folder {parent}; make it first")
 
 
+def _check_free(path: str | Path, target: Path, replace: bool) -> None:
+    """Whether a folder may appear at `path`, or files in the one that is there."""
+    if not target.exists() or (replace and target.is_dir()):
+        return
+    if not target.is_dir() or not all(map(is_unfinished, target.iterdir())):
+        kind = "a folder" if replace else "an empty folder"
+        raise WriteError(f"{path} is there already, and is not {kind}; remove it or choose another name")
+
+
+@contextmanager
+def _folders_made(target: Path, unusable: str) -> Iterator[None]:
+    """`target` and the folders it is in are there, and it takes new files; those that were made and are still empty go
+    if the block fails."""
+    made: list[Path] = []
+
+    def remove() -> None:
+        for folder in reversed(made):
+            with suppress(OSError):
+                folder.rmdir()
+
+    with when_stopped(remove):
+        try:
+            try:
+                for folder in (*reversed(target.parents), target):
+                    if not folder.is_dir():
+                        folder.mkdir()
+                        made.append(folder)
+                with _beside(target / "results", _new_file, locked=False):
+                    pass
+            except InputError:
+                raise
+            except OSError as error:
+                raise WriteError(f"{unusable}: {reason(error)}") from error
+            yield
+        except BaseException:
+            remove()
+            raise
+
+
+@contextmanager
+def _named(beside: Path, path: str | Path) -> Iterator[None]:
+    """Errors within that are about the hidden folder `beside`, or a file in it, name `path` instead."""
+    try:
+        yield
+    except InputError as error:
+        if str(beside) not in str(error):
+            raise
+        raise type(error)(str(error).replace(str(beside), str(path))) from error
+    except OSError as error:
+        about = Path(os.fsdecode(error.filename)) if isinstance(error.filename, str | bytes) else None
+        if about is None or not about.is_relative_to(beside):
+            raise
+        raise WriteError(f"cannot write {Path(path) / about.relative_to(beside)}: {reason(error)}") from error
+
+
+def _move(beside: Path, target: Path, path: str | Path) -> None:
+    """What is in the hidden folder `beside` into the folder `target`, all of it or none."""
+    if not target.exists():
+        os.replace(beside, target)
+        return
+    moves = [(entry, Path(os.path.realpath(target / entry.name))) for entry in beside.iterdir()]
+    for entry, place in moves:
+        if place.exists() and (place.is_dir() or entry.is_dir()):
+            raise WriteError(f"cannot write {Path(path) / entry.name}: it is there already; remove it")
+    with _beside(target / "replaced", os.mkdir) as kept:
+        for entry, place in moves:
+            _keep(place, kept / entry.name)
+        begun: list[tuple[Path, Path]] = []
+        try:
+            for entry, place in moves:
+                begun.append((kept / entry.name, place))
+                os.replace(entry, place)
+        except BaseException:
+            _put_back(begun)
+            raise
+
+
+def _keep(file: Path, place: Path) -> None:
+    """A second name or, where the file system has no links, a copy of a file that may be there."""
+    try:
+        os.link(file, place)
+    except FileNotFoundError:
+        pass
+    except OSError:
+        shutil.copy2(file, place)
+
+
+def _put_back(replaced: list[tuple[Path, Path]]) -> None:
+    """Files from where they are kept to their places; what is not kept was not there before."""
+    for kept, place in replaced:
+        with suppress(OSError):
+            if kept.exists():
+                os.replace(kept, place)
+            else:
+                place.unlink(missing_ok=True)
+
+
 def _is_of(about: Path, path: str | Path) -> bool:
     """Whether a file is the one at `path`, or hidden beside it."""
     return any(PARTIAL.fullmatch(part) for part in about.parts) or os.path.realpath(about) == os.path.realpath(path)
 
 
 @contextmanager
-def _beside(target: Path, create: Callable[[Path], object]) -> Iterator[Path]:
-    """A new file or folder beside `target`, locked; gone at the end."""
+def _beside(target: Path, create: Callable[[Path], object], *, locked: bool = True) -> Iterator[Path]:
+    """A new file or folder beside `target`, locked unless it is a trial; gone at the end."""
     clear_abandoned(target.parent)
     places: list[Path] = []
 
@@ -247,12 +315,17 @@ def _beside(target: Path, create: Callable[[Path], object]) -> Iterator[Path]:
             while handle is None and len(places) < ATTEMPTS:
                 places.append(target.with_name(_hidden_name(target.name)))
                 create(places[-1])
+                if not locked:
+                    break
                 try:
-                    handle = _lock(places[-1])
+                    handle = lock(places[-1])
                 except (BlockingIOError, FileNotFoundError):
                     continue  # another process cleared it before it was locked
+                except NoLocksError as error:
+                    warn_without_locks(reason(error))
+                    break
                 except OSError:
-                    break  # no locks on this file system
+                    break  # no right to open it again
             yield places[-1]
         finally:
             remove()
@@ -277,20 +350,6 @@ def _host() -> str:
 
 def _new_file(place: Path) -> None:
     os.close(os.open(place, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-
-
-def _lock(place: Path) -> int:
-    """An open handle that holds the lock; raises BlockingIOError where another has it, OSError where there are none."""
-    if fcntl is None:
-        raise OSError(errno.ENOLCK, "no locks")
-    handle = os.open(place, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.stat(place)  # it may have been removed in between
-    except BaseException:
-        os.close(handle)
-        raise
-    return handle
 
 
 def _remove(place: Path) -> None:

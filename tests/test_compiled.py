@@ -4,6 +4,8 @@ Of processes that start together one compiles."""
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import re
 import shutil
@@ -18,6 +20,7 @@ from pathlib import Path
 import pytest
 
 from spikecam_env import compiled
+from spikecam_env.locks import lock
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("spikecam_env", "scenes", "denoiser")
@@ -140,6 +143,7 @@ def test_of_processes_that_need_a_function_at_once_one_compiles_it(tmp_path: Pat
     code = f"""
 from pathlib import Path
 from spikecam_env import compiled
+from spikecam_env.locks import lock
 alone = compiled._alone
 compiled._alone = lambda path: alone(Path({str(turn)!r}))  # one file for all, which the test holds at first
 {USES_A_KERNEL.replace("a = np", "print('ready', flush=True); a = np", 1)}
@@ -158,14 +162,29 @@ compiled._alone = lambda path: alone(Path({str(turn)!r}))  # one file for all, w
 
 
 def test_a_process_that_never_ends_its_turn_delays_others_and_no_more(tmp_path: Path, monkeypatch) -> None:
-    from filelock import FileLock
-
+    turn = tmp_path / "turn"
+    turn.touch()
     monkeypatch.setattr(compiled, "LONGEST_WAIT_S", 0.2)
     began = time.monotonic()
-    with FileLock(tmp_path / "turn"), compiled._alone(tmp_path / "turn"):
+    held = lock(turn)
+    with compiled._alone(turn):
         assert time.monotonic() - began >= 0.2
+    os.close(held)
     with compiled._alone(tmp_path / "no such folder" / "turn"):
         pass
+
+
+@pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOLCK])
+def test_where_there_are_no_locks_nobody_waits(number: int, tmp_path: Path, monkeypatch) -> None:
+    def flock(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    monkeypatch.setattr(compiled, "LONGEST_WAIT_S", 2.0)
+    (tmp_path / "turn").touch()  # as an earlier process leaves it
+    began = time.monotonic()
+    with compiled._alone(tmp_path / "turn"):
+        assert time.monotonic() - began < 1.0
 
 
 def test_all_compiled_code_is_decorated_in_one_place() -> None:

@@ -17,7 +17,6 @@ twin's picture it is a bound on any stream of spikes, for two streams of one lig
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,6 +29,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from denoiser import accumulate
+from denoiser.evaluate.writing import write_result
 from denoiser.metrics import gap_closed, psnr_db, ssim
 from denoiser.online import OnlineDnSS
 from denoiser.pairs import light_in_frame
@@ -37,7 +37,6 @@ from scenes.collage import Collage
 from scenes.textures import Texture, random_texture
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import middleTFI, middleTFP
-from spikecam_env.whole import write_text_whole
 
 Stream = NDArray[np.uint8] | NDArray[np.float32]
 PHOTOGRAPHS = ("astronaut", "camera", "chelsea", "coffee", "coins", "page", "rocket")
@@ -104,7 +103,7 @@ def evaluate_quick(
         "mean_interval": {b: round(1 / np.mean([s["rate"] for s in scores if s["light"] == b]), 1) for b in LIGHTS},
     }
     if out is not None:
-        _write(Path(out), result)
+        write_result(Path(out), "evaluate", result, report(result))
     return result
 
 
@@ -262,12 +261,6 @@ def _cell(s: dict[str, float | None]) -> str:
 
 def _shown(value: float | None, width: int, digits: int) -> str:
     return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
-
-
-def _write(folder: Path, result: dict[str, Any]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in (("evaluate.json", json.dumps(result, indent=1)), ("evaluate.txt", report(result))):
-        write_text_whole(folder / name, text)
 
 
 def main() -> None:

@@ -34,6 +34,7 @@ from denoiser.evaluate.work import Results, tasks, undone, work
 from scenes.catalogue import SCENES
 from spikecam_env.checked import checked_count, checked_memory, checked_shape
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.run_folder import run_folder
 from spikecam_env.whole import made_folder, write_text_whole
 
 ABLATION = (
@@ -110,8 +111,8 @@ def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = Fa
     Returns table, title, rows, settings, groups (see `table_summary.groups`), scenes (every record), missing (why rows,
     columns or recordings are not there), parameters (weights of the rows' networks) and figures (see
     `figures.figures`).
-    Raises InputError for unknown names, too few frames, a folder of recordings that is not there, and a folder that
-    holds results of other settings.
+    Raises InputError for unknown names, too few frames, a folder of recordings that is not there, and a folder in which
+    another run is at work, or that holds results of other settings.
     """
     if name not in TABLES:
         raise unknown_name("table", name, TABLES)
@@ -128,11 +129,10 @@ def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = Fa
     if asked.out is None:
         records = _made(cases, here, columns, asked, Results.opened(None, {}), None, progress)
         return _result(name, rows, cases, records, missing, sizes)
-    with made_folder(asked.out) as folder:
+    with run_folder(asked.out, "a table") as folder:
         results = Results.opened(folder / f"{name}.jsonl", _settings(asked))
-        pictures = folder / "pictures"
-        pictures.mkdir(exist_ok=True)
-        records = _made(cases, here, columns, asked, results, pictures, progress)
+        with made_folder(folder / "pictures", "pictures") as pictures:
+            records = _made(cases, here, columns, asked, results, pictures, progress)
         result = _result(name, rows, cases, records, missing, sizes)
         write_text_whole(folder / f"{name}.json", json.dumps(result, indent=1) + "\n")
         write_text_whole(folder / f"{name}.txt", report(result))

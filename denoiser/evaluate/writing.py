@@ -7,13 +7,24 @@ import math
 from pathlib import Path
 from typing import Any
 
-from spikecam_env.whole import write_text_whole
+from spikecam_env.whole import whole_folder, write_text_whole
 
 
 def write_result(folder: Path, name: str, result: dict[str, Any], text: str) -> None:
-    """`<name>.json` and `<name>.txt` in a folder that is there; each appears whole.  What is not finite is null."""
-    write_text_whole(folder / f"{name}.json", json.dumps(_plain(result), indent=1, allow_nan=False) + "\n")
-    write_text_whole(folder / f"{name}.txt", text)
+    """Write `<name>.json` and `<name>.txt` into a folder, made if needed: both or neither.
+
+    Args:
+        folder: for the files; those of the same names in it are replaced.
+        name: of the files.
+        result: for programs; numbers that are not finite become null.
+        text: to read.
+
+    Raises:
+        WriteError: where they cannot be written.
+    """
+    with whole_folder(folder, replace=True) as beside:
+        write_text_whole(beside / f"{name}.json", json.dumps(_plain(result), indent=1, allow_nan=False) + "\n")
+        write_text_whole(beside / f"{name}.txt", text)
 
 
 def _plain(value: Any) -> Any:

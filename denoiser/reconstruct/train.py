@@ -34,6 +34,7 @@ from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
 from spikecam_env.checked import checked_count, checked_number, checked_seed
 from spikecam_env.errors import InputError
+from spikecam_env.run_folder import run_folder
 from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.torch_settings import torch_settings
 
@@ -112,16 +113,16 @@ def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -
     """Train, or go on training; returns the path of the weights.
 
     `minutes` counts from here, the drawing of textures and compilation included.
-    Raises InputError where `out` holds the run of another mode or width, or a damaged one.
+    Raises InputError where another run is at work in `out`, or it holds the run of another mode or width, or a damaged
+    one.
     """
-    with torch_settings(config.threads, config.seed):
+    with run_folder(config.out, "a run of training"), torch_settings(config.threads, config.seed):
         return _trained(config, progress)
 
 
 def _trained(config: ReconstructorConfig, progress: bool) -> Path:
     began = time.monotonic()
     torch.backends.cudnn.benchmark = True
-    config.out.mkdir(parents=True, exist_ok=True)
     lesson = lesson_of(config.recipe())
     lesson.networks.to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
     run = Run.begin(lesson.networks)

@@ -27,6 +27,7 @@ from spikecam_env.checked import checked_number
 from spikecam_env.datasets.ray_cluster import connected
 from spikecam_env.envs.tasks.low_light import LowLight
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.run_folder import run_folder
 from spikecam_env.untrusted import Count, Declared, Name, Positive, Seed, Side, Whole, declared, parse_json, read_text
 from spikecam_env.whole import write_text_whole
 
@@ -160,9 +161,8 @@ def _curve(case: Case, out: Path) -> tuple[dict[str, float], ...]:
     """Of its training, which is done or gone on with if it is not whole."""
     if case.sight in READY:
         return ()
-    folder, ppo = out / case.folder, learner(case.steps, imitate=case.imitate)
-    folder.mkdir(parents=True, exist_ok=True)
-    return tuple(train_agent(case.learned, folder, ppo, case.seed).training["curve"])
+    ppo = learner(case.steps, imitate=case.imitate)
+    return tuple(train_agent(case.learned, out / case.folder, ppo, case.seed).training["curve"])
 
 
 def _played(case: Case, curve: tuple[dict[str, float], ...], out: Path) -> Result:
@@ -183,18 +183,32 @@ def actor_of(case: Case, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
 
 
 def study(wanted: Sequence[Case], out: Path, *, jobs: int = 1, ray: str | None = None) -> list[Result]:
-    """What the record in `out` lacks is measured and written to it; the results of `wanted`."""
-    known = {result.case: result for result in read_record(out / RECORD)}
-    missing: dict[str, list[Case]] = {}
-    for case in wanted:
-        if case not in known:
-            missing.setdefault(case.folder, []).append(case)
-    runs = spread(partial(measure, out=out), missing.values(), jobs, ray)
-    for results in tqdm(runs, total=len(missing), desc="agents", unit="run", disable=None):
-        known |= {result.case: result for result in results}
-        lines = "".join(result.model_dump_json() + "\n" for result in known.values())
-        write_text_whole(out / RECORD, lines)
-    return [known[case] for case in wanted]
+    """Measure the cases that the record in a folder lacks, and add each to it when it is done.
+
+    Args:
+        wanted: the cases.
+        out: the folder, made if needed, for the record and every run.
+        jobs: processes that work at the same time.
+        ray: address of a Ray cluster that works instead, or "local".
+
+    Returns:
+        A result for each of `wanted`.
+
+    Raises:
+        InputError: where another run is at work in `out`, its record is damaged, or there is no such cluster.
+    """
+    with run_folder(out, "a study"):
+        known = {result.case: result for result in read_record(out / RECORD)}
+        missing: dict[str, list[Case]] = {}
+        for case in wanted:
+            if case not in known:
+                missing.setdefault(case.folder, []).append(case)
+        runs = spread(partial(measure, out=out), missing.values(), jobs, ray)
+        for results in tqdm(runs, total=len(missing), desc="agents", unit="run", disable=None):
+            known |= {result.case: result for result in results}
+            lines = "".join(result.model_dump_json() + "\n" for result in known.values())
+            write_text_whole(out / RECORD, lines)
+        return [known[case] for case in wanted]
 
 
 RECORD = "record.jsonl"
@@ -211,15 +225,12 @@ def read_record(path: Path) -> list[Result]:
 def spread(work: Callable[[T], R], items: Iterable[T], jobs: int, ray: str | None) -> Iterator[R]:
     """Results in any order: of this process, of `jobs` processes, or of a Ray cluster (its address, or "local")."""
     if ray is not None:
-        cluster = connected(ray, jobs)
-        task = cluster.remote(num_cpus=1)(_done)
-        waiting = [task.remote(work, item) for item in items]
-        try:
+        with connected(ray, jobs) as cluster:
+            task = cluster.remote(num_cpus=1)(_done)
+            waiting = [task.remote(work, item) for item in items]
             while waiting:
                 done, waiting = cluster.wait(waiting)
                 yield cluster.get(done[0])
-        finally:
-            cluster.shutdown()
     elif jobs == 1:
         yield from map(work, items)
     else:

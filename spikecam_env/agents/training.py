@@ -24,6 +24,7 @@ from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
 from spikecam_env.envs.tasks import TASKS, ReadSpin
 from spikecam_env.errors import unknown_name
+from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
 from spikecam_env.whole import write_text_whole
 
@@ -126,16 +127,31 @@ def learner(steps: int | None = None, *, imitate: bool = False, plain: bool = Fa
 
 
 def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16) -> Agent:
-    """Train, or go on from `out/last.pt`; out: a folder that is there.  ppo: default `PPO()`.
+    """Train, or go on from `out/last.pt`.
 
-    >>> from pathlib import Path
-    >>> from spikecam_env.agents.ppo import PPO
-    >>> agent = train_agent(Study("Catch-v1"), Path(), PPO(steps=64, rollout=32), environments=2)
-    >>> Path("agent.pt").is_file()
-    True
+    Args:
+        study: what the learner is put before.
+        out: folder of the run, made if needed.
+        ppo: the method; default `PPO()`.
+        seed: of network, actions, episodes and cameras.
+        environments: cameras that are stepped together.
+
+    Returns:
+        The agent.
+
+    Raises:
+        InputError: where another run is at work in `out`, or it holds the run of another network, or a damaged one.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from spikecam_env.agents.ppo import PPO
+        >>> agent = train_agent(Study("Catch-v1"), Path(), PPO(steps=64, rollout=32), environments=2)
+        >>> Path("agent.pt").is_file()
+        True
     """
     ppo = ppo or PPO()
     with (
+        run_folder(out, "a run of training"),
         closing(study.make_vec(environments)) as envs,
         torch_settings(threads=1, seed=seed),  # as many as pay for so small a network
     ):

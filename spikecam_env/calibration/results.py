@@ -1,4 +1,4 @@
-"""A calibration as files: model.toml, maps.h5 and report.html, each whole or absent."""
+"""A calibration as files: model.toml, maps.h5 and report.html, all of them or none."""
 
 from __future__ import annotations
 
@@ -12,28 +12,40 @@ from spikecam_env.calibration.snee import Calibration
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams.whole_hdf5 import WholeHDF5
 from spikecam_env.version import __version__
-from spikecam_env.whole import made_folder, write_text_whole
+from spikecam_env.whole import whole_folder, write_text_whole
 
 MAPS_FORMAT = "spikecam-maps/1"
 
 
 def save_calibration(calibration: Calibration, folder: str | Path) -> list[Path]:
-    """Write all three files; returns their paths.
+    """Write the three files, all of them or none.
 
-    >>> from spikecam_env.sensor import SensorModel
-    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
-    >>> [path.name for path in save_calibration(calibrate(campaign), "calibrated")]
-    ['model.toml', 'maps.h5', 'report.html']
+    Args:
+        calibration: as `calibrate` returns it.
+        folder: for the files, made if needed; those of the same names in it are replaced.
+
+    Returns:
+        Their paths.
+
+    Raises:
+        WriteError: where they cannot be written.
+
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> levels = (0.0, 0.2, 0.5)
+        >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=levels, frames=400, shape=(8, 8))
+        >>> [path.name for path in save_calibration(calibrate(campaign), "calibrated")]
+        ['model.toml', 'maps.h5', 'report.html']
     """
     from spikecam_env.calibration.report import report  # draws by matplotlib, which who denoises does not need
 
-    target = Path(folder)
-    paths = [target / name for name in ("model.toml", "maps.h5", "report.html")]
-    with made_folder(target):
-        calibrated_model(calibration).to_toml(paths[0])
-        save_maps(calibration, paths[1])
-        write_text_whole(paths[2], report(calibration, findings(calibration)))
-    return paths
+    names = ("model.toml", "maps.h5", "report.html")
+    with whole_folder(folder, replace=True) as beside:
+        model, maps, page = (beside / name for name in names)
+        calibrated_model(calibration).to_toml(model)
+        save_maps(calibration, maps)
+        write_text_whole(page, report(calibration, findings(calibration)))
+    return [Path(folder) / name for name in names]
 
 
 def calibrated_model(calibration: Calibration) -> SensorModel:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,10 +22,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import USES, Campaign, read_campaign
-from spikecam_env.campaign.writing import campaign_folder, finish_campaign, save_light, save_spikes
+from spikecam_env.campaign.writing import finish_campaign, save_light, save_spikes
 from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.names import distinct, file_name
+from spikecam_env.run_folder import run_folder
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams.packing import packed_bytes
 from spikecam_env.untrusted import read_json
@@ -74,7 +76,7 @@ def record_takes(
     Same arguments, same bytes.  A folder that a stopped run left unfinished is completed; a finished campaign of the
     same settings is returned as it is.
     Errors: InputError for no takes, names that repeat or are no file names, an unknown use, light of another shape, a
-    v_d that leaves no threshold, and a folder of other settings.
+    v_d that leaves no threshold, and a folder of other settings, or in which another run is at work.
 
     >>> from spikecam_env.sensor import Keyframes, SensorModel
     >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
@@ -86,11 +88,16 @@ def record_takes(
     _check(takes, shape)
     target = Path(folder)
     plan = _plan(takes, shape, seed, engine)
-    if (target / "campaign.json").exists() and _same_simulation(target, model, plan):
-        return read_campaign(target)
+    if os.path.exists(target / "campaign.json"):
+        if _same_simulation(target, model, plan):
+            return read_campaign(target)
+        raise InputError(f"{target} holds a campaign already; remove it or choose another folder")
     cameras = {v_d: _camera(model, v_d) for v_d in dict.fromkeys(take.v_d for take in takes)}
-    _claim(campaign_folder(target), model, plan)
-    with tqdm(total=sum(take.frames for take in takes), unit="frame", disable=not progress) as bar:
+    with (
+        run_folder(target, "a campaign"),
+        tqdm(total=sum(take.frames for take in takes), unit="frame", disable=not progress) as bar,
+    ):
+        _claim(target, model, plan)
         for number, take in enumerate(takes):
             bar.set_description(f"record {take.name}")
             stream = target / f"{take.name}.dat"
@@ -101,8 +108,8 @@ def record_takes(
             save_light(target / f"{take.name}.npz", take.light)
             sensor = SpikeSensor(camera, shape, seed, engine, take=number)
             save_spikes(stream, _stream(sensor, take, _light_scale(model, camera), bar))
-    entries = [_entry(take, model) for take in takes]
-    return finish_campaign(target, shape, model.frame_rate_hz, entries)
+        entries = [_entry(take, model) for take in takes]
+        return finish_campaign(target, shape, model.frame_rate_hz, entries)
 
 
 def at_v_d(model: SensorModel, v_d: float) -> SensorModel:

@@ -15,25 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.campaign.reading import FORMAT, Campaign, read_campaign
-from spikecam_env.errors import InputError, WriteError
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import pack_frames
-from spikecam_env.whole import reason, whole_file, write_text_whole
-
-
-def campaign_folder(folder: str | Path) -> Path:
-    """Make (if needed) and return the folder of a new campaign.
-
-    Errors: InputError where it holds a finished campaign already, or a file is in the way.
-    """
-    target = Path(folder)
-    if (target / "campaign.json").exists():
-        raise InputError(f"{target} holds a campaign already; remove it or choose another folder")
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WriteError(f"cannot use {target} as a folder for a campaign: {reason(error)}") from error
-    return target
+from spikecam_env.whole import whole_file, write_text_whole
 
 
 def save_spikes(path: Path, blocks: Iterable[ArrayLike]) -> None:

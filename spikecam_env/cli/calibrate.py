@@ -39,11 +39,12 @@ class Calibrate:
         campaign = read_campaign(self.campaign, outside=self.outside)
         with out_folder(self.out) as folder:
             calibration = calibrate(campaign, reset_noise_mV=self.reset_noise_mv, progress=True)
-            print(table([_row(finding) for finding in findings(calibration)]))
-            for warning in calibration.warnings:
-                print(f"note: {warning}")
-            for path in save_calibration(calibration, folder):
-                print(f"wrote {path}")
+            written = save_calibration(calibration, folder)
+        print(table([_row(finding) for finding in findings(calibration)]))
+        for warning in calibration.warnings:
+            print(f"note: {warning}")
+        for path in written:
+            print(f"wrote {self.out / path.name}")
 
 
 def _row(f: Finding) -> dict[str, str]:

@@ -41,7 +41,6 @@ class Simulate:
     """Record the dark and flats to fit at this V_D - V_ref too, in volts."""
 
     def run(self) -> None:
-        from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.named import named
         from spikecam_env.gap import KINDS, second_voltage, standard_design, write_campaign
 
@@ -53,9 +52,9 @@ class Simulate:
         if self.second_v_d is not None:
             planned = second_voltage(planned, self.second_v_d)
         model = self.camera.load()
-        with out_folder(self.out) as folder:
-            campaign = write_campaign(
-                folder,
+        report(
+            write_campaign(
+                self.out,
                 model,
                 shape=self.shape,
                 frames=self.frames,
@@ -63,7 +62,7 @@ class Simulate:
                 seed=self.seed,
                 progress=True,
             )
-        report(campaign)
+        )
 
 
 @dataclass

@@ -52,7 +52,9 @@ class Demo:
         from spikecam_env.cli.viewer import show_file
 
         with out_folder(self.out) as folder:
-            shown = self._picture(folder) if self.quick else self._film(folder)
+            lines = self._picture(folder) if self.quick else self._film(folder)
+        print("\n".join(lines))
+        shown = self.out / ("demo.png" if self.quick else "demo.mp4")
         if self.open and show_file(shown):
             print(f"opened {shown}")
 
@@ -70,22 +72,22 @@ class Demo:
             least=least,
         )
 
-    def _picture(self, folder: Path) -> Path:
+    def _picture(self, folder: Path) -> list[str]:
+        """Lines to print."""
         from spikecam_env.cli.panels import write_picture
         from spikecam_env.cli.showcase import PICTURE_FRAMES, last_picture
 
-        picture = folder / "demo.png"
-        write_picture(picture, last_picture(self._streamed(QUICK_FRAMES, PICTURE_FRAMES)))
-        print(f"wrote {picture}: noisy spikes, denoised, true light; `spikecam demo` makes a film of them")
-        return picture
+        write_picture(folder / "demo.png", last_picture(self._streamed(QUICK_FRAMES, PICTURE_FRAMES)))
+        what = "noisy spikes, denoised, true light; `spikecam demo` makes a film of them"
+        return [f"wrote {self.out / 'demo.png'}: {what}"]
 
-    def _film(self, folder: Path) -> Path:
+    def _film(self, folder: Path) -> list[str]:
+        """Lines to print."""
         from spikecam_env.cli.files import write_json
         from spikecam_env.cli.panels import write_film, write_picture
         from spikecam_env.cli.showcase import FILM_FRAMES, comparison, film_frames
         from spikecam_env.cli.table import table
 
-        film = folder / "demo.mp4"
         run = self._streamed(FRAMES, FILM_FRAMES)
         frames, rows = film_frames(run), comparison(run)
         speed: dict[str, Any] = {
@@ -96,12 +98,9 @@ class Demo:
             "x real time": run.times_real,
             "latency, frames": run.latency,
         }
-        write_film(film, frames, fps=15.0)
+        write_film(folder / "demo.mp4", frames, fps=15.0)
         write_picture(folder / "demo.png", frames[len(frames) // 2])
         options = {**asdict(self), "out": str(self.out)}
         write_json(folder / "demo.json", {"options": options, "speed": speed, "table": rows})
-        print(table(rows))
-        print()
-        print(table([speed]))
-        print(f"wrote {film}, and demo.png and demo.json beside it")
-        return film
+        wrote = f"wrote {self.out / 'demo.mp4'}, and demo.png and demo.json beside it"
+        return [table(rows), "", table([speed]), wrote]

@@ -97,7 +97,8 @@ class Denoise:
                 write_film(folder / "film.mp4", (side_by_side(t) for t in frames), total=len(frames))
             summary = {"file": str(self.file), "mode": self.mode, "window": self.window, "rows": rows}
             write_json(folder / "summary.json", summary)
-            print(table(rows))
-            if rows[0]["NIQE"] is None:
-                print(f"no NIQE: {why}")
-            print(f"wrote {', '.join(sorted(p.name for p in folder.iterdir()))} in {folder}")
+            written = sorted(path.name for path in folder.iterdir())
+        print(table(rows))
+        if rows[0]["NIQE"] is None:
+            print(f"no NIQE: {why}")
+        print(f"wrote {', '.join(written)} in {self.out}")

@@ -80,8 +80,8 @@ class Diagnose:
             )
             diagnosis.write(folder)
             write_report(diagnosis, folder / "report.html")
-            print(summary(diagnosis))
-            print(f"\nthe page: {folder / 'report.html'}   the model: {folder / 'model.toml'}")
+        print(summary(diagnosis))
+        print(f"\nthe page: {self.out / 'report.html'}   the model: {self.out / 'model.toml'}")
 
     def _known_effects(self) -> None:
         from spikecam_env.errors import unknown_name

@@ -74,12 +74,9 @@ class New:
     """Overwrite files of these names."""
 
     def run(self) -> None:
-        from spikecam_env.cli.files import out_folder
-        from spikecam_env.sensor.beginning import check_new_name, write_new_effect
+        from spikecam_env.sensor.beginning import write_new_effect
 
-        check_new_name(self.name)
-        with out_folder(self.out) as folder:
-            effect, test = write_new_effect(self.name, folder, force=self.force)
+        effect, test = write_new_effect(self.name, self.out, force=self.force)
         print(f"wrote {effect} and {test}")
         print(f"test it: python -m pytest {test}   use it: spikecam record --effect-file {effect} --effect {self.name}")
 

@@ -48,10 +48,8 @@ class Quick:
         from spikecam_env.cli.files import out_folder
 
         weights = ModeWeights(self.paper, self.best, self.fast).by_mode()
-        with nullcontext() if self.out is None else out_folder(self.out):
-            result = evaluate_quick(
-                self.modes, weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=self.out
-            )
+        with nullcontext() if self.out is None else out_folder(self.out) as folder:
+            result = evaluate_quick(self.modes, weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=folder)
         print(report(result), end="")
         if self.out is not None:
             print(f"wrote evaluate.json and evaluate.txt in {self.out}")

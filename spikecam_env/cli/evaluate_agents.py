@@ -72,7 +72,6 @@ class Agents:
     def run(self) -> None:
         from spikecam_env.agents.report import draw_curves
         from spikecam_env.agents.study import cases, study, summary
-        from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.table import table
         from spikecam_env.whole import write_text_whole
 
@@ -89,13 +88,12 @@ class Agents:
             shape=self.size,
             imitate=self.imitate,
         )
-        with out_folder(self.out):
-            results = study(wanted, self.out, jobs=self.jobs, ray=self.ray)
-            text = table(summary(results))
-            write_text_whole(self.out / "agents.txt", text + "\n")
-            draw_curves(results, self.out / "curves.png")
-            if self.films:
-                self._film([result.case for result in results if result.case.seed == self.first_seed])
+        results = study(wanted, self.out, jobs=self.jobs, ray=self.ray)
+        text = table(summary(results))
+        write_text_whole(self.out / "agents.txt", text + "\n")
+        draw_curves(results, self.out / "curves.png")
+        if self.films:
+            self._film([result.case for result in results if result.case.seed == self.first_seed])
         print(text)
         print(f"wrote record.jsonl, agents.txt and curves.png in {self.out}")
 

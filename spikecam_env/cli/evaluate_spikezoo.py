@@ -36,10 +36,10 @@ class SpikeZoo:
         from denoiser.evaluate.writing import write_result
         from spikecam_env.cli.files import out_folder
 
-        with nullcontext() if self.out is None else out_folder(self.out):
+        with nullcontext() if self.out is None else out_folder(self.out) as folder:
             result = evaluate_spikezoo(self.folder, self.modes, weights=self.weights.by_mode(), rate=self.rate)
-            if self.out is not None:
-                write_result(self.out, "spikezoo", result, report(result))
+            if folder is not None:
+                write_result(folder, "spikezoo", result, report(result))
         print(report(result), end="")
         if self.out is not None:
             print(f"wrote spikezoo.json and spikezoo.txt in {self.out}")

@@ -41,7 +41,7 @@ class Truth:
         from denoiser.evaluate.writing import write_result
         from spikecam_env.cli.files import out_folder
 
-        with nullcontext() if self.out is None else out_folder(self.out):
+        with nullcontext() if self.out is None else out_folder(self.out) as folder:
             result = evaluate_truth(
                 self.static,
                 self.moving,
@@ -50,8 +50,8 @@ class Truth:
                 scenes=self.scenes,
                 seed=self.seed,
             )
-            if self.out is not None:
-                write_result(self.out, "truth", result, report(result))
+            if folder is not None:
+                write_result(folder, "truth", result, report(result))
         print(report(result), end="")
         if self.out is not None:
             print(f"wrote truth.json and truth.txt in {self.out}")

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from spikecam_env.whole import made_folder, write_text_whole
+from spikecam_env.whole import whole_folder, write_text_whole
 
-out_folder = made_folder
+
+def out_folder(path: Path) -> AbstractContextManager[Path]:
+    """A new folder to fill with the files of a result, which are in `path` after the block, all of them or none."""
+    return whole_folder(path, replace=True)
 
 
 def json_text(data: Any) -> str:

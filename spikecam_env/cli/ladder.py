@@ -46,8 +46,8 @@ class Ladder:
         with out_folder(self.out) as folder:
             made = ladder(campaign, self.model, seed=self.seed, jobs=self.jobs, progress=True)
             made.write(folder)
-            print(table(rung_rows(made)))
-            print(f"\ngap: mean square of {made.statistics} statistics' held-out part, in noise; 1 is chance")
-            for note in made.notes:
-                print(f"note: {note}")
-            print(f"the figure: {folder / 'ladder.png'}   the model: {folder / 'model.toml'}")
+        print(table(rung_rows(made)))
+        print(f"\ngap: mean square of {made.statistics} statistics' held-out part, in noise; 1 is chance")
+        for note in made.notes:
+            print(f"note: {note}")
+        print(f"the figure: {self.out / 'ladder.png'}   the model: {self.out / 'model.toml'}")

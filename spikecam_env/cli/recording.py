@@ -25,6 +25,7 @@ def check_out(out: Path, frames: int, shape: tuple[int, int], truth_every: int =
     """Errors: InputError for a file type that no recording has, or that has no room for truth where there is to be
     some, a place that cannot be written to, and more frames than the disk has room for, or for a .npz the memory."""
     from spikecam_env.streams.packing import packed_bytes
+    from spikecam_env.streams.side_file import side_path
 
     suffix = out.suffix.lower()
     if suffix not in (*HDF5, ".dat", ".npz"):
@@ -32,6 +33,8 @@ def check_out(out: Path, frames: int, shape: tuple[int, int], truth_every: int =
     if truth_every and suffix not in HDF5:
         raise InputError(f"--out {out}: truth (--truth-every {truth_every}) is kept in .h5 files only")
     check_file(out)
+    if suffix == ".dat":
+        check_file(side_path(out))
     if suffix == ".npz":
         checked_memory(2 * frames * math.prod(shape), f"{frames} frames in a .npz")
     else:
@@ -86,10 +89,11 @@ def _appending(
         with SpikeWriter(out, sensor.shape, sensor.model.frame_rate_hz, **attributes) as writer:
             yield writer.append, lambda frame: append_truth(writer, scene, frame)
     elif suffix == ".dat":
-        with whole_file(out) as beside, beside.open("wb") as file:
-            yield lambda block: file.write(pack_frames(block).tobytes()), _no_truth
         rows, columns = sensor.shape
-        write_side_file(out, {"height": rows, "width": columns, "frame_rate_hz": sensor.model.frame_rate_hz})
+        with whole_file(out) as beside:
+            with beside.open("wb") as file:
+                yield lambda block: file.write(pack_frames(block).tobytes()), _no_truth
+            write_side_file(out, {"height": rows, "width": columns, "frame_rate_hz": sensor.model.frame_rate_hz})
     else:
         blocks: list[Any] = []
         yield blocks.append, _no_truth

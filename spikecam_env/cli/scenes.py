@@ -50,6 +50,7 @@ class Scenes:
             raise unknown_name("scene", self.name, SCENES)
         if min(self.size) < 8:
             raise InputError(f"--size {self.size[0]} {self.size[1]}; at least 8 rows and 8 columns")
+        self._check_places()
         if self.film is not None:
             self._write_film(self.film)
         if self.out is not None:
@@ -58,11 +59,20 @@ class Scenes:
             for name in (self.name,) if self.name else SCENES:
                 print(f"{name:10} {about(name)}")
 
+    def _check_places(self) -> None:
+        """Raises InputError for files that cannot be written, before either is begun."""
+        from spikecam_env.whole import check_file
+
+        for option, path, suffixes in (("film", self.film, (".mp4", ".gif")), ("out", self.out, (".png",))):
+            if path is None:
+                continue
+            if path.suffix.lower() not in suffixes:
+                raise InputError(f"--{option} {path}: unknown file type {path.suffix!r}; use {' or '.join(suffixes)}")
+            check_file(path)
+
     def _write_film(self, path: Path) -> None:
         from spikecam_env.cli.panels import write_film, write_gif
 
-        if path.suffix.lower() not in (".mp4", ".gif"):
-            raise InputError(f"--film {path}: unknown file type {path.suffix!r}; use .mp4 or .gif")
         if self.name is None:
             raise InputError(f"which scene? spikecam scenes NAME --film {path}; `spikecam scenes` lists the names")
         at = range(0, self.frames, self.every)
@@ -92,11 +102,7 @@ class Scenes:
 
         from scenes.catalogue import SCENES
         from spikecam_env.cli.panels import Panel, sheet, write_picture
-        from spikecam_env.whole import check_file
 
-        if path.suffix.lower() != ".png":
-            raise InputError(f"--out {path}: unknown file type {path.suffix!r}; use .png")
-        check_file(path)
         names = (self.name,) if self.name else SCENES
         panels = []
         for name in tqdm(names, desc="scenes", unit="scene", leave=False):

@@ -80,11 +80,7 @@ class Train:
     """Continue from the folder's checkpoint, if there is one."""
 
     def run(self) -> None:
-        from spikecam_env.cli.files import out_folder
-
-        options = self._options()
-        with out_folder(self.out):
-            print(f"wrote {_train(self.mode, options)}")
+        print(f"wrote {_train(self.mode, self._options())}")
 
     def _options(self) -> dict[str, Any]:
         """Those that the mode has, where they were given.  Raises InputError for others."""

@@ -43,12 +43,10 @@ class TrainAgent:
 
     def run(self) -> None:
         from spikecam_env.agents.training import Study, learner, train_agent
-        from spikecam_env.cli.files import out_folder
         from spikecam_env.cli.table import table
 
         study = Study(self.task.removeprefix("spikecam_env/"), self.obs)
-        with out_folder(self.out):
-            ppo = learner(self.steps, imitate=self.imitate, plain=self.plain)
-            agent = train_agent(study, self.out, ppo, self.seed, self.environments)
+        ppo = learner(self.steps, imitate=self.imitate, plain=self.plain)
+        agent = train_agent(study, self.out, ppo, self.seed, self.environments)
         print(table(agent.training["curve"][-10:]))
         print(f"wrote agent.pt, curve.json and last.pt in {self.out}")

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -20,13 +21,17 @@ from spikecam_env.checked import checked_count, checked_disk
 from spikecam_env.datasets.manifest import NAME, Manifest
 from spikecam_env.datasets.plan import Entry, Plan
 from spikecam_env.datasets.processes import on_processes
-from spikecam_env.datasets.ray_cluster import on_ray
+from spikecam_env.datasets.ray_cluster import connected, on_ray
 from spikecam_env.datasets.renderer import AUTO, first_that_works
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
+from spikecam_env.run_folder import run_folder
 from spikecam_env.stopping import when_stopped
 from spikecam_env.streams.packing import packed_bytes
-from spikecam_env.whole import alone_in, clear_unfinished, is_unfinished, made_folder
+from spikecam_env.whole import clear_unfinished, is_unfinished
+
+AtWork = Callable[[Plan, Path, tuple[Entry, ...]], Iterator[Written | int]]
+"""Files as they are done, in any order, and between them how many more frames are."""
 
 
 @dataclass(frozen=True)
@@ -61,16 +66,17 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
     """
     checked_count(jobs, "jobs")
     target = Path(os.path.realpath(folder))
-    with made_folder(target, "a dataset"), alone_in(target), when_stopped(partial(clear_unfinished, target)):
+    with run_folder(target, "a dataset"), when_stopped(partial(clear_unfinished, target)):
         plan = _with_renderer(plan, target)
         manifest = _begun(plan, target)
         clear_unfinished(target)
         _check_room(plan, target, manifest)
-        manifest.write(target)
-        try:
-            return _make_missing(plan, target, manifest, jobs, ray, progress)
-        finally:
-            clear_unfinished(target)
+        with _workers(jobs, ray) as at_work:
+            manifest.write(target)
+            try:
+                return _make_missing(plan, target, manifest, at_work, progress)
+            finally:
+                clear_unfinished(target)
 
 
 def _with_renderer(plan: Plan, folder: Path) -> Plan:
@@ -108,7 +114,7 @@ def _check_room(plan: Plan, folder: Path, manifest: Manifest) -> None:
     checked_disk(size, folder, f"{scenes} scenes of {plan.frames} frames")
 
 
-def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: str | None, progress: bool) -> Built:
+def _make_missing(plan: Plan, folder: Path, manifest: Manifest, at_work: AtWork, progress: bool) -> Built:
     missing = _missing(plan, manifest)
     there = len(plan.entries) - len(missing)
     seconds: Counter[str] = Counter()
@@ -118,7 +124,7 @@ def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: 
         total=frames, initial=plan.frames * there, desc=plan.kind, unit="frame", leave=False, disable=not progress
     )
     with bar:
-        for news in _at_work(plan, folder, missing, jobs, ray):
+        for news in at_work(plan, folder, missing):
             if isinstance(news, Written):
                 manifest = manifest.with_file(news)
                 manifest.write(folder)
@@ -136,12 +142,17 @@ def _make_missing(plan: Plan, folder: Path, manifest: Manifest, jobs: int, ray: 
     )
 
 
-def _at_work(
-    plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, ray: str | None
-) -> Iterator[Written | int]:
-    """Files as they are done, in any order, and between them how many more frames are."""
+@contextmanager
+def _workers(jobs: int, ray: str | None) -> Iterator[AtWork]:
+    """Who makes files: a Ray cluster, which is connected within the block, or processes, or this one."""
     if ray is not None:
-        return on_ray(plan, folder, entries, jobs, ray)
-    if jobs > 1:
-        return on_processes(plan, folder, entries, jobs)
+        with connected(ray, jobs) as cluster:
+            yield partial(on_ray, cluster)
+    elif jobs > 1:
+        yield partial(on_processes, jobs=jobs)
+    else:
+        yield _here
+
+
+def _here(plan: Plan, folder: Path, entries: tuple[Entry, ...]) -> Iterator[Written | int]:
     return chain.from_iterable(write_scene(plan, entry, folder) for entry in entries)

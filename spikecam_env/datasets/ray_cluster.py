@@ -9,6 +9,7 @@ import logging
 import os
 import socket
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
@@ -23,30 +24,31 @@ RETRIES = 3
 """Times that a scene is begun again after its worker died."""
 
 
-def on_ray(plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int, address: str) -> Iterator[Written | int]:
+def on_ray(ray: ModuleType, plan: Plan, folder: Path, entries: tuple[Entry, ...]) -> Iterator[Written | int]:
     """Files as they are done, in any order, and with each its number of frames.
 
-    address: LOCAL starts a cluster of `jobs` workers on this machine for the time of the run; else that of a cluster,
-    where the package is installed and `folder` is storage that all machines share.  A cluster that asks for a token
-    wants RAY_AUTH_MODE=token, and the token, set for this process too.
-    Errors: what a worker raised; InputError without Ray, without that cluster, and if workers keep dying.
+    Args:
+        ray: as `connected` gives it, to a cluster where the package is installed.
+        plan: of the dataset.
+        folder: storage that all machines of the cluster share.
+        entries: scenes to make.
+
+    Raises:
+        InputError: if workers keep dying, or write where this machine does not see it.
+        Exception: as a worker raised it.
     """
-    ray = connected(address, jobs)
-    try:
-        task = ray.remote(num_cpus=1, max_retries=RETRIES)(_file_of)
-        waiting = [task.remote(plan, folder, entry) for entry in entries]
-        while waiting:
-            done, waiting = ray.wait(waiting)
-            written = _result(ray, done[0])
-            if not (folder / written.entry.path).is_file():
-                raise InputError(
-                    f"a worker wrote {written.entry.path} where this machine does not see it: "
-                    f"{folder} must be storage that all machines of the cluster share"
-                )
-            yield written
-            yield plan.frames
-    finally:
-        ray.shutdown()
+    task = ray.remote(num_cpus=1, max_retries=RETRIES)(_file_of)
+    waiting = [task.remote(plan, folder, entry) for entry in entries]
+    while waiting:
+        done, waiting = ray.wait(waiting)
+        written = _result(ray, done[0])
+        if not (folder / written.entry.path).is_file():
+            raise InputError(
+                f"a worker wrote {written.entry.path} where this machine does not see it: "
+                f"{folder} must be storage that all machines of the cluster share"
+            )
+        yield written
+        yield plan.frames
 
 
 def _file_of(plan: Plan, folder: Path, entry: Entry) -> Written:
@@ -82,7 +84,18 @@ def _check_answers(address: str) -> None:
         raise InputError(f"no Ray cluster answers at {address!r} ({error}); give host:port, auto or {LOCAL}") from error
 
 
-def connected(address: str, jobs: int) -> ModuleType:
+@contextmanager
+def connected(address: str, jobs: int) -> Iterator[ModuleType]:
+    """Ray, connected to a cluster within the block.
+
+    Args:
+        address: of a running cluster, or LOCAL for one on this machine that ends with the block.  A cluster that asks
+            for a token wants RAY_AUTH_MODE=token, and the token, set for this process too.
+        jobs: workers of a LOCAL cluster.
+
+    Raises:
+        InputError: without Ray, or without that cluster.
+    """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     try:
         import ray
@@ -99,4 +112,7 @@ def connected(address: str, jobs: int) -> ModuleType:
             f"no Ray cluster at {address!r}: {error}; give its address, or {LOCAL!r}; "
             "to one that asks for a token this command goes with RAY_AUTH_MODE=token too"
         ) from error
-    return ray
+    try:
+        yield ray
+    finally:
+        ray.shutdown()

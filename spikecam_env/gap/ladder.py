@@ -39,7 +39,7 @@ from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import label_unit_note
 from spikecam_env.gap.verdict.comparison import aligned_mean
 from spikecam_env.sensor import Effect, SensorModel
-from spikecam_env.whole import whole_file, write_text_whole
+from spikecam_env.whole import whole_folder, write_text_whole
 
 Array = NDArray[np.float64]
 
@@ -91,12 +91,11 @@ class Ladder:
                 "rungs": rungs}  # fmt: skip
 
     def write(self, folder: Path) -> None:
-        """ladder.json, ladder.png and model.toml, the last rung's; each whole."""
-        folder.mkdir(parents=True, exist_ok=True)
-        self.rungs[-1].model.to_toml(folder / "model.toml")
-        with whole_file(folder / "ladder.png") as beside:
-            ladder_figure(self).savefig(beside, format="png", dpi=130)
-        write_text_whole(folder / "ladder.json", json.dumps(self.to_json(), indent=1))
+        """Write ladder.json, ladder.png and the last rung's model.toml into a folder, made if needed: all or none."""
+        with whole_folder(folder, replace=True) as beside:
+            self.rungs[-1].model.to_toml(beside / "model.toml")
+            ladder_figure(self).savefig(beside / "ladder.png", format="png", dpi=130)
+            write_text_whole(beside / "ladder.json", json.dumps(self.to_json(), indent=1))
 
 
 @sums_in_one_order

@@ -18,7 +18,7 @@ from spikecam_env.gap.observe.observation import Observation
 from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
-from spikecam_env.whole import write_text_whole
+from spikecam_env.whole import whole_folder, write_text_whole
 
 DIAGNOSIS_FORMAT = "spikecam-diagnosis/1"
 VERDICTS = ("none", "named", "class", "unknown", "parameter", "data")
@@ -349,10 +349,10 @@ class Diagnosis:
         }
 
     def write(self, folder: Path) -> None:
-        """diagnosis.json and model.toml, whole."""
-        folder.mkdir(parents=True, exist_ok=True)
-        self.patched.to_toml(folder / "model.toml")
-        write_text_whole(folder / "diagnosis.json", json.dumps(self.to_json(), indent=1, default=json_value))
+        """Write diagnosis.json and model.toml into a folder, made if needed: both or neither."""
+        with whole_folder(folder, replace=True) as beside:
+            self.patched.to_toml(beside / "model.toml")
+            write_text_whole(beside / "diagnosis.json", json.dumps(self.to_json(), indent=1, default=json_value))
 
 
 def json_value(value: Any) -> Any:

@@ -62,7 +62,7 @@ class Geometry:
 
 def read_side_file(path: Path) -> tuple[SideFile, Path] | None:
     """Entries and path of the file beside a recording; None where there is none; raises InputError for a wrong one."""
-    own = path.with_name(f"{path.name}.json")
+    own = side_path(path)
     if own.is_file():
         return declared(SideFile, read_json(own), str(own)), own
     shared = path.with_suffix(".json")
@@ -73,9 +73,14 @@ def read_side_file(path: Path) -> tuple[SideFile, Path] | None:
     return None
 
 
+def side_path(path: Path) -> Path:
+    """`recording.dat.json`, beside a recording."""
+    return path.with_name(f"{path.name}.json")
+
+
 def write_side_file(path: Path, entries: dict[str, Any]) -> None:
     """Write `recording.dat.json` beside a recording; raises InputError for entries that no side file has."""
-    side = path.with_name(f"{path.name}.json")
+    side = side_path(path)
     stated = {name: value for name, value in entries.items() if value is not None}
     declared(SideFile, stated, str(side))
     write_text_whole(side, json.dumps(stated, indent=1) + "\n")

@@ -149,9 +149,9 @@ def save_vidar_dat(
     packed = pack_checked(frames[:, ::-1] if flip else frames, bit_order)
     with whole_file(path) as beside:
         beside.write_bytes(packed.data)
-    if side_file:
-        entries = {"height": frames.shape[1], "width": frames.shape[2], "flip": flip, "bit_order": bit_order}
-        write_side_file(Path(path), {**entries, "frame_rate_hz": frame_rate_hz})
+        if side_file:
+            entries = {"height": frames.shape[1], "width": frames.shape[2], "flip": flip, "bit_order": bit_order}
+            write_side_file(Path(path), {**entries, "frame_rate_hz": frame_rate_hz})
 
 
 def _from_bits(source: Path, taken: Geometry, first: int, count: int | None) -> NDArray[np.uint8]:

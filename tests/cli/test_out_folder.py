@@ -1,4 +1,4 @@
-"""The folder for results."""
+"""Folders for results: of a command that writes them all at once, and of a run that goes on in one."""
 
 from __future__ import annotations
 
@@ -8,31 +8,44 @@ import pytest
 
 from spikecam_env.cli.files import out_folder
 from spikecam_env.errors import InputError
+from spikecam_env.run_folder import run_folder
 
 
 def test_a_folder_is_made_and_stays(tmp_path: Path) -> None:
-    with out_folder(tmp_path / "a" / "b") as folder:
+    with out_folder(tmp_path / "a" / "b"):
         pass
-    assert folder.is_dir()
+    with run_folder(tmp_path / "a" / "c") as folder:
+        assert folder.is_dir()
+    assert (tmp_path / "a" / "b").is_dir() and folder.is_dir()
 
 
-def test_a_folder_that_nothing_was_written_to_goes_with_the_error(tmp_path: Path) -> None:
-    with pytest.raises(InputError), out_folder(tmp_path / "new"):
+@pytest.mark.parametrize("kind", [out_folder, run_folder])
+def test_a_folder_that_nothing_was_written_to_goes_with_the_error(kind, tmp_path: Path) -> None:
+    with pytest.raises(InputError), kind(tmp_path / "new"):
         raise InputError("too short")
     assert not (tmp_path / "new").exists()
 
 
-def test_what_was_there_or_was_written_stays(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", [out_folder, run_folder])
+def test_a_folder_that_was_there_stays(kind, tmp_path: Path) -> None:
     (tmp_path / "old").mkdir()
-    with pytest.raises(InputError), out_folder(tmp_path / "old"):
+    with pytest.raises(InputError), kind(tmp_path / "old"):
         raise InputError("too short")
-    with pytest.raises(KeyboardInterrupt), out_folder(tmp_path / "half") as folder:
-        (folder / "part").touch()
-        raise KeyboardInterrupt
-    assert (tmp_path / "old").is_dir() and (tmp_path / "half" / "part").is_file()
+    assert (tmp_path / "old").is_dir()
 
 
-def test_a_file_in_the_way_is_said(tmp_path: Path) -> None:
+def test_finished_files_of_a_run_stay_and_those_of_a_result_that_is_not_whole_go(tmp_path: Path) -> None:
+    for kind, name in ((out_folder, "result"), (run_folder, "run")):
+        with pytest.raises(KeyboardInterrupt), kind(tmp_path / name) as folder:
+            (folder / "part").touch()
+            raise KeyboardInterrupt
+    assert (tmp_path / "run" / "part").is_file() and not (tmp_path / "result").exists()
+
+
+@pytest.mark.parametrize("kind", [out_folder, run_folder])
+def test_a_file_in_the_way_is_said(kind, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="cannot use"), out_folder(tmp_path / "file" / "results"):
+    with pytest.raises(InputError, match="cannot use"), kind(tmp_path / "file" / "results"):
+        pass
+    with pytest.raises(InputError, match="file"), kind(tmp_path / "file"):
         pass

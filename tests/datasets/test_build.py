@@ -18,7 +18,8 @@ from small_dataset import LONG, bytes_in, small_plan
 
 from spikecam_env.datasets import build, verify
 from spikecam_env.errors import InputError
-from spikecam_env.whole import alone_in, is_unfinished
+from spikecam_env.run_folder import alone_in
+from spikecam_env.whole import is_unfinished
 
 
 def test_the_same_call_writes_the_same_bytes_later(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ from small_dataset import LONG, bytes_in, small_plan
 from test_build import kill_first_writer
 
 from spikecam_env.datasets import build
-from spikecam_env.datasets.ray_cluster import on_ray
 from spikecam_env.errors import InputError
 
 
@@ -21,14 +20,14 @@ def test_two_workers_one_killed_write_the_bytes_of_one_process(tmp_path: Path, w
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:9", "head:x", "ray://127.0.0.1:9"])
-def test_an_address_without_a_cluster_is_refused_at_once(tmp_path: Path, address: str) -> None:
-    plan = small_plan()
+def test_an_address_without_a_cluster_is_refused_at_once_and_nothing_is_written(tmp_path: Path, address: str) -> None:
     with pytest.raises(InputError, match=f"no Ray cluster answers at '{address}'"):
-        next(on_ray(plan, tmp_path, plan.entries, 2, address))
+        build(small_plan(), tmp_path / "new" / "dataset", ray=address)
+    assert not list(tmp_path.iterdir())
 
 
 def test_without_ray_the_message_says_what_to_install(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "ray", None)
-    plan = small_plan()
     with pytest.raises(InputError, match=r"pip install 'spikecam-env\[ray\]'"):
-        next(on_ray(plan, tmp_path, plan.entries, 2, "local"))
+        build(small_plan(), tmp_path / "dataset", ray="local")
+    assert not list(tmp_path.iterdir())

@@ -14,10 +14,10 @@ import pytest
 
 from spikecam_env.cli.main import run
 from spikecam_env.errors import InputError, WriteError
+from spikecam_env.run_folder import alone_in
 from spikecam_env.whole import (
     ABANDONED_S,
     PARTIAL,
-    alone_in,
     clear_unfinished,
     is_unfinished,
     whole_file,

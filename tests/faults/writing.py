@@ -32,12 +32,14 @@ Work = dict[str, Callable[..., object]]
 class Writing:
     """A command line, in which {out}, {recording} and {campaign} are filled in.  out: name of what it writes.
 
-    work: stand-ins; `refused` lets none of it begin.
+    work: stand-ins; `refused` lets none of it begin.  resumes: whether it has its folder to itself, and goes on there
+    with what was finished before it was stopped.
     """
 
     args: str
     out: str
     work: Work
+    resumes: bool = False
 
     @property
     def is_file(self) -> bool:
@@ -74,9 +76,9 @@ def _bank(*_: object, **__: object) -> object:
 
 
 def _evaluation(_: object, **options) -> dict[str, object]:
-    from denoiser.evaluate import quick
+    from denoiser.evaluate.writing import write_result
 
-    quick._write(Path(options["out"]), {"figures": list(range(3000))})
+    write_result(Path(options["out"]), "evaluate", {"figures": list(range(3000))}, "figures\n" * 200)
     return {}
 
 
@@ -107,7 +109,6 @@ TRAINING: Work = {"denoiser.simulated:Bank.drawn": _bank, "denoiser.reconstruct.
 EVALUATION: Work = {
     "denoiser.evaluate:evaluate_quick": _evaluation,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,
-    "denoiser.evaluate.quick:report": lambda _: "figures\n" * 200,
 }
 SPIKEZOO: Work = {
     "denoiser.evaluate.spikezoo:evaluate_spikezoo": _result,
@@ -146,26 +147,34 @@ WRITINGS: dict[str, Writing] = {
     "live": Writing("live {recording} --film {out}", "live.mp4", LIVE),
     "play": Writing("play Catch-v1 --film {out}", "catch.mp4", PLAYED),
     "view": Writing("view Catch-v1 --frames 80 --save {out}", "catch.rrd", VIEWED),
-    "dataset": Writing(f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}),
-    "train": Writing("train --out {out} --steps 1 --batch 1 --patch 16", "run", TRAINING),
-    "train ssml": Writing("train --mode ssml --out {out} --steps 1 --batch 1 --patch 16 --width 12", "run", TRAINING),
+    "dataset": Writing(
+        f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}, resumes=True
+    ),
+    "train": Writing("train --out {out} --steps 1 --batch 1 --patch 16", "run", TRAINING, resumes=True),
+    "train ssml": Writing(
+        "train --mode ssml --out {out} --steps 1 --batch 1 --patch 16 --width 12", "run", TRAINING, resumes=True
+    ),
     "evaluate": Writing("evaluate quick --out {out}", "evaluation", EVALUATION),
     "evaluate table": Writing(
         f"evaluate table1 --out {{out}} --rows noisy --scenes disk --seeds 1 --frames 200 {' '.join(SMALL)}",
         "table",
         {},
+        resumes=True,
     ),
     "evaluate spikezoo": Writing("evaluate spikezoo {recordings} --out {out}", "evaluation", SPIKEZOO),
     "evaluate tasks": Writing("evaluate tasks --tasks Catch-v1 --episodes 1 --json {out}", "tasks.json", TASKS),
-    "train-agent": Writing("train-agent Catch-v1 --out {out} --steps 2 --environments 2", "agent", {}),
+    "train-agent": Writing("train-agent Catch-v1 --out {out} --steps 2 --environments 2", "agent", {}, resumes=True),
     "evaluate agents": Writing(
-        "evaluate agents --tasks Catch-v1 --observations tracker --seeds 1 --episodes 1 --out {out}", "study", {}
+        "evaluate agents --tasks Catch-v1 --observations tracker --seeds 1 --episodes 1 --out {out}",
+        "study",
+        {},
+        resumes=True,
     ),
     "evaluate truth": Writing("evaluate truth --out {out}", "evaluation", TRUTH),
     "export": Writing("export {recording} --frames 33 --out {out}", "exported", {}),
     "calibrate": Writing("calibrate {campaign} --out {out}", "calibrated", CALIBRATION),
     "campaign simulate": Writing(
-        "campaign simulate {out} --shape 16 16 --frames 400 --recording flat:radiance=0.3", "campaign", {}
+        "campaign simulate {out} --shape 16 16 --frames 400 --recording flat:radiance=0.3", "campaign", {}, resumes=True
     ),
     "campaign import": Writing(
         "campaign import {recordings} {out} --label disk.h5=unknown --frame-rate-hz 40000", "imported", {}

@@ -12,7 +12,7 @@ from spikecam_env.errors import InputError, shown
 from spikecam_env.names import file_name
 from spikecam_env.sensor.declaration import NAME
 from spikecam_env.sensor.effects import CATALOGUE, base
-from spikecam_env.whole import check_file, write_text_whole
+from spikecam_env.whole import whole_folder, write_text_whole
 
 BEGUN = "new_effect"
 """The effect of this folder: files, class and text bear its name."""
@@ -33,18 +33,27 @@ def check_new_name(name: str) -> None:
 
 
 def write_new_effect(name: str, folder: Path, *, force: bool = False) -> tuple[Path, Path]:
-    """Write NAME.py and test_NAME.py into a folder; returns their paths.
+    """Write NAME.py and test_NAME.py into a folder, made if needed: both or neither.
 
-    force: replace files of these names.  Raises InputError as `check_new_name`, and for files that are there.
+    Args:
+        name: of the effect.
+        folder: for the files.
+        force: replace files of these names.
+
+    Returns:
+        Paths of the effect and of its test.
+
+    Raises:
+        InputError: as `check_new_name` does, for files that are there already, and where they cannot be written.
     """
     check_new_name(name)
     effect, test = folder / f"{name}.py", folder / f"test_{name}.py"
-    for path in (effect, test):
-        if path.exists() and not force:
-            raise InputError(f"{path} is there already; give another name, or --force to replace it")
-        check_file(path)
-    write_text_whole(effect, _renamed(f"{BEGUN}.py", name))
-    write_text_whole(test, _renamed(f"test_{BEGUN}.py", name))
+    with whole_folder(folder, replace=True) as beside:
+        for path in (effect, test):
+            if path.exists() and not force:
+                raise InputError(f"{path} is there already; give another name, or --force to replace it")
+        write_text_whole(beside / effect.name, _renamed(f"{BEGUN}.py", name))
+        write_text_whole(beside / test.name, _renamed(f"test_{BEGUN}.py", name))
     return effect, test
 
 
