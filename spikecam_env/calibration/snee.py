@@ -31,9 +31,10 @@ from spikecam_env.calibration.response import (
 )
 from spikecam_env.calibration.spike_times import STEPS, SpikeTimes, spike_times
 from spikecam_env.campaign.reading import Campaign, CampaignRecording, read_campaign
+from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Circuit
-from spikecam_env.sensor.unit import SWING_V
+from spikecam_env.sensor.unit import MOST_KAPPA, SWING_V
 
 Array = NDArray[np.float64]
 
@@ -151,7 +152,9 @@ def calibrate(
     _check_regular(flags)
     if main.v_d is not None:
         prior = replace(prior, reset_V=prior.reference_V + main.v_d)
+    most_mV = 1e3 * MOST_KAPPA * prior.swing_V
     noise_mV = prior.thermal_noise_mV if reset_noise_mV is None else reset_noise_mV
+    noise_mV = checked_number(noise_mV, "reset_noise_mV", 0.0, most_mV, unit=f"mV, {MOST_KAPPA:g} of the swing")
     swing = swing_sd = charge = None
     if len(settings) == 2 and main.v_d is not None and settings[1].v_d is not None:
         swing, swing_sd = swing_from_two_v_d(main, settings[1])
