@@ -46,30 +46,6 @@ def distinct(names: Iterable[str], what: str) -> None:
             raise InputError(f"{what}s {same[0]!r} and {same[1]!r} are one file where case does not count; rename one")
 
 
-def each_once(values: Iterable[object], what: str) -> None:
-    """Refuse a value that a list holds more than once: of two the last would count, or the work would be done twice.
-
-    Args:
-        values: of the list; any that can be compared.
-        what: begins the error's text, e.g. "--candidates".
-
-    Raises:
-        InputError: for the first such value.
-
-    Example:
-        >>> each_once(["dead_time", "crosstalk", "dead_time"], "--candidates")
-        Traceback (most recent call last):
-            ...
-        spikecam_env.errors.InputError: --candidates: 'dead_time' is given more than once; give it once
-    """
-    seen: list[object] = []
-    for value in values:
-        if value in seen:
-            given = str(value) if isinstance(value, Path) else value
-            raise InputError(f"{what}: {shown(given)} is given more than once; give it once")
-        seen.append(value)
-
-
 def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -> Path:
     """The path that a text in a file means, relative to its folder.
 

@@ -31,10 +31,11 @@ def own_code(place: str | Callable[[], str], passing: tuple[type[BaseException],
             ...
         spikecam_env.errors.OwnCodeError: judge: SystemExit: 3
     """
+    as_they_are: tuple[type[BaseException], ...] = (OwnCodeError, KeyboardInterrupt, *passing)
     try:
         yield
         _check_streams()
-    except (OwnCodeError, KeyboardInterrupt, *passing):
+    except as_they_are:
         raise
     except BaseException as error:
         where = place if isinstance(place, str) else place()

@@ -27,9 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory
+from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory, each_once
 from spikecam_env.errors import InputError, shown, unknown_name
-from spikecam_env.names import each_once
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from spikecam_env.checked import each_once
 from spikecam_env.cli.effect_files import EffectFiles
-from spikecam_env.names import each_once
 
 if TYPE_CHECKING:
     from spikecam_env.sensor import SensorModel

@@ -9,8 +9,8 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 
+from spikecam_env.checked import each_once
 from spikecam_env.errors import InputError, shown
-from spikecam_env.names import each_once
 
 START = """spikecam: a spike camera that you can step, record and denoise.
 

@@ -21,8 +21,8 @@ from spikecam_env.checked import (
     checked_seed,
     checked_shape,
     checked_whole,
+    each_once,
 )
-from spikecam_env.names import each_once
 
 MOST_WORKERS = 1024
 """Threads or processes of a command; the largest machines have some hundreds of cores."""

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 
+from spikecam_env.checked import each_once
 from spikecam_env.errors import unknown_name
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.names import each_once
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
