@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from denoiser.given_network import check_output, has_passes
 from denoiser.network import pad_to_multiple
 from denoiser.number_type import computing_in
 from denoiser.side_by_side import side_by_side
 from denoiser.stream_network import CARRY, MULTIPLE
 from denoiser.threads import where_torch_can
 from denoiser.window import Window
+from spikecam_env.own_code import own_code
 
 
-@runtime_checkable
 class StreamPasses(Protocol):
     """A network of many planes a pass: `StreamDnSS`, or the same elsewhere than in torch."""
 
@@ -59,14 +60,15 @@ def rates_of_many(
 
 
 def _rates(
-    network: nn.Module | StreamPasses,
+    network: Any,
     windows: Sequence[Window],
     number_type: torch.dtype,
     carried: Sequence[Carried],
 ) -> list[tuple[NDArray[np.float32], Carried]]:
-    device = next(network.parameters()).device if isinstance(network, nn.Module) else torch.device("cpu")
+    weight = next(network.parameters(), None) if isinstance(network, nn.Module) else None
+    device = torch.device("cpu") if weight is None else weight.device
     with torch.inference_mode(), computing_in(number_type, device):
-        if isinstance(network, StreamPasses):
+        if has_passes(network):
             rate, kept = _side_by_side(network, windows, number_type, carried, device)
         else:
             rate, kept = _as_in_training(network, windows, number_type, carried, device)
@@ -92,8 +94,9 @@ def _as_in_training(
     spikes = torch.from_numpy(np.stack([w.spikes for w in windows])).to(device, number_type)
     planes = torch.from_numpy(np.stack([w.planes for w in windows])).to(device)
     before = tuple(torch.from_numpy(array).to(device) for array in _stacked(carried)) or None
-    rate, kept = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout), before)
-    return rate, kept or ()
+    with own_code(f"network {type(network).__name__}"):
+        found = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout), before)
+    return check_output(network, found, (len(windows), max(w.count for w in windows), *windows[0].planes.shape[1:]))
 
 
 def _side_by_side(

@@ -22,6 +22,7 @@ from torch import nn
 
 from denoiser import accumulate, infer, mus
 from denoiser.chain import Chain, Crossfade, Rates
+from denoiser.given_network import check_network, has_passes
 from denoiser.number_type import PRECISIONS, number_type
 from denoiser.on_device import DeviceChain, DeviceStreams, kept, spikes_on, unpacked_on
 from denoiser.openvino_passes import OpenvinoPasses
@@ -67,9 +68,12 @@ class OnlineDnSS:
         its maps.h5, or a `PixelMap`.
     overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`denoiser.chain`): less error,
         no seams, twice the work.
+    network: of the recipe.  A module of another class that takes and gives the same, as `torch.compile(network)`, is
+        called as it is in training; a pass then takes longer by what `spikecam bench loop` prints.
     The network is copied: training it further changes nothing here.  One object denoises one stream: for another stream
     take `another()`.
-    Errors: InputError for unknown options and unusable spikes; NotReadyError for a push after `flush`.
+    Errors: InputError for unknown options, a network of another recipe or without finite weights, and unusable spikes;
+    NotReadyError for a push after `flush`.
 
     >>> online = OnlineDnSS.pretrained("best", output="rate")
     >>> spikes = (np.random.default_rng(0).random((64, 16, 24)) < 0.2).astype(np.uint8)
@@ -91,6 +95,7 @@ class OnlineDnSS:
         overlap: bool = False,
         device: str | torch.device | None = None,
     ) -> None:
+        check_network(recipe, network)
         self.output = _checked_output(output)
         if not isinstance(precision, str) or precision not in PRECISIONS:
             raise unknown_name("precision", precision, PRECISIONS)
@@ -337,8 +342,11 @@ class OnlineDnSS:
 def _moved(network: nn.Module | infer.StreamPasses, engine: str, device: torch.device) -> nn.Module:
     if not isinstance(network, nn.Module):
         raise InputError(f"engine {engine!r} has no device; take 'torch' or 'captured', or leave device out")
-    if not isinstance(network, infer.StreamPasses):
-        raise InputError("a device takes networks of many planes a pass, as mode 'best' is; leave device out")
+    if not has_passes(network):
+        raise InputError(
+            f"a device takes networks of many planes a pass, as mode 'best' is, and no {type(network).__name__}; "
+            "leave device out"
+        )
     return network.to(device)
 
 

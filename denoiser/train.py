@@ -26,7 +26,7 @@ from torch import Tensor, nn
 from denoiser.captured import captured, checked_compiler
 from denoiser.interval_training import IntervalWindows
 from denoiser.network import DnSS
-from denoiser.recipe import RECIPES, Recipe, checked_channels, recipe_of
+from denoiser.recipe import Recipe, checked_channels, recipe_of
 from denoiser.rollout import Rollouts
 from denoiser.run import Run
 from denoiser.simulated import Bank, SimulatedStreams
@@ -34,7 +34,7 @@ from denoiser.smaller import narrowed, without_refine
 from denoiser.stream_network import StreamDnSS
 from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
-from denoiser.weights import load_weights, pretrained_path, save_weights
+from denoiser.weights import load_weights, save_weights
 from spikecam_env.errors import InputError
 from spikecam_env.run_folder import run_folder
 from spikecam_env.sensor.kernels.cuda import checked_device
@@ -240,7 +240,7 @@ def started(recipe: Recipe, start: str, seed: int, patch: int = 64) -> nn.Module
     Of a larger network a smaller one is made (`smaller`), on streams of this seed and side [pixels].  Raises InputError
     where the recipe is of another kind, or the larger one.
     """
-    found, network, _ = load_weights(_named(start))
+    found, network, _ = load_weights(start)
     alike = replace(found, decoder=recipe.decoder, channels=recipe.channels, refine=recipe.refine) == recipe
     larger = all(one >= other for one, other in zip(found.channels, recipe.channels, strict=True))
     if not alike or not larger or found.refine < recipe.refine:  # how rates become spikes is not learnt
@@ -257,15 +257,10 @@ def started(recipe: Recipe, start: str, seed: int, patch: int = 64) -> nn.Module
 
 def _teacher(recipe: Recipe, teacher: str) -> nn.Module:
     """Raises InputError for a network of other windows."""
-    found, network, _ = load_weights(_named(teacher))
+    found, network, _ = load_weights(teacher)
     if found.layout != recipe.layout:
         raise InputError(f"teacher is {teacher!r}, weights of another mode; give a file of this mode")
     return network.to(memory_format=torch.channels_last).requires_grad_(False)  # type: ignore[call-overload, no-any-return]
-
-
-def _named(weights: str) -> Path:
-    """The path of weights that are given by path, or of those that ship by the name of their mode."""
-    return pretrained_path(weights) if weights in RECIPES else Path(weights)
 
 
 def _save(config: TrainConfig, recipe: Recipe, run: Run) -> Path:

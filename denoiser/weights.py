@@ -46,12 +46,12 @@ def save_weights(
 
 
 def load_weights(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[str, Any]]:
-    """Read a checkpoint: (recipe, network in evaluation mode, training record).
+    """Read a checkpoint, or the weights of a mode that ship: (recipe, network in evaluation mode, training record).
 
     Warns where it has no digest.  Raises InputError for a missing or damaged file, a file of another kind, weights of
     another network, and weights that are not finite or not those of the digest.
     """
-    return where_torch_can(lambda: _load(path))
+    return where_torch_can(lambda: _load(weights_path(path)))
 
 
 def digest(recipe: Described, weights: Mapping[str, Tensor]) -> str:
@@ -60,7 +60,7 @@ def digest(recipe: Described, weights: Mapping[str, Tensor]) -> str:
     for name in sorted(weights):
         tensor = weights[name].detach().cpu().contiguous()
         found.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}".encode())
-        found.update(tensor.numpy().tobytes())
+        found.update(tensor.reshape(-1).view(torch.uint8).numpy().tobytes())  # numpy has no bfloat16
     return found.hexdigest()
 
 
@@ -69,6 +69,21 @@ def pretrained_path(mode: str) -> Path:
     if not isinstance(mode, str) or mode not in RECIPES:
         raise unknown_name("denoiser mode", mode, RECIPES)
     return Path(str(resources.files("denoiser") / "weights" / f"{mode}.pt"))
+
+
+def weights_path(weights: Any) -> Path:
+    """Where weights are that are given by path, or by the name of the mode that ships them.
+
+    Raises:
+        InputError: it is neither, a network for one.
+    """
+    if isinstance(weights, str) and weights in RECIPES:
+        return pretrained_path(weights)
+    if not isinstance(weights, str | os.PathLike):
+        raise InputError(
+            f"weights are given as a {type(weights).__name__}; give {', '.join(RECIPES)} or the path of a checkpoint"
+        )
+    return Path(weights)
 
 
 def write_whole(path: str | os.PathLike[str], data: Any) -> None:

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scenes.exposure import checked_interval
 from scenes.film import Film, Reading, fitted, given_times, read_array, read_film
 from scenes.keys import LONGEST_INTERVAL, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth
@@ -83,7 +84,7 @@ class VideoScene:
         times = None if times_s is None else np.asarray(times_s, np.float64)
         code = _transfer(transfer, gamma)
         how = Reading(shape, code, channel, film_rate_hz, times, slow, most_pictures, seconds)
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):  # a film too long or too short for any number is refused below
             taken = _film(film, how)
             end_s = [taken.time_s[-1] + taken.last_s] if interpolation == "hold" else []
             self._knots = np.append(taken.time_s, end_s) * float(frame_rate_hz)
@@ -252,8 +253,8 @@ def _check_choices(
         raise InputError(f"shape is {shape}; it must be (rows, columns), both at least 1")
     if most_pictures is not None and most_pictures < 2:
         raise InputError(f"most_pictures is {most_pictures}; a film has 2 or more")
-    if mean_interval is not None and not 1 <= mean_interval < np.inf:
-        raise InputError(f"mean_interval is {mean_interval}; it must be 1 frame or more, e.g. 10")
+    if mean_interval is not None:
+        checked_interval(mean_interval)
     if interpolation not in INTERPOLATIONS:
         raise unknown_name("interpolation", interpolation, INTERPOLATIONS)
     if channel not in CHANNELS:

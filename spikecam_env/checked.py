@@ -9,6 +9,7 @@ import math
 import operator
 import os
 import shutil
+from collections.abc import Iterable
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,30 @@ def checked_above_zero(value: Any, name: str) -> float:
     if not number > 0:
         raise InputError(f"{_said(name, value)}; it must be a number above 0, or inf")
     return number
+
+
+def each_once(values: Iterable[object], what: str) -> None:
+    """Refuse a value that a list holds more than once: of two the last would count, or the work would be done twice.
+
+    Args:
+        values: of the list; any that can be compared.
+        what: begins the error's text, e.g. "--candidates".
+
+    Raises:
+        InputError: for the first such value.
+
+    Example:
+        >>> each_once(["dead_time", "crosstalk", "dead_time"], "--candidates")
+        Traceback (most recent call last):
+            ...
+        spikecam_env.errors.InputError: --candidates: 'dead_time' is given more than once; give it once
+    """
+    seen: list[object] = []
+    for value in values:
+        if value in seen:
+            given = os.fspath(value) if isinstance(value, os.PathLike) else value
+            raise InputError(f"{what}: {shown(given)} is given more than once; give it once")
+        seen.append(value)
 
 
 def as_number(value: Any) -> float:

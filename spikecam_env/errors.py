@@ -3,6 +3,7 @@
 - `InputError`: a value, file or option from the user is unusable.  The message names the value, what is
   allowed, and what to do; the command line prints it in one line and exits with code 2.
 - `WriteError`: an `InputError` of a file that cannot be written: a full disk, a read-only folder.
+- `OwnCodeError`: an `InputError` of a user's own code, an effect for one, that failed or returned an unusable value.
 - `NotReadyError`: a call came before the one it needs (stepping before reset).
 
 All are subclasses of the built-in a caller would expect, so `except ValueError` or `OSError` keeps working.
@@ -33,6 +34,19 @@ class WriteError(InputError, OSError):
     Traceback (most recent call last):
         ...
     spikecam_env.errors.WriteError: cannot write nowhere/model.toml: there is no folder nowhere; make it first
+    """
+
+
+class OwnCodeError(InputError):
+    """A user's own code that failed or returned an unusable value: says where and why; `__cause__` is what it raised.
+
+    Example:
+        >>> from spikecam_env.own_code import own_code
+        >>> with own_code("effect threshold_sag, compare, frame 7"):
+        ...     1 / 0
+        Traceback (most recent call last):
+            ...
+        spikecam_env.errors.OwnCodeError: effect threshold_sag, compare, frame 7: ZeroDivisionError: division by zero
     """
 
 

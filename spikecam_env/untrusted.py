@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory
+from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory, each_once
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.locks import warn_without_locks
 
@@ -97,7 +97,7 @@ def read_json(path: str | Path) -> Any:
 def parse_json(text: str, where: str) -> Any:
     """The value in a JSON text; raises InputError where it is not one."""
     try:
-        return json.loads(text, parse_constant=_no_constant)
+        return json.loads(text, parse_constant=_no_constant, object_pairs_hook=_each_key_once)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where} is not a JSON file: {_short(error)}") from error
 
@@ -182,6 +182,7 @@ def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[st
     try:
         with zipfile.ZipFile(source) as archive:
             held = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+            each_once((info.filename for info in archive.infolist()), str(source))
             wanted = list(held) if names is None else list(names)
             missing = [name for name in wanted if name not in held]
             if missing:
@@ -340,6 +341,14 @@ def _plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode("utf-8")
     return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
+
+
+def _each_key_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        twice = next(key for number, (key, _) in enumerate(pairs) if key in dict(pairs[:number]))
+        raise ValueError(f"{shown(twice)} is given more than once in one object")
+    return table
 
 
 def _no_constant(name: str) -> Any:

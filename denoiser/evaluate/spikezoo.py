@@ -31,7 +31,7 @@ from tqdm import tqdm
 from denoiser.evaluate.restored import Weights, denoisers, restored
 from denoiser.metrics import psnr_db, ssim
 from spikecam_env.checked import checked_number
-from spikecam_env.datasets.spikezoo import RATE, find_clips, read_clip
+from spikecam_env.datasets.spikezoo import RATE, WHITES, find_clips, read_clip
 from spikecam_env.errors import InputError
 from spikecam_env.streams import middleTFP
 
@@ -54,7 +54,7 @@ def evaluate_spikezoo(
     over the clips and its spread; "clips": the same of each clip; "settings".
     Errors: InputError for a folder of another layout, a clip of fewer than 41 frames, and weights that do not load.
     """
-    rate = checked_number(rate, "rate", 0.0, above=True, unit="spikes/frame")
+    rate = checked_number(rate, "rate", *WHITES, unit="spikes/frame")
     online = denoisers(modes, weights)
     scores: list[dict[str, Any]] = []
     for clip in tqdm(find_clips(folder), desc="evaluate", unit="clip", leave=False):

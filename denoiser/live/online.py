@@ -28,8 +28,7 @@ from denoiser.live.past import Past
 from denoiser.live.ring import Ring
 from denoiser.online import OnlineDnSS
 from denoiser.pixel_map import PixelMap
-from denoiser.recipe import RECIPES
-from denoiser.weights import load_weights, pretrained_path
+from denoiser.weights import load_weights
 from denoiser.window import RollingWindow, Window
 from spikecam_env.checked import checked_count, checked_shape, checked_whole
 from spikecam_env.errors import InputError, NotReadyError
@@ -67,7 +66,7 @@ class LiveDnSS:
         room: int = ROOM,
         **options: Any,
     ) -> None:
-        recipe, network, _ = load_weights(pretrained_path(str(mode)) if mode in RECIPES else mode)
+        recipe, network, _ = load_weights(mode)
         self.shape = checked_shape(shape)
         self._layout = recipe.layout
         self._online = OnlineDnSS(recipe, network, output="rate", **options)

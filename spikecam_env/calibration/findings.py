@@ -61,10 +61,18 @@ def _rates(c: Calibration) -> list[Finding]:
     each_dark = f"each pixel to ± {Z90 * np.median(main.dark_sd[good]):.2g} (median)"
     return [
         typical("alpha/phi, mean", gain, "thresholds/frame at radiance 1", "slope of rate over light; " + each),
-        Finding("alpha/phi, spread", "identified", float(gain.std() / gain.mean()), None, "relative", "over pixels"),
+        _spread("alpha/phi, spread", gain),
         typical("I_dark/phi, mean", dark, "thresholds/frame", "rate at no light; " + each_dark),
-        Finding("I_dark/phi, spread", "identified", float(dark.std() / dark.mean()), None, "relative", "over pixels"),
+        _spread("I_dark/phi, spread", dark),
     ]
+
+
+def _spread(quantity: str, values: np.ndarray) -> Finding:
+    """Standard deviation over pixels over their mean, unless that is 0."""
+    mean = float(values.mean())
+    if mean == 0.0:
+        return Finding(quantity, "not identified", None, None, "relative", "the mean is 0")
+    return Finding(quantity, "identified", float(values.std()) / mean, None, "relative", "over pixels")
 
 
 def _noise(c: Calibration) -> list[Finding]:

@@ -126,9 +126,11 @@ def _residuals(figure: Figure, s: Setting, c: Calibration) -> None:
     z = s.residual[:, good]
     z = z[np.isfinite(z)]
     edges = np.linspace(-5, 5, 81)
-    left.hist(np.clip(z, -5, 5), edges, density=True, color="tab:blue", alpha=0.7)
     left.plot(edges, np.exp(-(edges**2) / 2) / np.sqrt(2 * np.pi), "k", lw=1)
-    left.set(xlabel="residual [sd]", title=f"rms {np.sqrt(np.mean(z**2)) if z.size else 0:.3f}")
+    left.set(xlabel="residual [sd]", title="two levels leave no residuals")
+    if z.size:
+        left.hist(np.clip(z, -5, 5), edges, density=True, color="tab:blue", alpha=0.7)
+        left.set(title=f"rms {np.sqrt(np.mean(z**2)):.3f}")
     image = right.imshow(s.chi2, vmin=0, vmax=3, interpolation="nearest", cmap="viridis")
     figure.colorbar(image, ax=right, label="reduced chi²")
 
@@ -193,8 +195,9 @@ def _swing(figure: Figure, s: Setting, c: Calibration) -> None:
 
 def _normal_histogram(axis: Axes, values: NDArray[np.float64], label: str) -> None:
     axis.hist(values, 60, density=True, color="tab:blue", alpha=0.6)
-    x = np.linspace(values.min(), values.max(), 200)
-    axis.plot(
-        x, np.exp(-((x - values.mean()) ** 2) / (2 * values.var())) / np.sqrt(2 * np.pi * values.var()), "k", lw=1
-    )
+    if values.var() > 0:
+        x = np.linspace(values.min(), values.max(), 200)
+        axis.plot(
+            x, np.exp(-((x - values.mean()) ** 2) / (2 * values.var())) / np.sqrt(2 * np.pi * values.var()), "k", lw=1
+        )
     axis.set(xlabel=label, title=f"{values.mean():.4g} ± {values.std():.2g} (sd)")

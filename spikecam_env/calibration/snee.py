@@ -7,6 +7,7 @@ alpha, C_S and I_dark in ampere stay prior: rates know charge only in thresholds
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,13 +20,26 @@ from tqdm import tqdm
 from spikecam_env.calibration.charge import ChargeScale, charge_at_one_v_d, charge_at_two_v_d
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
 from spikecam_env.calibration.population import FLAGS, pixel_flags
-from spikecam_env.calibration.response import Lines, Rates, fit_lines, rates_from_counts, rates_from_times, together
+from spikecam_env.calibration.response import (
+    SATURATION,
+    Lines,
+    Rates,
+    fit_lines,
+    rates_from_counts,
+    rates_from_times,
+    together,
+)
 from spikecam_env.calibration.spike_times import STEPS, SpikeTimes, spike_times
 from spikecam_env.campaign.reading import Campaign, CampaignRecording, read_campaign
+from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Circuit
+from spikecam_env.sensor.unit import MOST_KAPPA, SWING_V
 
 Array = NDArray[np.float64]
+
+SAME_V_D_V = 1e-6
+"""Distance up to which two V_d are one [V]: far below what a supply sets, far above the rounding of labels."""
 
 Z90 = 1.6448536
 """Half-width of a 90 % interval [standard deviations]."""
@@ -115,7 +129,8 @@ def calibrate(
 
     circuit: prior for what rates cannot say (capacitance, reference voltage); default the published one.
     reset_noise_mV: prior for the reset noise, used where there is one V_d; default thermal, sqrt(kT/C).
-    Raises InputError where nothing can be identified: one level only, all dark, labels that contradict the rates.
+    Raises InputError where nothing can be identified: one level only, all dark, all saturated, no regular pixel, labels
+    that contradict the rates.
 
     >>> from spikecam_env.sensor import SensorModel
     >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
@@ -133,16 +148,27 @@ def calibrate(
     settings.sort(key=lambda s: -sum(level.use == "fit" for level in s.levels))
     settings = settings[:2]
     main = settings[0]
-    flags = main.flags
+    flags = np.bitwise_or.reduce([main.flags, *(s.flags & FLAGS["unidentified"] for s in settings[1:])])
+    _check_regular(flags)
     if main.v_d is not None:
         prior = replace(prior, reset_V=prior.reference_V + main.v_d)
+    most_mV = 1e3 * MOST_KAPPA * prior.swing_V
     noise_mV = prior.thermal_noise_mV if reset_noise_mV is None else reset_noise_mV
+    noise_mV = checked_number(noise_mV, "reset_noise_mV", 0.0, most_mV, unit=f"mV, {MOST_KAPPA:g} of the swing")
     swing = swing_sd = charge = None
     if len(settings) == 2 and main.v_d is not None and settings[1].v_d is not None:
         swing, swing_sd = swing_from_two_v_d(main, settings[1])
         known = np.where(flags == 0, swing, np.nan).reshape(-1)
-        prior = replace(prior, bias_V=float(np.nanmean(known)) - main.v_d)
-        charge = charge_at_two_v_d(main.jitter, settings[1].jitter, known, known - main.v_d + settings[1].v_d)
+        others = known - main.v_d + settings[1].v_d
+        if _are_swings(known) and _are_swings(others):
+            prior = replace(prior, bias_V=float(np.nanmean(known)) - main.v_d)
+            charge = charge_at_two_v_d(main.jitter, settings[1].jitter, known, others)
+        else:
+            swing = swing_sd = None
+            warnings.append(
+                f"V_d = {main.v_d:g} and {settings[1].v_d:g} V give no swing from {SWING_V[0]:g} to {SWING_V[1]:g} V: "
+                "they are too near each other, or their labels are wrong; V_S, N and kappa are as of one V_d"
+            )
     if charge is None:
         charge = charge_at_one_v_d(main.jitter, prior.swing_V, noise_mV)
     return Calibration(
@@ -157,6 +183,18 @@ def calibrate(
         prior,
         tuple(warnings),
     )
+
+
+def _are_swings(swing_V: Array) -> bool:
+    """Whether the mean of the pixels that are known, of which there are some, is a swing that a circuit can have."""
+    return bool(SWING_V[0] <= np.nanmean(swing_V) <= SWING_V[1])
+
+
+def _check_regular(flags: NDArray[np.uint8]) -> None:
+    if np.any(flags == 0):
+        return
+    counts = ", ".join(f"{int(np.sum(flags & bit > 0))} {name}" for name, bit in FLAGS.items())
+    raise InputError(f"no pixel is regular ({counts} of {flags.size}): nothing can be said of this camera; record anew")
 
 
 def swing_from_two_v_d(one: Setting, other: Setting) -> tuple[Array, Array]:
@@ -181,12 +219,18 @@ def _by_v_d(campaign: Campaign, warnings: list[str]) -> dict[float | None, list[
         if light is None:
             warnings.append(f"{recording.name}: not used, its light is unknown or moves")
         else:
-            groups.setdefault(recording.v_d, []).append((recording, light))
+            groups.setdefault(_alike(groups, recording.v_d), []).append((recording, light))
     if not groups:
         raise InputError(f"{campaign.folder} has no static recording of known light; SNEE needs flats at known levels")
     if len(groups) > 2:
         warnings.append(f"{len(groups)} values of v_d; the two with most recordings are used")
     return groups
+
+
+def _alike(known: Iterable[float | None], v_d: float | None) -> float | None:
+    """A V_d of those that are known, where it is this one but for SAME_V_D_V; else this one."""
+    near = (one for one in known if one is not None and v_d is not None and abs(one - v_d) <= SAME_V_D_V)
+    return next(near, v_d)
 
 
 def _fit_setting(
@@ -217,6 +261,11 @@ def _fit_setting(
         warnings.append("no spike times: temporal noise is not identified; intervals assume s^2 of shot noise alone")
     white = jitter.white if jitter else 1.0 / Circuit().threshold_electrons
     lines = fit_lines(light, rates, white, use)
+    if not np.any(np.isfinite(lines.gain)):
+        raise InputError(
+            f"no pixel has two levels{_at(v_d)} below saturation, {SATURATION:g} spikes a frame; "
+            "add flats of less light"
+        )
     excess = _pooled_excess(lines)
     if lines.freedom.max() == 0:
         warnings.append("two levels only: that rate is linear in light is assumed, not tested")
@@ -250,7 +299,7 @@ def _fit_setting(
 
 
 def _check_levels(light: Array, v_d: float | None) -> None:
-    at = "" if v_d is None else f" at v_d = {v_d:g} V"
+    at = _at(v_d)
     if light.size == 0 or light.max() <= 0:
         raise InputError(f"all fit recordings{at} are dark: the response to light cannot be identified; add a lit flat")
     if np.all(light == light[0]):
@@ -260,6 +309,10 @@ def _check_levels(light: Array, v_d: float | None) -> None:
         )
 
 
+def _at(v_d: float | None) -> str:
+    return "" if v_d is None else f" at v_d = {v_d:g} V"
+
+
 def _check_order(
     recordings: list[tuple[CampaignRecording, Array]], light: Array, rates: Rates, use: NDArray[np.bool_]
 ) -> None:
@@ -267,7 +320,14 @@ def _check_order(
     label, rate = np.median(light, axis=1), np.nanmedian(rates.rate, axis=1)
     lit = rate[use & (label > 0)]
     if lit.size and lit.max() <= 2 / rates.frames.max():
-        raise InputError("no pixel responds to light in any recording: was the cap on, or are these the right files?")
+        best = np.nanmax(rates.rate[use & (label > 0)], axis=0)
+        some = int(np.sum(best > 2 / rates.frames.max()))
+        pixels = (
+            f"all but {some} pixels respond to light in no recording"
+            if some
+            else "no pixel responds to light in any recording"
+        )
+        raise InputError(f"{pixels}: was the cap on, or are these the right files?")
     order = np.argsort(label, kind="stable")
     for a, b in pairwise(order):
         if label[b] > label[a] and rate[b] < 0.99 * rate[a] - 2 / min(rates.frames[a], rates.frames[b]):

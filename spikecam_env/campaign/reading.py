@@ -17,15 +17,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from spikecam_env.checked import checked_count, checked_memory, checked_shape
 from spikecam_env.errors import InputError
 from spikecam_env.names import distinct, file_name, inside
 from spikecam_env.sensor import Keyframes
+from spikecam_env.sensor.model import FRAME_RATES_HZ
 from spikecam_env.streams.packing import packed_bytes, unpack_frames
 from spikecam_env.untrusted import (
     Count,
@@ -133,7 +135,7 @@ class Campaign:
 class _Camera(Declared):
     height: Side
     width: Side
-    frame_rate_hz: Positive
+    frame_rate_hz: Annotated[float, Field(ge=FRAME_RATES_HZ[0], le=FRAME_RATES_HZ[1])]
 
 
 class _Entry(Declared):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from spikecam_env.checked import each_once
 from spikecam_env.cli.effect_files import EffectFiles
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ class Camera:
         from spikecam_env.cli.named import named
         from spikecam_env.sensor import CATALOGUE, SensorModel
 
+        each_once((text.partition(":")[0] for text in self.effect), "--effect")
         model = SensorModel.load(self.model)
         for name in self.without:
             model = model.without(name)

@@ -50,7 +50,7 @@ def say(text: str) -> None:
     """Write a line on standard error.  Nothing is written to a closed stream, or once a signal has come."""
     if stopping.is_stopping():
         return
-    with suppress(OSError):
+    with suppress(OSError, ValueError):  # ValueError: a user's code has closed the stream
         print(f"spikecam: {text}", file=sys.stderr, flush=True)
 
 
@@ -66,6 +66,8 @@ def _is_unread() -> bool:
 
 def _flushed(code: int) -> int:
     """The exit code, once what was printed has been written; output that nobody takes is dropped."""
+    if sys.stdout.closed:  # by a user's code, which the command has refused
+        return code
     try:
         sys.stdout.flush()
     except OSError as error:

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
+from spikecam_env.checked import LARGEST_COUNT
 from spikecam_env.cli.camera import Camera
 from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
 from spikecam_env.errors import InputError
 
 if TYPE_CHECKING:
     from scenes import VideoScene
+
+MOST_OFF = 0.25
+"""Share by which spikes may differ from what the mean interval asks without a warning; four standard deviations of
+their number come to it."""
 
 
 @dataclass
@@ -86,6 +92,7 @@ class FilmToSpikes:
         attributes |= {"film": self.film.name, "transfer": scene.transfer, "gain": scene.gain}
         what = f"record {self.film.name}"
         spikes = record_scene(self.out, scene, sensor, frames, what, attributes, self.truth_every)
+        self._warn_if_off(frames * math.prod(self.size), spikes)
         done = self._done(scene, frames, sensor.engine, spikes)
         print(table([{"film to spikes": name, "": value} for name, value in done.items()]))
 
@@ -93,6 +100,8 @@ class FilmToSpikes:
         """Errors: InputError for less than one, and where both options say it."""
         if self.frames is not None and self.seconds is not None:
             raise InputError(f"--frames {self.frames} --seconds {self.seconds:g}; give one of the two")
+        if self.seconds is not None and not self.seconds * rate_hz <= LARGEST_COUNT:
+            raise InputError(f"--seconds {self.seconds:g} are more frames than can be counted; give fewer")
         asked = self.frames if self.seconds is None else round(self.seconds * rate_hz)
         if asked is not None and asked < 1:
             raise InputError(f"{asked} frames are asked; record at least 1")
@@ -108,6 +117,19 @@ class FilmToSpikes:
                 f"{asked} frames are asked; {self.film} lasts {whole} ({scene.frames / scene.frame_rate_hz:.4g} s)"
             )
         return whole if asked is None else asked
+
+    def _warn_if_off(self, pixels: int, spikes: int) -> None:
+        """Say where spikes are far from the mean interval that was asked.  pixels: of all frames together."""
+        asked = pixels / self.mean_interval
+        if abs(spikes - asked) <= MOST_OFF * asked + 4.0 * math.sqrt(asked):
+            return
+        why = (
+            "dark current and noise fire besides light that is so faint"
+            if spikes > asked
+            else "a pixel fires once a frame at most, however bright its light, and effects of the model take light"
+        )
+        got = f"{pixels / spikes:.4g}" if spikes else "no spike"
+        warnings.warn(f"--mean-interval {self.mean_interval:g} became {got}: {why}", UserWarning, stacklevel=2)
 
     def _done(self, scene: VideoScene, frames: int, engine: str, spikes: int) -> dict[str, Any]:
         pixels = frames * math.prod(self.size)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 
+from spikecam_env.checked import each_once
 from spikecam_env.errors import InputError, shown
 
 START = """spikecam: a spike camera that you can step, record and denoise.
@@ -25,25 +26,35 @@ ALWAYS = ("help",)
 """Options of every command."""
 OF_THE_PARSER = "tyro-"
 """How the names of options begin that the parser adds, such as --tyro-print-completion."""
+APPENDS = get_args(tyro.conf.UseAppendAction[str])[1]
+"""Marks options that may be repeated."""
 
 
 def check_words(args: Sequence[str], commands: Mapping[str, type]) -> None:
-    """Raises InputError for the first word that is no command, and for the first option that the command does not have.
+    """Raises InputError for the first word that is no command, and for the first option that the command does not have,
+    or that is given more than once and may not be.
 
     args: the command line, without the program's name.  commands: the class of options of each command, which may hold
     commands of its own.
     """
     said, choices, options = "spikecam", dict(commands), set(ALWAYS)
+    given: list[str] = []
+    repeatable: set[str] = set()
     for word in args:
         if choices and not word.startswith("-"):
             if word not in choices:
                 raise _unknown_command(said, word, choices)
             chosen = choices[word]
             said, choices, options = f"{said} {word}", commands_of(chosen), set(ALWAYS).union(options_of(chosen))
+            repeatable = repeatable_of(chosen)
         elif word.startswith("--") and not choices:
             name = word[2:].partition("=")[0].replace("_", "-")
             if name and name not in options and not name.startswith(OF_THE_PARSER):
                 raise _unknown_option(said, name, options)
+            switch = name.removeprefix("no-") if f"no-{name.removeprefix('no-')}" in options else name
+            if switch not in repeatable:
+                given.append(f"--{switch}")
+    each_once(given, f"`{said}`")
 
 
 def _unknown_command(said: str, word: str, choices: Iterable[str]) -> InputError:
@@ -68,6 +79,19 @@ def commands_of(options: type) -> dict[str, type]:
                 kind, *marks = get_args(part)
                 found |= {mark.name: kind for mark in marks if getattr(mark, "name", None)}
     return found
+
+
+def repeatable_of(options: Any) -> set[str]:
+    """Names of those options of a command that may be given more than once, each time another value."""
+    hints = get_type_hints(options, include_extras=True)
+    names: set[str] = set()
+    for field in fields(options):
+        hint = hints[field.name]
+        if is_dataclass(hint):
+            names |= repeatable_of(hint)
+        elif APPENDS in get_args(hint):
+            names.add(field.name.replace("_", "-"))
+    return names
 
 
 def options_of(options: Any) -> set[str]:

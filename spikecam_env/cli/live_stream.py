@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from spikecam_env.streams.sources import Source
 
 MOST_PICTURES_S = 1000.0
+SLOWEST, FASTEST = 1e-6, 1e6
+"""Speeds of a file or a scene: a frame in 25 s, and more frames a second than any machine takes in."""
 
 
 @dataclass
@@ -45,7 +47,7 @@ class Live:
     """End after so many frames."""
     seconds: Positive | None = None
     """End after so long."""
-    speed: Positive | None = None
+    speed: Annotated[float | None, Checked(checked_number, least=SLOWEST, most=FASTEST)] = None
     """Speed of a file or a scene.  Default: 1, real time, the camera's frame rate of 40 000 frames a second."""
     loop: bool = False
     """Begin a file again when it is over."""

@@ -16,7 +16,8 @@ def named(text: str, catalogue: Mapping[str, type[Any]], kind: str) -> Any:
     >>> named("dead_time:tau_us=0.2", CATALOGUE, "effect")
     DeadTime(tau_us=0.2)
 
-    Errors: InputError for an unknown name or parameter, a value of another type, and one that is missing.
+    Errors: InputError for an unknown name or parameter, a value of another type, and one that is missing
+    or given twice.
     """
     name, _, rest = text.partition(":")
     if name not in catalogue:
@@ -27,6 +28,8 @@ def named(text: str, catalogue: Mapping[str, type[Any]], kind: str) -> Any:
         key, equals, value = (word.strip() for word in part.partition("="))
         if key not in known:
             raise unknown_name(f"parameter of {name}", key, known)
+        if key in values:
+            raise InputError(f"{kind} {shown(text)}: {key} is given more than once; give it once")
         if not equals:
             raise InputError(f"{kind} {shown(text)}: {key} has no value; write {name}:{key}=...")
         values[key] = _value(value, known[key], f"{name}.{key}")

@@ -4,7 +4,7 @@
     rpm: Annotated[float | None, Checked(checked_number, most=1e9)] = None
 
 The check is the library's own, with the option's name for the value's.  Options without a check of their own are held
-to what every one of them must be: numbers are finite.
+to what every one of them must be: numbers are finite, and a list names nothing twice.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from spikecam_env.checked import (
     checked_seed,
     checked_shape,
     checked_whole,
+    each_once,
 )
 
 MOST_WORKERS = 1024
@@ -71,6 +72,8 @@ def _check(value: Any, hint: Any, name: str) -> None:
         mark.check(value, name, **mark.limits)
     if not checks:
         _check_finite(value, name)
+    if isinstance(value, tuple) and _is_list(hint):
+        each_once(value, name)
 
 
 def _check_finite(value: Any, name: str) -> None:
@@ -81,6 +84,11 @@ def _check_finite(value: Any, name: str) -> None:
         checked_number(value, name)
     elif isinstance(value, int) and not isinstance(value, bool):
         checked_whole(value, name)
+
+
+def _is_list(hint: Any) -> bool:
+    """Whether a type is `tuple[X, ...]`, annotated, or in a union."""
+    return (get_origin(hint) is tuple and Ellipsis in get_args(hint)) or any(map(_is_list, get_args(hint)))
 
 
 def _marks(hint: Any) -> list[Any]:

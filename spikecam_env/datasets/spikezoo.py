@@ -29,6 +29,9 @@ from spikecam_env.whole import whole_file
 
 RATE = 0.6
 """Spikes a frame of white, in its REDS clips: mean rate over mean picture is 0.597 in the one measured."""
+WHITES = (1e-3, 10.0)
+"""Least and greatest white [spikes/frame]: below, every spike is white; above, all that a pixel reports, one spike a
+frame, is a tenth of white and less."""
 CLIP_FRAMES = 301
 """Frames of its REDS clips."""
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
@@ -82,10 +85,10 @@ def write_clip(
     """Write a clip into spike/ and gt/ of a folder; returns the share of pixels whose light is cut at white.
 
     spikes: (T, H, W).  light: (H, W) at frame T // 2 [spikes/frame]; `rate` of it is white.
-    Raises InputError for a name that is no file's, a rate that is not above 0, and frames of no whole bytes, which
+    Raises InputError for a name that is no file's, a rate out of range (WHITES), and frames of no whole bytes, which
     Spike-Zoo cannot read.
     """
-    rate = checked_number(rate, "rate", 0.0, above=True, unit="spikes/frame")
+    rate = checked_number(rate, "rate", *WHITES, unit="spikes/frame")
     file_name(name, "clip name")
     if light.size % 8:
         raise InputError(f"frames have {light.shape[0]} x {light.shape[1]} pixels; Spike-Zoo reads multiples of 8")

@@ -16,10 +16,10 @@ from scenes.exposure import lit
 from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
-from spikecam_env.checked import checked_number, checked_shape
+from spikecam_env.checked import as_number, checked_number, checked_shape
 from spikecam_env.envs.motor import turned
 from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
-from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
+from spikecam_env.errors import InputError, NotReadyError, OwnCodeError, shown, unknown_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
 
 MakeScene = Callable[[np.random.Generator, dict[str, Any]], Scene]
@@ -117,7 +117,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._gaze = Gaze.fixed(0.0, 0.0)  # the path of the block that is exposed last, or next
         self._recent: list[NDArray[np.uint8]] = []
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        picture = self.observation.space(self.view)
+        picture = self._picture_space = self.observation.space(self.view)
         self.observation_space: spaces.Space[Any] = with_state_space(picture) if obs_state else picture
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -166,8 +166,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def outcome(self) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """What `step` returns, once the block is exposed."""
         observation, info = self._shown()
-        reward, terminated = self._judge(self._drawn, self.sensor.frame, self._gaze)
-        return observation, float(reward), bool(terminated), False, info
+        reward, terminated = _checked_verdict(self._judge(self._drawn, self.sensor.frame, self._gaze))
+        return observation, reward, terminated, False, info
 
     def render(self) -> NDArray[np.uint8] | None:
         """(H, W, 3) uint8, or None without a render mode."""
@@ -263,6 +263,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def _shown(self) -> tuple[Any, dict[str, Any]]:
         """What is seen of the last block, and what is known of it."""
         picture, self._seen = self.observation.step(self.blocks, self._seen)
+        _check_picture(picture, self._picture_space, self.observation)
         age = float(np.asarray(self.observation.age(self._seen)).reshape(-1)[0])
         info = self._info() | {"age": age}
         if not self.obs_state:
@@ -295,11 +296,32 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def _checked(self, scene: Scene) -> Scene:
         rate = self.model.frame_rate_hz
+        if not isinstance(scene, Scene):
+            raise OwnCodeError(f"make_scene returned a {type(scene).__name__}; it must return a scene (scenes.Scene)")
         if (scene.shape, scene.frame_rate_hz) != (self.shape, rate):
             raise InputError(
                 f"the scene is {scene.shape} at {scene.frame_rate_hz} Hz; the camera {self.shape} at {rate} Hz"
             )
         return scene
+
+
+def _checked_verdict(found: Any) -> tuple[float, bool]:
+    """What a judge returned.  Raises OwnCodeError unless it is a finite reward and whether the episode is over."""
+    reward, terminated = found if isinstance(found, tuple) and len(found) == 2 else (None, None)
+    number = as_number(reward)
+    if not isfinite(number) or not isinstance(terminated, bool | np.bool_ | int):
+        raise OwnCodeError(f"judge returned {shown(found)}; it must return (reward, terminated): a number and a bool")
+    return number, bool(terminated)
+
+
+def _check_picture(picture: Any, space: spaces.Space[Any], law: Observation) -> None:
+    """Raise OwnCodeError where an observation is not one of its own space: arrays (1, ...) of its shape and type."""
+    shape, dtype = getattr(picture, "shape", None), getattr(picture, "dtype", None)
+    if space.shape is not None and (shape != (1, *space.shape) or dtype != space.dtype):
+        raise OwnCodeError(
+            f"observation {type(law).__name__}: step returned {dtype} of shape {shape}; its space has {space.dtype} of "
+            f"{(1, *space.shape)}"
+        )
 
 
 def expose(

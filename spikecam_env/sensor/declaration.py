@@ -12,6 +12,7 @@ from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor.effect_sheet import Sheet
 from spikecam_env.sensor.effects.base import Effect, Stage
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.own_hooks import CHECKS
 
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 COUNTED = ("pixels", "spikes", "frames")
@@ -28,6 +29,8 @@ def check_declaration(effect: type[Effect]) -> None:
         raise unknown_name(f"strength of {effect.name}", getattr(effect, "strength", None), known)
     if isinstance(known[effect.strength].default, bool):
         raise _wrong(effect, f"its strength {effect.strength} is a switch; a strength is a number")
+    if not any(effect.overrides(hook) for hook in CHECKS):
+        raise _wrong(effect, f"it has no hook, so that it does nothing; write one of {', '.join(CHECKS)}")
     Sheet.of(effect)
     _made(effect, {})
     _made(effect, {effect.strength: effect.neutral})

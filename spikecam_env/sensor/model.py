@@ -27,6 +27,9 @@ FORMAT = "spikecam-model/1"
 PRESETS = ("ideal", "measured", "physical", "scsim")
 
 
+FRAME_RATES_HZ = (1.0, 1e6)
+"""Lowest and highest frame rate of a camera [Hz]."""
+
 _CIRCUIT = {f.name for f in fields(Circuit)}
 
 
@@ -60,7 +63,7 @@ class SensorModel:
 
     name: str
     circuit: Circuit
-    frame_rate_hz: float = parameter(unit="Hz (40000 for a Vidar)", bounds=(1.0, 1e6), doc="frames a second")
+    frame_rate_hz: float = parameter(unit="Hz (40000 for a Vidar)", bounds=FRAME_RATES_HZ, doc="frames a second")
     effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:

@@ -18,7 +18,6 @@ import importlib
 import inspect
 import os
 import sys
-import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -28,8 +27,10 @@ from types import ModuleType
 from typing import Any
 
 from spikecam_env.errors import InputError
+from spikecam_env.own_code import in_a_line, line_in, own_code
 from spikecam_env.sensor.declaration import check_declaration
 from spikecam_env.sensor.effects import CATALOGUE, Effect
+from spikecam_env.sensor.own_hooks import guard
 from spikecam_env.untrusted import read_text
 
 GROUP = "spikecam.effects"
@@ -100,7 +101,7 @@ def load_installed_effects() -> tuple[type[Effect], ...]:
             for effect in effects:
                 register(effect)
         except Exception as error:
-            warnings.warn(f"effects of {entry.name} = {entry.value} are left out: {_last_line(error)}", stacklevel=2)
+            warnings.warn(f"effects of {entry.name} = {entry.value} are left out: {in_a_line(error)}", stacklevel=2)
         else:
             loaded += effects
     return tuple(loaded)
@@ -117,6 +118,7 @@ def register(effect: type[Effect]) -> None:
     if known is not effect and (file_of(known) is None or file_of(known) != file_of(effect)):
         raise InputError(f"there is an effect {effect.name} already ({_home(known)}); give the class another name")
     check_declaration(effect)
+    guard(effect)  # again: a decorator may have given the class more hooks
     copyreg.pickle(effect, _reduced)
     _set_catalogue({**CATALOGUE, effect.name: effect})
 
@@ -148,11 +150,10 @@ def _module_of(source: Path, text: str) -> ModuleType:
     module.__file__, module.__dict__["__source__"] = str(source), text
     sys.modules[name] = module  # dataclasses look their module up while it is run
     try:
-        exec(compile(text, str(source), "exec"), module.__dict__)
-    except BaseException as error:
+        with own_code(lambda: f"{source}{_line_in(source)}"):
+            exec(compile(text, str(source), "exec"), module.__dict__)
+    except BaseException:
         del sys.modules[name]
-        if isinstance(error, Exception | SystemExit):
-            raise InputError(f"{source}{_line_in(source, error)}: {_last_line(error)}") from error
         raise
     return module
 
@@ -163,15 +164,11 @@ def _effects_in(module: ModuleType) -> Iterator[type[Effect]]:
             yield value
 
 
-def _line_in(source: Path, error: BaseException) -> str:
-    if isinstance(error, SyntaxError):
-        return f", line {error.lineno}"
-    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(source)]
-    return f", line {lines[-1]}" if lines else ""
-
-
-def _last_line(error: BaseException) -> str:
-    return "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
+def _line_in(source: Path) -> str:
+    """Where the exception that is being handled passed an effect file."""
+    error = sys.exc_info()[1]
+    line = None if error is None else line_in(str(source), error)
+    return f", line {line}" if line else ""
 
 
 def _home(effect: type[Effect]) -> str:

@@ -133,7 +133,7 @@ def test_record_has_a_frame_rate_of_its_own(tmp_path: Path) -> None:
         (("p", "--film-rate", "100", "--slow", "2"), "one of film_rate_hz, times_s and slow"),
         (("p", "--film-rate", "100", "--transfer", "log"), "unknown transfer 'log'"),
         (("p", "--film-rate", "100", "--channel", "red"), "the pictures are grey"),
-        (("p", "--film-rate", "100", "--mean-interval", "0.5"), "mean_interval is 0.5"),
+        (("p", "--film-rate", "100", "--mean-interval", "0.5"), "mean_interval = 0.5"),
         (("p", "--film-rate", "100", "--mean-interval", "nan"), "--mean-interval nan; it must be"),
         (("p", "--film-rate", "100", "--frames", "0"), "--frames 0; it must be"),
         (("p", "--film-rate", "100", "--frames", "9999"), "p lasts 800 (0.02 s)"),

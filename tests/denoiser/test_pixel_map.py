@@ -41,13 +41,75 @@ def test_files_hold_the_same_map(calibration, tmp_path):
     OnlineDnSS.pretrained("best", unit=tmp_path).push(np.zeros((1, *SHAPE), np.uint8))
 
 
-def test_pixels_that_are_not_known_get_the_median():
+def maps_file(path, gain, dark):
+    """A maps.h5 of `spikecam calibrate`, with these values."""
+    with h5py.File(path, "w") as file:
+        file.attrs["format"] = "spikecam-maps/1"
+        file["setting_0/gain"], file["setting_0/dark"] = gain, dark
+    return path
+
+
+ODD_GAINS = [(gain, 0.001) for gain in (np.nan, -0.1, 0.0, np.inf, 1e300, 0.9)]
+ODD_DARKS = [(0.002, dark) for dark in (np.nan, np.inf, 7.0, -3.0)]
+
+
+@pytest.mark.parametrize("wrong", [*ODD_GAINS, *ODD_DARKS])
+def test_a_pixel_that_is_not_known_or_odd_gets_the_median(wrong, tmp_path):
     gain, dark = np.full((2, 3), 0.002), np.full((2, 3), 0.001)
-    gain[0, 0], dark[1, 2] = np.nan, np.inf
-    found = PixelMap._measured(gain, dark)
+    gain[0, 0], dark[0, 0] = wrong
+    found = PixelMap.of(maps_file(tmp_path / "maps.h5", gain, dark))
     assert np.allclose(found.gain, 1.0) and np.allclose(found.dark, 0.001)
-    with pytest.raises(InputError, match="no pixel"):
-        PixelMap._measured(np.full((2, 2), np.nan), np.zeros((2, 2)))
+
+
+WHOLE = np.full((2, 3), 0.002)
+REFUSED = {
+    "NaN": (WHOLE * np.nan, WHOLE),
+    "negative": (-WHOLE, WHOLE),
+    "infinite": (WHOLE * np.inf, WHOLE),
+    "zero": (0 * WHOLE, WHOLE),
+    "far too large": (WHOLE * 1e40, WHOLE),
+    "dark NaN": (WHOLE, WHOLE * np.nan),
+    "dark negative": (WHOLE, -100 * WHOLE),
+    "dark above 1": (WHOLE, 1000 * WHOLE),
+    "most of it": (np.where(np.arange(3) < 2, np.nan, WHOLE), WHOLE),
+    "another shape": (WHOLE, WHOLE[:1]),
+    "one row": (WHOLE[0], WHOLE[0]),
+    "whole numbers": (WHOLE.astype(int) + 1, WHOLE),
+    "complex": (WHOLE.astype(complex), WHOLE),
+    "nothing": (np.zeros((0, 3)), np.zeros((0, 3))),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_file_of_values_that_no_calibration_gives_is_refused(name, tmp_path):
+    path = maps_file(tmp_path / "maps.h5", *REFUSED[name])
+    with pytest.raises(InputError, match=r"maps\.h5: ") as caught:
+        OnlineDnSS.pretrained("best", unit=path)
+    print(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+GAIN, DARK = np.ones((2, 3)), np.full((2, 3), 0.01)
+PAIRS = {
+    "NaN": (np.where(np.arange(3) == 1, np.nan, GAIN), DARK, r"gain nan at pixel \(0, 1\); it must be a number"),
+    "infinite": (GAIN * np.inf, DARK, "gain inf at pixel"),
+    "negative": (-GAIN, DARK, "gain -1 at pixel"),
+    "zero": (0 * GAIN, DARK, "gain 0 at pixel"),
+    "in another unit": (50 * GAIN, DARK, "mean 50; they are relative to the mean pixel"),
+    "dark above 1": (GAIN, 2 + DARK, "dark 2.01 at pixel"),
+    "dark negative": (GAIN, -DARK, "dark -0.01 at pixel"),
+    "true": (GAIN > 0, DARK, "holds bool"),
+    "complex": (GAIN * 1j, DARK, "holds complex128"),
+    "objects": (np.full((2, 3), None), DARK, "holds object"),
+    "text": (GAIN.astype(str), DARK, "holds <U"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_pair_of_maps_out_of_range_is_refused_with_the_pixel(name):
+    gain, dark, said = PAIRS[name]
+    with pytest.raises(InputError, match=said):
+        OnlineDnSS.pretrained("best", unit=(gain, dark))
 
 
 def test_files_that_hold_no_map_are_refused_in_one_line(tmp_path):

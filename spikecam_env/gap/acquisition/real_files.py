@@ -32,10 +32,17 @@ from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.gap.acquisition.labels import READING, RELATIVE, UNKNOWN, Label
 from spikecam_env.names import file_name, inside
 from spikecam_env.sensor import Keyframes
+from spikecam_env.sensor.model import FRAME_RATES_HZ
 from spikecam_env.streams import read_recording
 from spikecam_env.streams.recording import ENDINGS, reading_options
 from spikecam_env.untrusted import array_names
 from spikecam_env.whole import whole_folder
+
+RADIANCES_PER_UNIT = (1e-12, 1e12)
+"""Least and greatest radiance of a label of 1: lux, photons or a lamp's own scale are far within."""
+
+FAINTEST = 1e-12
+"""Least radiance of a label that is not 0, dark: a spike in a year."""
 
 _FRAMES_AT_ONCE = 256
 """Frames written at once."""
@@ -92,8 +99,9 @@ def import_campaign(
         raise InputError(
             f"no labels: say of each recording what it was shown, a number or `unknown`; {_listing(source)}"
         )
-    frame_rate_hz = None if frame_rate_hz is None else checked_number(frame_rate_hz, "frame_rate_hz", 0.0, above=True)
-    radiance_per_unit = checked_number(radiance_per_unit, "radiance_per_unit", 0.0, above=True)
+    if frame_rate_hz is not None:
+        frame_rate_hz = checked_number(frame_rate_hz, "frame_rate_hz", *FRAME_RATES_HZ, unit="Hz")
+    radiance_per_unit = checked_number(radiance_per_unit, "radiance_per_unit", *RADIANCES_PER_UNIT)
     if not 0.0 <= holdout_share < 1.0:
         raise InputError(f"holdout_share = {holdout_share}; it must be 0 up to, not including, 1")
     for name in reading:
@@ -192,6 +200,11 @@ def _pieces(
     common: dict[str, Any] = {"frame_rate_hz": recording.frame_rate_hz, "note": label.note}
     kept = len(spikes) - int(holdout_share * len(spikes) if label.use == "fit" else 0)
     first = _Piece(label, name, label.use, light, kept, spikes[:kept], **common)
+    if kept == len(spikes) and holdout_share > 0.0 and label.use == "fit":
+        raise InputError(
+            f"holdout_share = {holdout_share:g} holds out no frame of {label.file!r}, which has {len(spikes)}; "
+            "give a larger share, or 0"
+        )
     if kept == len(spikes):
         return [first]
     rest = _Piece(label, f"{name}-holdout", "holdout", _later(light, kept), len(spikes) - kept, spikes[kept:], **common)
@@ -220,8 +233,8 @@ def _light(source: _Source, label: Label, part: _Part, unit: float) -> Keyframes
     if label.radiance == UNKNOWN:
         return None
     if not isinstance(label.radiance, str):
-        most = float(np.finfo(np.float32).max)
-        return even_light(checked_number(label.radiance * unit, f"the label of {label.file!r}: radiance", 0.0, most))
+        least, most = (0.0 if label.radiance == 0.0 else FAINTEST), float(np.finfo(np.float32).max)
+        return even_light(checked_number(label.radiance * unit, f"the label of {label.file!r}: radiance", least, most))
     path = source.file(label.radiance, label)
     frame, radiance = read_light(path, f"the label of {label.file!r}")
     if radiance.ndim != 3:

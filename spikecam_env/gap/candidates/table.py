@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 
+from spikecam_env.checked import each_once
 from spikecam_env.errors import unknown_name
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import Observation
@@ -173,10 +174,12 @@ def expected_events(
 
 
 def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str]) -> list[str]:
-    """Names to try: the catalogue less what the model has, less `exclude`; raises InputError for unknown names."""
+    """Names to try: the catalogue less what the model has, less `exclude`; raises InputError for unknown names, and
+    for one that is given twice or in both."""
     for name in (*(only or ()), *exclude):
         if name not in CATALOGUE:
             raise unknown_name("candidate", name, CATALOGUE)
+    each_once((*(only or ()), *exclude), "candidates and exclude")
     has = {e.name for e in model.effects}
     return [n for n in CATALOGUE if n not in has and n not in exclude and (only is None or n in only)]
 

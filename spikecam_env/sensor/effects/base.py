@@ -57,6 +57,9 @@ Field = NDArray[np.float32]
 Spikes = NDArray[np.bool_]
 
 
+PACKAGE = f"{__package__}."
+"""Modules of the package's own effects begin with it; hooks of others are checked (`sensor/own_hooks.py`)."""
+
 MOST_PARTS = 1024
 """Parts of a frame at most: 32 periods of a sine."""
 
@@ -305,6 +308,10 @@ class Effect:
 
     def __init_subclass__(cls) -> None:
         cls.name = effect_name(cls.__name__)
+        if not cls.__module__.startswith(PACKAGE):
+            from spikecam_env.sensor.own_hooks import guard  # it knows all that hooks return, which is defined here
+
+            guard(cls)
 
     def __post_init__(self) -> None:
         check_parameters(self, self.name)

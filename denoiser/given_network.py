@@ -1,0 +1,90 @@
+"""A network that a user gives to the denoiser: checked before it is copied, and its output before it is used.
+
+A network of the recipe's own class computes passes by `passed`, which sees less data twice.  Any other module, as
+`torch.compile(network)` is one, is called: what it adds to the network within it acts.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor, nn
+
+from denoiser.network import DnSS
+from denoiser.recipe import Recipe
+from denoiser.stream_network import StreamDnSS
+from spikecam_env.errors import InputError, OwnCodeError
+
+if TYPE_CHECKING:
+    from denoiser.infer import Carried
+
+
+def check_network(recipe: Any, network: Any) -> None:
+    """Refuse what is no network of this recipe, or cannot compute.
+
+    Args:
+        recipe: a `Recipe`, else refused.
+        network: its network (`recipe.network()`, `load_weights(path)`), or a module that takes and gives the same.
+
+    Raises:
+        InputError: says what was given, and what to give.
+    """
+    if not isinstance(recipe, Recipe):
+        raise InputError(f"recipe is a {type(recipe).__name__}; give a Recipe, for one `recipe_of('best')`")
+    if not isinstance(network, nn.Module):
+        raise InputError(f"network is {_kind(network)}; give a torch module, `recipe.network()` or of `load_weights`")
+    if isinstance(network, torch.jit.ScriptModule):
+        raise InputError("network is a ScriptModule, which cannot be copied in another type; give the network itself")
+    with torch.device("meta"):
+        own = recipe.network()
+    weights = network.state_dict()
+    if type(network) is type(own):
+        _check_sizes(weights, own.state_dict())
+    elif isinstance(network, DnSS | StreamDnSS) and not isinstance(network, type(own)):
+        raise InputError(f"network is a {type(network).__name__}, the recipe's is a {type(own).__name__}; give its own")
+    for name, tensor in weights.items():
+        if isinstance(tensor, Tensor) and tensor.is_meta:
+            raise InputError(f"network: {name} is on the device meta and has no values; load its weights")
+        if isinstance(tensor, Tensor) and not bool(torch.isfinite(tensor).all()):
+            raise InputError(f"network: {name} holds values that are not finite; train anew or load other weights")
+
+
+def check_output(network: nn.Module, found: Any, sizes: tuple[int, int, int, int]) -> tuple[Tensor, Carried]:
+    """What a module returned for a batch: rates and what is carried.
+
+    Args:
+        network: the module, for the error's text.
+        found: what it returned.
+        sizes: (N, planes, H, W) of the batch; planes are those that are used, it may return more.
+
+    Raises:
+        OwnCodeError: it is no pair of rates (N, planes, H, W) and of tensors to carry, or not finite.
+    """
+    name = type(network).__name__
+    if not isinstance(found, tuple) or len(found) != 2 or not isinstance(found[0], Tensor):
+        raise OwnCodeError(f"network {name}: it returned a {type(found).__name__}; it must return (rates, carried)")
+    rate, kept = found
+    if rate.ndim != 4 or (len(rate), *rate.shape[2:]) != (sizes[0], *sizes[2:]) or rate.shape[1] < sizes[1]:
+        raise OwnCodeError(f"network {name}: rates have shape {tuple(rate.shape)}; it must be {sizes}")
+    if not bool(torch.isfinite(rate).all()):
+        raise OwnCodeError(f"network {name}: its rates are not all finite")
+    return rate, kept or ()
+
+
+def has_passes(network: Any) -> bool:
+    """Whether a network's own class has `passed`; a wrapper that hands on its network's attributes has none."""
+    return hasattr(type(network), "passed")
+
+
+def _check_sizes(weights: dict[str, Any], own: dict[str, Any]) -> None:
+    for name, tensor in weights.items():
+        if name in own and tensor.shape != own[name].shape:
+            raise InputError(
+                f"network is of another recipe: {name} is {tuple(tensor.shape)}, of this recipe "
+                f"{tuple(own[name].shape)}; give the recipe that `load_weights` returns with the network"
+            )
+
+
+def _kind(value: Any) -> str:
+    return f"the class {value.__name__}" if isinstance(value, type) else f"a {type(value).__name__}"
