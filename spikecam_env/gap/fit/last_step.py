@@ -1,0 +1,123 @@
+"""The last step of a fit: by its own twins, which are more than a descent's, with the errors of its parameters.
+
+    s' = s + step        s: logarithms of parameters        step, covariance: of `compare.step.step_of`
+
+A parameter that was not descended, to save effort, has its derivative taken here, once, at the fit.  Errors contain
+what a descent would have found: the part of the step that was not taken, and the curvature that one step leaves,
+
+    f(s) ~ exp(k s)        error of one step d = k d^2 / 2        k: power of the strength, 1 of other parameters
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.step import step_of
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.coordinates import error_of
+from spikecam_env.gap.fit.gauss_newton import (
+    WHITE,
+    Free,
+    Probe,
+    at_settled_unit,
+    derivatives,
+    longest_of,
+    moved,
+    prior_sd,
+)
+from spikecam_env.gap.fit.problem import Problem
+
+Array = NDArray[np.float64]
+
+Errors = dict[str, dict[str, float]]
+"""Standard deviation of each parameter, by effect and name."""
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives of the statistics by parameters' logarithms."""
+
+    free: tuple[tuple[str, str], ...]
+    """The n parameters, by effect and name."""
+    columns: Array
+    """(S, n) change of each statistic for one more of each logarithm."""
+    noise: Array
+    """(S, n) standard deviations of `columns`."""
+    once: NDArray[np.bool_]
+    """(n,) whether a parameter was not descended: its derivative was taken once, at the fit."""
+
+    @classmethod
+    def of_descent(cls, free: Free, columns: Array, noise: Array) -> Slopes:
+        """Those at the end of a descent."""
+        return cls(tuple(free), columns, noise, np.zeros(len(free), bool))
+
+    @classmethod
+    def at(cls, problem: Problem, probe: Probe, found: Fit, free: Free) -> Slopes:
+        """Those at a fit, by a twin a parameter and one of the fit; none without parameters."""
+        if not free:
+            return cls((), *np.zeros((2, len(problem.seen), 0)), np.zeros(0, bool))
+        here, base = at_settled_unit(probe, problem.null, found.model, found.base, free)
+        columns, noise = derivatives(problem, probe, found.model, base, here, free)
+        return cls(tuple(free), columns, noise, np.ones(len(free), bool))
+
+    def beside(self, other: Slopes) -> Slopes:
+        """With those by other parameters."""
+        pairs = ((self.columns, other.columns), (self.noise, other.noise))
+        columns, noise = (np.concatenate(pair, axis=1) for pair in pairs)
+        return Slopes((*self.free, *other.free), columns, noise, np.concatenate([self.once, other.once]))
+
+
+def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Array]:
+    """Move a fit by the step that its own twins ask for.
+
+    Args:
+        problem: before any effect was added.
+        found: the fit, simulated.
+        names: of its effects, whose errors are returned.
+        slopes: derivatives at the fit.
+
+    Returns:
+        (the fit, moved where that leaves no more misfit; standard deviations by effect and parameter;
+        (S,) variance of the statistics by what is open of the parameters).  Derivatives that are noisy may leave two
+        parameters open that make up for each other, but not what both do: the variance is without their noise.
+    """
+    errors: Errors = {name: {} for name in names}
+    free = slopes.free
+    if not free:
+        return found, errors, np.zeros(len(problem.seen))
+    before = prior_sd(free)
+    _, covariance = step_of(problem.null, problem.seen, found.prediction, slopes.columns, slopes.noise, before)
+    step, exact = step_of(problem.null, problem.seen, found.prediction, slopes.columns, before=before)
+    best, taken = _stepped(problem, found, slopes, step)
+    skipped = slopes.once * error_of_one_step(free, step, taken)
+    values = {e.name: e.parameters() for e in best.model.effects}
+    for (name, key), e in zip(free, np.sqrt(np.diag(covariance) + skipped**2), strict=True):
+        if (name, key) != WHITE:
+            errors[name][key] = error_of(name, key, values[name][key], float(e))
+    spread = exact + np.diag(skipped**2)
+    return best, errors, np.einsum("sn,nm,sm->s", slopes.columns, spread, slopes.columns)
+
+
+def error_of_one_step(free: Free, step: Array, taken: Array) -> Array:
+    """(n,) error of logarithms that another step would remove: what was not taken of a step, and its curvature."""
+    powers = np.array([1.0 if f == WHITE or f[1] != candidate(f[0]).strength else candidate(f[0]).power for f in free])
+    return np.hypot(step - taken, powers * taken**2 / 2)
+
+
+def _stepped(problem: Problem, best: Fit, slopes: Slopes, step: Array) -> tuple[Fit, Array]:
+    """(the fit moved, (n,) the step taken): none that leaves more, nor a longer one than a descent's of a parameter
+    that was descended; of others, as far as a descent steps at once.  What one twin happened to scatter is in the
+    parameters that it led to."""
+    longest = longest_of(slopes.free, problem.settings.fitting.longest_step)
+    step = np.where(slopes.once, np.clip(step, -longest, longest), step)
+    predicted = replace(best.prediction, mean=best.prediction.mean + slopes.columns @ step)
+    rho, left = problem.residual_and_misfit(predicted)
+    if np.any(np.abs(step) > longest) or left > best.misfit:
+        return best, np.zeros(len(step))
+    model, base = moved(best.model, best.base, slopes.free, step)
+    return replace(best, model=model, base=base, prediction=predicted, rho=rho, misfit=left), step
