@@ -28,6 +28,7 @@ from spikecam_env.gap import Bars, Dark, Flat, Step, write_campaign
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.diagnose import diagnose
+from spikecam_env.gap.result import Diagnosis
 from spikecam_env.sensor import SensorModel
 from spikecam_env.whole import write_text_whole
 
@@ -87,6 +88,8 @@ class Stated:
     """End of its 90 % interval."""
     sd: float | None
     """Its standard deviation."""
+    skipped: str
+    """What was left out to stay within the effort; empty where nothing was."""
 
     @property
     def contains(self) -> bool:
@@ -100,7 +103,7 @@ class Stated:
 
 
 def diagnosed(case: int, seed: int, efforts: Sequence[float]) -> list[Stated]:
-    """One campaign at several efforts."""
+    """One campaign at several efforts, the least first; where nothing was skipped, a larger one changes nothing."""
     model = MODEL
     for name, parameters in HIDDEN[case].items():
         model = with_effect(model, name, parameters)
@@ -108,19 +111,30 @@ def diagnosed(case: int, seed: int, efforts: Sequence[float]) -> list[Stated]:
         campaign = write_campaign(
             Path(folder, "camera"), model, shape=SHAPE, frames=FRAMES, recordings=DESIGN, seed=FIRST_CAMERA + seed
         )
-        return [stated for effort in efforts for stated in at_effort(campaign, case, seed, effort)]
+        done: list[Stated] = []
+        found = None
+        for effort in sorted(efforts):
+            if found is None or unfinished_note(found):
+                found = diagnose(campaign, MODEL, candidates=CANDIDATES, effort=effort, seed=seed, progress=False)
+            done += stated_by(found, case, seed, effort)
+        return done
 
 
-def at_effort(campaign: Any, case: int, seed: int, effort: float) -> Iterator[Stated]:
+def unfinished_note(found: Diagnosis) -> str:
+    """The note on steps that were skipped to stay within the effort; empty where none was."""
+    return next((note for note in found.data if "--effort" in note), "")
+
+
+def stated_by(found: Diagnosis, case: int, seed: int, effort: float) -> Iterator[Stated]:
     """Every fitted parameter of the hidden effects, as a diagnosis states it."""
-    found = diagnose(campaign, MODEL, candidates=CANDIDATES, effort=effort, seed=seed, progress=False)
     named = {effect.name: effect.parameters for effect in found.effects} if found.verdict == "named" else {}
     for name, parameters in HIDDEN[case].items():
         for key in candidate(name).fitted:
             estimate = named.get(name, {}).get(key)
             low, high = (estimate.interval if estimate else None) or (None, None)
             value, sd = (float(estimate.value), float(estimate.sd)) if estimate else (None, None)
-            yield Stated(case, seed, effort, name, key, parameters[key], value, low, high, sd)
+            skipped = unfinished_note(found)
+            yield Stated(case, seed, effort, name, key, parameters[key], value, low, high, sd, skipped)
 
 
 def rows(done: Sequence[Stated]) -> Iterator[dict[str, Any]]:
