@@ -48,20 +48,20 @@ def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tupl
 def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, Array]:
     """The fit, its errors, and (S,) by what variance statistics are unknown for them (`last_step`).
 
-    What is not refined (`to_refine`) takes the last step alone."""
+    Of what is not refined (`to_refine`), as of the others, derivatives are then taken anew for the last step."""
     settings, probe = problem.settings, _probe(problem, found, names)
     free = to_refine(problem, found, names)
     held = [parameter for parameter in fitted_of(names) if parameter not in free]
     free += [WHITE] if is_noisy(problem, found.base) else []
-    slopes = Slopes.at(problem, probe, found, [])
-    now, base = found.model, found.base
+    now, base, slopes = found.model, found.base, None
     if free:
         end = descend(problem, probe, now, base, free)
         now, base, slopes = end.model, end.base, Slopes.of_descent(free, end.columns, end.noise)
     best = confirmed(problem, replace(found, model=now, base=base), settings.twins.in_the_end)
     if best.misfit > problem.misfit(found.prediction) + settings.deviance.by_chance:
         best = found
-    slopes = slopes.beside(Slopes.at(problem, probe, best, held))
+    if held or slopes is None:
+        slopes = Slopes.at(problem, probe, best, free + held)
     return with_last_step(problem, best, names, slopes)
 
 

@@ -2,8 +2,8 @@
 
     s' = s + step        s: logarithms of parameters        step, covariance: of `compare.step.step_of`
 
-A parameter that was not descended, to save effort, has its derivative taken here, once, at the fit.  Errors contain
-the part of the step that was not taken, and, of such a parameter, the curvature that one step leaves,
+Where parameters were not descended, to save effort, derivatives are taken here, once, at the fit.  Errors contain the
+part of the step that was not taken, and, without a descent, the curvature that one step leaves,
 
     f(s) ~ exp(k s)        error of one step d = k d^2 / 2        k: power of the strength, 1 of other parameters
 """
@@ -54,28 +54,22 @@ class Slopes:
     """(S, n) change of each statistic for one more of each logarithm."""
     noise: Array
     """(S, n) standard deviations of `columns`."""
-    once: NDArray[np.bool_]
-    """(n,) whether a parameter was not descended: its derivative was taken once, at the fit."""
+    once: bool
+    """Whether derivatives were taken once, at the fit, since not all parameters were descended."""
 
     @classmethod
     def of_descent(cls, free: Free, columns: Array, noise: Array) -> Slopes:
         """Those at the end of a descent."""
-        return cls(tuple(free), columns, noise, np.zeros(len(free), bool))
+        return cls(tuple(free), columns, noise, once=False)
 
     @classmethod
     def at(cls, problem: Problem, probe: Probe, found: Fit, free: Free) -> Slopes:
         """Those at a fit, by a twin a parameter and one of the fit; none without parameters."""
         if not free:
-            return cls((), *np.zeros((2, len(problem.seen), 0)), np.zeros(0, bool))
+            return cls((), *np.zeros((2, len(problem.seen), 0)), once=True)
         here, base = at_settled_unit(probe, problem.null, found.model, found.base, free)
         columns, noise = derivatives(problem, probe, found.model, base, here, free)
-        return cls(tuple(free), columns, noise, np.ones(len(free), bool))
-
-    def beside(self, other: Slopes) -> Slopes:
-        """With those by other parameters."""
-        pairs = ((self.columns, other.columns), (self.noise, other.noise))
-        columns, noise = (np.concatenate(pair, axis=1) for pair in pairs)
-        return Slopes((*self.free, *other.free), columns, noise, np.concatenate([self.once, other.once]))
+        return cls(tuple(free), columns, noise, once=True)
 
 
 def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Array]:
@@ -99,10 +93,10 @@ def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes
     before = prior_sd(free)
     _, covariance = step_of(problem.null, problem.seen, found.prediction, slopes.columns, slopes.noise, before)
     step, exact = step_of(problem.null, problem.seen, found.prediction, slopes.columns, before=before)
-    if slopes.once.any():
+    if slopes.once:
         step = linear_minimum(problem, found, slopes, before)
     best, taken = _stepped(problem, found, slopes, step)
-    skipped = np.hypot(step - taken, slopes.once * curvature_of_step(free, taken))
+    skipped = np.hypot(step - taken, curvature_of_step(free, taken) if slopes.once else 0.0)
     values = {e.name: e.parameters() for e in best.model.effects}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance) + skipped**2), strict=True):
         if (name, key) != WHITE:
@@ -131,11 +125,10 @@ def curvature_of_step(free: Free, taken: Array) -> Array:
 
 
 def _stepped(problem: Problem, best: Fit, slopes: Slopes, step: Array) -> tuple[Fit, Array]:
-    """(the fit moved, (n,) the step taken): none that leaves more, nor a longer one than a descent's of a parameter
-    that was descended; of others, as far as a descent steps at once.  What one twin happened to scatter is in the
-    parameters that it led to."""
+    """(the fit moved, (n,) the step taken): none that leaves more.  After a descent none longer than one of a descent;
+    without, as far as that goes.  What one twin happened to scatter is in the parameters that it led to."""
     longest = longest_of(slopes.free, problem.settings.fitting.longest_step)
-    step = np.where(slopes.once, np.clip(step, -longest, longest), step)
+    step = np.clip(step, -longest, longest) if slopes.once else step
     predicted = replace(best.prediction, mean=best.prediction.mean + slopes.columns @ step)
     rho, left = problem.residual_and_misfit(predicted)
     if np.any(np.abs(step) > longest) or left > best.misfit:

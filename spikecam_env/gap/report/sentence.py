@@ -139,4 +139,5 @@ BOUNDS_OF_MAPS = "Recordings that are rates only have no upper bounds: these nee
 def unfinished(effort: Budget) -> list[str]:
     """A note on what was not begun because enough had been simulated; none where nothing was left out."""
     left_out = listed([human(what) for what in effort.left_out], "and")
-    return [f"Skipped to stay within --effort: {left_out}. A larger --effort includes them."] if left_out else []
+    wider = " Intervals are wider for it." if any("finer" in what for what in effort.left_out) else ""
+    return [f"Skipped to stay within --effort: {left_out}. A larger --effort includes them.{wider}"] if left_out else []
