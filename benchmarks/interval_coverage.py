@@ -53,13 +53,13 @@ HIDDEN: tuple[dict[str, Parameters], ...] = (
     {"common_threshold_noise": {"sigma_mV": 4.0}},
     {"threshold_flicker_noise": {"sigma_mV": 3.0}},
     {"dead_time": {"tau_us": 0.5}},
-    {"crosstalk": {"kick": 0.005}},
+    {"spurious_spikes": {"probability": 1e-3}},
     {"photodiode_lag": {"fraction": 0.05, "tau_us": 600.0}},
     {"incomplete_reset": {"fraction": 0.02, "tau_us": 300.0}},
     {"afterpulsing": {"probability": 0.01, "delay_frames": 2.0}},
     {"row_fixed_pattern": {"sigma_mV": 80.0}},
     {"dead_time": {"tau_us": 0.5}, "row_temporal_noise": {"sigma_mV": 12.0}},
-    {"photodiode_lag": {"fraction": 0.05, "tau_us": 600.0}, "crosstalk": {"kick": 0.005}},
+    {"photodiode_lag": {"fraction": 0.05, "tau_us": 600.0}, "row_temporal_noise": {"sigma_mV": 12.0}},
 )
 """Effects of a camera, by name: counted, in proportion, by their square, of one parameter and two, and in pairs."""
 
