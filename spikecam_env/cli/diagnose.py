@@ -43,6 +43,8 @@ class Diagnose:
     """Budget: how often the campaign may be simulated before optional steps are skipped; inf for no limit."""
     static_only: bool = False
     """In unknown scenes with motion, use only the pixels in which nothing moves."""
+    bounds: bool = False
+    """Also simulate upper bounds of the effects that were not found, by some 200 campaigns more."""
     settings: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Tuned numbers other than the defaults, a TOML file of lines such as `deviance.tie = 8.0`; all of them stand in
     docs/reference/diagnosis_settings.md."""
@@ -75,6 +77,7 @@ class Diagnose:
                 jobs=self.jobs,
                 effort=self.effort,
                 static_only=self.static_only,
+                bounds=self.bounds,
                 settings=settings,
                 progress=True,
             )

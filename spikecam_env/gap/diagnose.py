@@ -34,8 +34,8 @@ from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
 from spikecam_env.gap.report.evidence import evidence_for
-from spikecam_env.gap.report.sentence import sentence, unfinished
-from spikecam_env.gap.result import Bound, Conclusion, Diagnosis, Evidence
+from spikecam_env.gap.report.sentence import BOUNDS_OF_MAPS, sentence, unbounded, unfinished
+from spikecam_env.gap.result import BOUNDED_VERDICTS, Bound, Conclusion, Diagnosis, Evidence
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
@@ -44,7 +44,7 @@ from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import in_nominal_units, label_unit_note, nominal_per_label
-from spikecam_env.gap.verdict.bounds import bounds
+from spikecam_env.gap.verdict.bounds import bounds as upper_bounds
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.gap.verdict.moving import moves, static_note
 from spikecam_env.gap.verdict.verdict import conclude, with_given_parameters, with_stand_ins
@@ -65,6 +65,7 @@ def diagnose(
     twin_count: int = 12,
     templates: Templates | None = None,
     static_only: bool = False,
+    bounds: bool = False,
     settings: DiagnosisSettings | None = None,
     progress: bool = True,
 ) -> Diagnosis:
@@ -81,6 +82,7 @@ def diagnose(
         twin_count: simulations of the campaign under the model.
         templates: of the candidates; default those that ship, others are simulated.
         static_only: whether to use only the static pixels of unknown scenes that move.
+        bounds: whether to simulate upper bounds of effects that were not found, by some 200 campaigns more.
         settings: the tuned numbers; default `DiagnosisSettings()`.
         progress: whether to name each stage as it begins.
 
@@ -107,11 +109,12 @@ def diagnose(
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
-        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only, settings)
+        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only, settings, bounds)
         found = of_spikes(measured, tested, asked, templates, stages)
     else:
         with stages.timed("maps"):
-            found = Findings(*diagnose_maps(measured, tested, names, seed, jobs, settings))
+            of_maps = diagnose_maps(measured, tested, names, seed, jobs, settings)
+            found = Findings(*of_maps, notes=(BOUNDS_OF_MAPS,) if bounds else ())
     conclusion = found.conclusion
     model_name = tested.name if isinstance(model, SensorModel) else str(model)
     return Diagnosis(
@@ -127,6 +130,7 @@ def diagnose(
         ranking=conclusion.ranking,
         not_testable=conclusion.not_testable,
         bounds=found.bounds,
+        with_bounds=bounds,
         patched=conclusion.patched,
         model_name=model_name,
         campaign=str(measured.folder),
@@ -170,6 +174,7 @@ class Asked:
     twin_count: int
     static_only: bool = False
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
+    bounds: bool = False
 
 
 def of_spikes(
@@ -202,11 +207,11 @@ def of_spikes(
         evidence = evidence_for(comparison, rounds, conclusion)
     bounded: list[Bound] = []
     not_bounded: list[tuple[str, str]] = []
-    if conclusion.verdict in ("none", "parameter"):
+    if asked.bounds and conclusion.verdict in BOUNDED_VERDICTS:
         with stages.timed("bounds"):
             standard = templates or templates_of(comparison.names, jobs=case.jobs, progress=stages.progress)
-            bounded, not_bounded = bounds(case, comparison.model, null, values, comparison.names, standard)
-    notes += unfinished(case.budget)
+            bounded, not_bounded = upper_bounds(case, comparison.model, null, values, comparison.names, standard)
+    notes += [*unbounded(conclusion.verdict, asked.bounds), *unfinished(case.budget)]
     return Findings(
         conclusion, evidence, tuple(bounded), tuple(not_bounded), tuple(notes), case.budget.simulated, motion
     )

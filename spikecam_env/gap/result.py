@@ -150,6 +150,9 @@ class Bound:
     at: dict[str, float] = field(default_factory=dict)
 
 
+BOUNDED_VERDICTS = ("none", "parameter")
+"""Verdicts with upper bounds of the effects that were not found, where they are asked for."""
+
 SIGNIFICANT = 0.05
 """Adjusted p-value below which a statistic is listed as one that differs."""
 
@@ -247,7 +250,7 @@ class Diagnosis:
         statistics: every statistic, measured and simulated.
         ranking: candidates that were tried.
         not_testable: (name, what is needed) of effects that these recordings cannot show.
-        bounds: upper bounds of effects that were not found.
+        bounds: upper bounds of effects that were not found; empty unless `diagnose` was called with bounds=True.
         patched: the model with the effects found, or with an empirical patch; loads back as a model.
         model_name: of the model that was tested.
         campaign: its folder.
@@ -263,6 +266,7 @@ class Diagnosis:
         static_only: whether moving pixels were left out.
         remainder: for verdict `named`, the difference beyond chance that remains; None where nothing does.
         settings: those that differ from the defaults, by "stage.name".
+        with_bounds: whether upper bounds were to be simulated.
 
     Example:
         >>> flats = [Dark(), *(Flat(radiance=level) for level in (0.1, 0.3))]
@@ -302,6 +306,7 @@ class Diagnosis:
     static_only: bool = False
     remainder: Remainder | None = None
     settings: dict[str, Any] = field(default_factory=dict)
+    with_bounds: bool = False
 
     @property
     def static_share(self) -> float:

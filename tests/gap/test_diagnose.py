@@ -70,7 +70,7 @@ def named(lagging) -> Diagnosis:
 
 @pytest.fixture(scope="module")
 def nothing(clean) -> Diagnosis:
-    return asked(clean, candidates=BOUNDED)
+    return asked(clean, candidates=BOUNDED, bounds=True)
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +120,22 @@ def test_the_gap_of_nothing_is_chance(nothing):
     assert nothing.gap.before == nothing.gap.after
 
 
+def test_bounds_are_simulated_only_where_they_are_asked_for(clean, nothing, tmp_path):
+    """Without them the answer is the same, costs no twin more than the null model's, and says how to have them."""
+    quick = asked(clean, candidates=BOUNDED)
+    quick.write(tmp_path)
+    said = json.loads((tmp_path / "diagnosis.json").read_text())
+    print(quick.simulated, nothing.simulated)
+    assert quick.verdict == nothing.verdict == "none" and quick.sentence == nothing.sentence
+    assert quick.simulated == FEW * len(DESIGN) + FEW * sum(isinstance(p, (Step, Bars)) for p in DESIGN)
+    assert quick.simulated < nothing.simulated and "bounds" not in quick.stages
+    assert said["bounds"] == said["not_bounded"] == [] and any("--bounds" in note for note in said["data"])
+    assert nothing.bounds and not any("--bounds" in note for note in nothing.data)
+    assert "--bounds" in summary(quick) and "--bounds" not in summary(nothing)
+    assert f"{command_of(quick)} --bounds" in report(quick) and command_of(nothing).endswith("--bounds")
+    assert "at most (95 %)" in report(nothing) and "at most (95 %)" not in report(quick)
+
+
 def test_a_wrong_label_is_the_datas_fault(clean, tmp_path):
     found = asked(relabelled(clean, "flat-0.2", 1.02, tmp_path / "wrong"))
     assert found.verdict == "data"
@@ -146,7 +162,7 @@ def test_so_it_is_beside_an_effect_that_the_others_have_shown(tmp_path):
 
 def test_a_parameter_that_is_off_is_set_and_shrinks_the_gap(tmp_path):
     noisy = written(tmp_path / "noisy", MODEL.with_effect(effect("reset_noise", sigma_mV=19.1)))
-    found = asked(noisy, candidates=BOUNDED[:1])
+    found = asked(noisy, candidates=BOUNDED[:1], bounds=True)
     assert {b.name for b in found.bounds} == set(BOUNDED[:1])
     assert found.verdict == "parameter" and list(found.parameters) == ["reset_noise"]
     row = found.parameters["reset_noise"]
@@ -198,7 +214,7 @@ def test_labels_in_another_unit_change_no_bound_and_the_page_says_so(clean, noth
         with np.load(folder / f"{recording.name}.npz") as light:
             labels = {"frame": light["frame"], "radiance": light["radiance"] * np.float32(1000)}
         np.savez(folder / f"{recording.name}.npz", **labels)
-    found = asked(folder, candidates=BOUNDED)
+    found = asked(folder, candidates=BOUNDED, bounds=True)
     assert found.verdict == nothing.verdict and found.not_testable == nothing.not_testable
     assert [b.name for b in found.bounds] == [b.name for b in nothing.bounds] == sorted(BOUNDED)
     for one, other in zip(found.bounds, nothing.bounds, strict=True):
@@ -235,7 +251,7 @@ def test_only_candidates_are_tried(only):
 
 def test_what_a_campaign_cannot_show_is_said_with_what_it_needs(tmp_path):
     still = tuple(p for p in DESIGN if not isinstance(p, Step | Bars))
-    found = asked(written(tmp_path, MODEL, still), candidates=(*MOVED, "vignetting"))
+    found = asked(written(tmp_path, MODEL, still), candidates=(*MOVED, "vignetting"), bounds=True)
     needs = dict(found.not_testable)
     print(needs)
     assert found.verdict == "none" and [b.name for b in found.bounds] == ["vignetting"]

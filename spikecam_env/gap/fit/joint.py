@@ -10,20 +10,17 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.prediction import Prediction
-from spikecam_env.gap.compare.step import step_of
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import confirmed
-from spikecam_env.gap.fit.coordinates import error_of, is_apart
-from spikecam_env.gap.fit.gauss_newton import WHITE, Free, Probe, descend, longest_of, moved, prior_sd
+from spikecam_env.gap.fit.coordinates import is_apart
+from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, descend
+from spikecam_env.gap.fit.last_step import Errors, Slopes, last_step
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of, with_held_out
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-Errors = dict[str, dict[str, float]]
-"""Standard deviation of each parameter, by effect and name."""
 
 
 def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, bool]:
@@ -49,35 +46,52 @@ def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tupl
 
 
 def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, Array]:
-    """The fit, its errors, and (S,) by what variance statistics are unknown for them: where derivatives are noisy, two
-    parameters may be open that make up for each other, but not what both do.
+    """The fit, its errors, and (S,) by what variance statistics are unknown for them (`last_step`).
 
-    What is not refined (`to_refine`) is left as it was fitted, and then no error is smaller than its fit's.
-    """
-    null, seen = problem.null, problem.seen
+    Of what is not refined (`to_refine`), as of the others, derivatives are then taken anew for the last step."""
+    settings, probe = problem.settings, _probe(problem, found, names)
     free = to_refine(problem, found, names)
+    held = [parameter for parameter in fitted_of(names) if parameter not in free]
     free += [WHITE] if is_noisy(problem, found.base) else []
-    now, base = found.model, found.base
-    columns, covariance, exact = np.zeros((len(seen), 0)), np.zeros((0, 0)), np.zeros((0, 0))
+    now, base, slopes = found.model, found.base, None
     if free:
-        end = descend(problem, _probe(problem, found, names), now, base, free)
-        now, base, columns = end.model, end.base, end.columns
-    best = confirmed(problem, replace(found, model=now, base=base), problem.settings.twins.in_the_end)
-    if best.misfit > problem.misfit(found.prediction) + problem.settings.deviance.by_chance:
+        end = descend(problem, probe, now, base, free)
+        now, base, slopes = end.model, end.base, Slopes.of_descent(free, end.columns, end.noise)
+    best = confirmed(problem, replace(found, model=now, base=base), settings.twins.in_the_end)
+    if best.misfit > problem.misfit(found.prediction) + settings.deviance.by_chance:
         best = found
-    if free:
-        covariance = step_of(null, seen, best.prediction, columns, end.noise, prior_sd(free))[1]
-        step, exact = step_of(null, seen, best.prediction, columns, before=prior_sd(free))
-        best = _stepped(problem, best, free, columns, step)
-    values = {e.name: e.parameters() for e in best.model.effects}
-    errors: Errors = {name: {} for name in names}
-    for (name, key), e in zip(free, np.sqrt(np.diag(covariance)), strict=True):
-        if (name, key) != WHITE:
-            errors[name][key] = error_of(name, key, values[name][key], float(e))
+    if held or slopes is None:
+        slopes = Slopes.at(problem, probe, best, free + held)
+    return with_last_step(problem, best, names, slopes)
+
+
+def with_last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Array]:
+    """`last_step`, with the parameters and errors of the fit's own effect; these are no smaller than before where not
+    all of them are free."""
+    best, errors, own2 = last_step(problem, found, names, slopes)
     errors[found.name] = no_smaller(errors[found.name], found.sd)
-    own: Mapping[str, float] = values[found.name]
-    best = replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name])
-    return best, errors, np.einsum("sn,nm,sm->s", columns, exact, columns)
+    own = next(e for e in best.model.effects if e.name == found.name).parameters()
+    return replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name]), errors, own2
+
+
+def stepped_once(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors]:
+    """The fit after one step of the parameters of its effects `names`, with errors that say so.
+
+    It takes the place of `refined_together` where the budget refuses that: derivatives at the fit, a twin each, are
+    the least that errors can be known by.
+    """
+    free = fitted_of(names)
+    free += [WHITE] if free and is_noisy(problem, found.base) else []
+    slopes = Slopes.at(problem, _probe(problem, found, names), found, free)
+    best, errors, own2 = with_last_step(problem, found, names, slopes)
+    error = np.sqrt(best.prediction.error**2 + own2 * np.isnan(problem.seen))
+    return replace(best, prediction=replace(best.prediction, error=error)), errors
+
+
+def fitted_of(names: Sequence[str]) -> list[tuple[str, str]]:
+    """All that is fitted of those effects whose course is not random, by effect and name: one twin has no direction of
+    the others."""
+    return [(name, key) for name in names if not candidate(name).random_course for key in candidate(name).fitted]
 
 
 def is_noisy(problem: Problem, base: BaseFit) -> bool:
@@ -86,10 +100,10 @@ def is_noisy(problem: Problem, base: BaseFit) -> bool:
 
 
 def to_refine(problem: Problem, found: Fit, names: Sequence[str]) -> list[tuple[str, str]]:
-    """Parameters, by effect and name: all that are fitted of those effects whose course is not random, since one twin
-    has no direction of these.  Where derivatives by every shape would take more than may be simulated, of several
-    effects, and of one that leaves something, the strengths alone: what effects take from each other is in these."""
-    free = [(name, key) for name in names if not candidate(name).random_course for key in candidate(name).fitted]
+    """Parameters to descend by, by effect and name: all of `fitted_of`.  Where a descent by every shape would take more
+    than may be simulated, of several effects, and of one that leaves something, the strengths alone: what effects take
+    from each other is in these."""
+    free = fitted_of(names)
     strengths = [(name, key) for name, key in free if key == candidate(name).strength]
     last = len(names) == 1 and problem.is_explained(found.prediction)
     if last or len(strengths) == len(free):
@@ -113,17 +127,6 @@ def no_smaller(known: Mapping[str, float], before: Mapping[str, float]) -> dict[
     if set(known) >= set(before):
         return dict(known)
     return {key: max(known.get(key, 0.0), sd) for key, sd in before.items()}
-
-
-def _stepped(problem: Problem, best: Fit, free: Free, columns: Array, step: Array) -> Fit:
-    """The fit moved by a last step (n,) of its own twins, which are more than the descent's: what one happened to
-    scatter is in the parameters that it led to."""
-    predicted = replace(best.prediction, mean=best.prediction.mean + columns @ step)
-    rho, left = problem.residual_and_misfit(predicted)
-    if np.any(np.abs(step) > longest_of(free, problem.settings.fitting.longest_step)) or left > best.misfit:
-        return best
-    model, base = moved(best.model, best.base, free, step)
-    return replace(best, model=model, base=base, prediction=predicted, rho=rho, misfit=left)
 
 
 def agree(before: Fit, after: Fit, errors: Errors, apart: float) -> bool:

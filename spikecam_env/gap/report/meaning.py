@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 from spikecam_env.gap.report.cells import bullets, number, percent, value_in_words
 from spikecam_env.gap.report.parameters_off import parameters_off
 from spikecam_env.gap.report.quantities import interval, quantity
+from spikecam_env.gap.report.reproduce import command_of
+from spikecam_env.gap.report.sentence import NO_BOUNDS
 from spikecam_env.gap.report.tables import bounds_tables
 from spikecam_env.gap.report.words import bare, equation_of, human, meaning_of, parameter_unit, sheet
 from spikecam_env.gap.result import Diagnosis, Estimate, NamedEffect, Remainder
@@ -23,13 +26,17 @@ def meaning_section(d: Diagnosis) -> Iterator[str]:
 
 
 def none_meaning(d: Diagnosis) -> Iterator[str]:
-    """Nothing found: upper bounds."""
+    """Nothing found: upper bounds, or the command that adds them."""
+    bounds_follow = "; these are the upper bounds:" if d.bounds or d.not_bounded else "."
     yield element(
         "p",
         "With this unit's own response, dark level and noise fitted, no statistic differs from the model by more than "
-        "chance. Weaker effects may be present; these are the upper bounds:",
+        f"chance. Weaker effects may be present{bounds_follow}",
     )
     yield from bounds_tables(d)
+    if NO_BOUNDS in d.data:
+        yield element("p", "This command adds the upper bounds of weaker effects:")
+        yield element("pre", command_of(replace(d, with_bounds=True)))
 
 
 def named_meaning(d: Diagnosis) -> Iterator[str]:

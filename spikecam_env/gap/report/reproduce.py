@@ -61,6 +61,8 @@ def command_of(d: Diagnosis) -> str:
         words.append(f"--effort {d.effort:g}")
     if d.static_only:
         words.append("--static-only")
+    if d.with_bounds:
+        words.append("--bounds")
     if d.settings:
         words.append("--settings FILE")
     return " ".join(words)

@@ -8,7 +8,7 @@ from spikecam_env.gap.report.cells import percent
 from spikecam_env.gap.report.parameters_off import parameters_off
 from spikecam_env.gap.report.quantities import plain_sizes, rough, three_digits
 from spikecam_env.gap.report.words import human, listed
-from spikecam_env.gap.result import CHANCE, Conclusion, Gap, Remainder
+from spikecam_env.gap.result import BOUNDED_VERDICTS, CHANCE, Conclusion, Gap, Remainder
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import gap_is_fitted
 
@@ -120,7 +120,24 @@ HARDLY_A_GAP = 1.2
 """Times its floor up to which a gap is hardly one, and no share of it is stated to be removed."""
 
 
+def unbounded(verdict: str, with_bounds: bool) -> list[str]:
+    """A note on upper bounds that a verdict could have, and that were not simulated; none for other verdicts."""
+    return [] if with_bounds or verdict not in BOUNDED_VERDICTS else [NO_BOUNDS]
+
+
+NO_BOUNDS = (
+    "Upper bounds of the effects that were not found are not simulated by default: `spikecam diagnose --bounds`, or "
+    "diagnose(..., bounds=True), adds them. They take some 200 campaigns."
+)
+"""Why a diagnosis that found no effect has no bounds, and what adds them."""
+
+
+BOUNDS_OF_MAPS = "Recordings that are rates only have no upper bounds: these need spikes."
+"""Why `--bounds` adds none."""
+
+
 def unfinished(effort: Budget) -> list[str]:
     """A note on what was not begun because enough had been simulated; none where nothing was left out."""
     left_out = listed([human(what) for what in effort.left_out], "and")
-    return [f"Skipped to stay within --effort: {left_out}. A larger --effort includes them."] if left_out else []
+    wider = " Intervals are wider for it." if any("finer" in what for what in effort.left_out) else ""
+    return [f"Skipped to stay within --effort: {left_out}. A larger --effort includes them.{wider}"] if left_out else []

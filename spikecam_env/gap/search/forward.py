@@ -21,7 +21,8 @@ from spikecam_env.gap.compare.distance import in_noise, is_significant, loss, re
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import confirmed, with_dark_levels_open, with_prediction
 from spikecam_env.gap.fit.gauss_newton import PROBES
-from spikecam_env.gap.fit.joint import Errors, is_noisy, no_smaller, refined_together, simulated_for
+from spikecam_env.gap.fit.joint import is_noisy, no_smaller, refined_together, simulated_for, stepped_once
+from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
@@ -130,8 +131,8 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
 def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Round]:
     """The rounds with the last one's best effect beside all found before, and their parameters refined together.
 
-    Effects that are no longer needed are left out.  Nothing is refined beyond the budget, or if the last effect is a
-    stand-in (`is_stand_in`).
+    Effects that are no longer needed are left out.  Nothing is refined if the last effect is a stand-in
+    (`is_stand_in`); beyond the budget, parameters take one step, with errors for the others (`stepped_once`).
 
     Args:
         problem: the model as given, by which all effects are judged together.
@@ -149,8 +150,11 @@ def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Rou
     elif before:
         best = with_prediction(problem, best, best.prediction)
     names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
-    if is_stand_in(problem, last, best, chance, bool(before)) or not may_be_refined(problem, best, names):
+    if is_stand_in(problem, last, best, chance, bool(before)):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
+    if not may_be_refined(problem, best, names):
+        best, errors = stepped_once(problem, best, names)
+        return [with_errors(r, errors) for r in (*before, replace(last, fits=(best, *last.fits[1:])))]
     best, errors, used_held_out = refined_together(problem, best, names)
     best = try_more_draws(problem, best)
     last = replace(last, fits=(best, *last.fits[1:]), used_held_out=used_held_out)

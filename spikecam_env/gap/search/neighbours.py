@@ -24,7 +24,8 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
 from spikecam_env.gap.fit.candidate import Fit, fit
 from spikecam_env.gap.fit.confirm import confirmed, no_more_certain, resettled, with_prediction
-from spikecam_env.gap.fit.joint import Errors, refined_together
+from spikecam_env.gap.fit.joint import refined_together
+from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import with_fitted_shapes
 from spikecam_env.gap.screen.screen import Screened

@@ -55,6 +55,12 @@ def test_what_is_left_out_is_said_once():
     ]
 
 
+def test_skipped_refinements_are_said_to_widen_intervals():
+    (said,) = unfinished(Budget(20, [20], ["finer strengths"]))
+    (other,) = unfinished(Budget(20, [20], ["a third effect"]))
+    assert said.endswith("Intervals are wider for it.") and "wider" not in other
+
+
 def test_what_takes_more_than_is_left_is_not_begun():
     budget = Budget(20, [13])
     assert budget.allows("photodiode_lag of another shape", 6) and budget.left_out == []
@@ -151,20 +157,25 @@ class Found:
 
 
 @pytest.mark.parametrize("spent, settled", [(38, False), (30, True)])
-def test_what_was_found_stays_as_it_was_fitted_when_no_effort_is_left(spent: int, settled: bool, monkeypatch):
+def test_what_was_found_takes_one_step_when_no_effort_is_left(spent: int, settled: bool, monkeypatch):
     """Two predictions of five recordings, each made twice, and four twins more: forty, of sixty and three tenths."""
+    monkeypatch.setattr(searching, "with_errors", lambda turn, errors: (turn, errors))
+    monkeypatch.setattr(searching, "stepped_once", lambda problem, found, names: (found, {names[0]: {"share": 0.1}}))
     monkeypatch.setattr(searching, "is_small_share", lambda *_: False)
     monkeypatch.setattr(searching, "simulated_for", lambda *_: (list(range(5)), 1))
     model = SimpleNamespace(effects=(SimpleNamespace(name="blooming"),))
     best = SimpleNamespace(name="blooming", model=model, misfit=10.0)
     case = SimpleNamespace(budget=Budget(60, [spent], verdict_known=settled))
-    assert joined(problem_of(case), [Found((best,))], 0.0) == [Found((best,))]
+    [(turn, errors)] = joined(problem_of(case), [Found((best,))], 0.0)
+    assert turn == Found((best,)) and errors == {"blooming": {"share": 0.1}}
     assert case.budget.left_out == ["finer strengths"]
 
 
 def test_what_is_not_simulated_together_is_judged_by_the_model_given(monkeypatch):
     """And not by the one with the first effect, whose noise is no price to the second."""
     monkeypatch.setattr(searching, "simulated_for", lambda *_: ([0], 1))
+    monkeypatch.setattr(searching, "stepped_once", lambda problem, found, names: (found, {}))
+    monkeypatch.setattr(searching, "with_errors", lambda turn, errors: turn)
     keys = tuple(Key("g", "r", str(i)) for i in range(3))
     null = Null(keys, np.zeros(3), np.ones(3), np.full(3, 0.1), 12, 11.0)
     both = Prediction(np.ones(3), np.full(3, 0.3), np.full(3, 2.0), ())

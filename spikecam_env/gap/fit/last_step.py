@@ -1,0 +1,137 @@
+"""The last step of a fit: by its own twins, which are more than a descent's, with the errors of its parameters.
+
+    s' = s + step        s: logarithms of parameters        step, covariance: of `compare.step.step_of`
+
+Where parameters were not descended, to save effort, derivatives are taken here, once, at the fit.  Errors contain the
+part of the step that was not taken, and, without a descent, the curvature that one step leaves,
+
+    f(s) ~ exp(k s)        error of one step d = k d^2 / 2        k: power of the strength, 1 of other parameters
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.step import step_of
+from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.coordinates import error_of
+from spikecam_env.gap.fit.gauss_newton import (
+    WHITE,
+    Free,
+    Probe,
+    at_settled_unit,
+    derivatives,
+    longest_of,
+    moved,
+    prior_sd,
+)
+from spikecam_env.gap.fit.problem import Problem
+
+Array = NDArray[np.float64]
+
+MOST_LINEAR_STEPS = 20
+"""Steps to a linear minimum at most; they cost no twin."""
+
+LEAST_LINEAR_STEP = 1e-3
+"""Step of a logarithm that needs no other; a thirtieth of the error of a parameter known to 3 %."""
+
+Errors = dict[str, dict[str, float]]
+"""Standard deviation of each parameter, by effect and name."""
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives of the statistics by parameters' logarithms."""
+
+    free: tuple[tuple[str, str], ...]
+    """The n parameters, by effect and name."""
+    columns: Array
+    """(S, n) change of each statistic for one more of each logarithm."""
+    noise: Array
+    """(S, n) standard deviations of `columns`."""
+    once: bool
+    """Whether derivatives were taken once, at the fit, since not all parameters were descended."""
+
+    @classmethod
+    def of_descent(cls, free: Free, columns: Array, noise: Array) -> Slopes:
+        """Those at the end of a descent."""
+        return cls(tuple(free), columns, noise, once=False)
+
+    @classmethod
+    def at(cls, problem: Problem, probe: Probe, found: Fit, free: Free) -> Slopes:
+        """Those at a fit, by a twin a parameter and one of the fit; none without parameters."""
+        if not free:
+            return cls((), *np.zeros((2, len(problem.seen), 0)), once=True)
+        here, base = at_settled_unit(probe, problem.null, found.model, found.base, free)
+        columns, noise = derivatives(problem, probe, found.model, base, here, free)
+        return cls(tuple(free), columns, noise, once=True)
+
+
+def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Array]:
+    """Move a fit by the step that its own twins ask for.
+
+    Args:
+        problem: before any effect was added.
+        found: the fit, simulated.
+        names: of its effects, whose errors are returned.
+        slopes: derivatives at the fit.
+
+    Returns:
+        (the fit, moved where that leaves no more misfit; standard deviations by effect and parameter;
+        (S,) variance of the statistics by what is open of the parameters).  Derivatives that are noisy may leave two
+        parameters open that make up for each other, but not what both do: the variance is without their noise.
+    """
+    errors: Errors = {name: {} for name in names}
+    free = slopes.free
+    if not free:
+        return found, errors, np.zeros(len(problem.seen))
+    before = prior_sd(free)
+    _, covariance = step_of(problem.null, problem.seen, found.prediction, slopes.columns, slopes.noise, before)
+    step, exact = step_of(problem.null, problem.seen, found.prediction, slopes.columns, before=before)
+    if slopes.once:
+        step = linear_minimum(problem, found, slopes, before)
+    best, taken = _stepped(problem, found, slopes, step)
+    skipped = np.hypot(step - taken, curvature_of_step(free, taken) if slopes.once else 0.0)
+    values = {e.name: e.parameters() for e in best.model.effects}
+    for (name, key), e in zip(free, np.sqrt(np.diag(covariance) + skipped**2), strict=True):
+        if (name, key) != WHITE:
+            errors[name][key] = error_of(name, key, values[name][key], float(e))
+    spread = exact + np.diag(skipped**2)
+    return best, errors, np.einsum("sn,nm,sm->s", slopes.columns, spread, slopes.columns)
+
+
+def linear_minimum(problem: Problem, found: Fit, slopes: Slopes, before: Array) -> Array:
+    """(n,) step to the minimum of the misfit, if the statistics were linear: what holds back a single step of
+    `step_of`, its damping and its robust weights, is no error of the parameters.  before: (n,) as of `step_of`."""
+    total = np.zeros(len(slopes.free))
+    for _ in range(MOST_LINEAR_STEPS):
+        there = replace(found.prediction, mean=found.prediction.mean + slopes.columns @ total)
+        step, _ = step_of(problem.null, problem.seen, there, slopes.columns, before=before)
+        total = total + step
+        if np.all(np.abs(step) < LEAST_LINEAR_STEP):
+            break
+    return total
+
+
+def curvature_of_step(free: Free, taken: Array) -> Array:
+    """(n,) error of logarithms after one step (n,), which another one would remove: it is linear, and laws are not."""
+    powers = [1.0 if f == WHITE or f[1] != candidate(f[0]).strength else candidate(f[0]).power for f in free]
+    return np.array(powers) * taken**2 / 2
+
+
+def _stepped(problem: Problem, best: Fit, slopes: Slopes, step: Array) -> tuple[Fit, Array]:
+    """(the fit moved, (n,) the step taken): none that leaves more.  After a descent none longer than one of a descent;
+    without, as far as that goes.  What one twin happened to scatter is in the parameters that it led to."""
+    longest = longest_of(slopes.free, problem.settings.fitting.longest_step)
+    step = np.clip(step, -longest, longest) if slopes.once else step
+    predicted = replace(best.prediction, mean=best.prediction.mean + slopes.columns @ step)
+    rho, left = problem.residual_and_misfit(predicted)
+    if np.any(np.abs(step) > longest) or left > best.misfit:
+        return best, np.zeros(len(step))
+    model, base = moved(best.model, best.base, slopes.free, step)
+    return replace(best, model=model, base=base, prediction=predicted, rho=rho, misfit=left), step
