@@ -121,6 +121,35 @@ class SpikeSensorBatch:
         self._pixels = self._pixels.replaced(chosen, self._started(chosen))
         self.frame[chosen] = 0
 
+    def exchange(self, cameras: Sequence[int], others: SpikeSensorBatch) -> None:
+        """Put the cameras of another batch, mid-stream, in the place of some of these.
+
+        Args:
+            cameras: numbers of those that go.
+            others: as many, of the same shape, models and device; they are not to be stepped any more.
+
+        Raises:
+            InputError: for another number of cameras, and for cameras of another shape, model or device.
+
+        Example:
+            >>> cameras, others = (SpikeSensorBatch("ideal", (2, 2), seeds, "cpu") for seeds in ([0, 1], [7]))
+            >>> cameras.exchange([1], others)
+            >>> cameras.seeds
+            (0, 7)
+        """
+        chosen = np.array(cameras, np.int64)
+        models = tuple(self.models[b] for b in chosen)
+        if (others.shape, others.device, others.models) != (self.shape, self.device, models):
+            raise InputError(
+                f"the other batch has {len(others)} cameras of {others.shape} on {others.device}; it must have "
+                f"{len(chosen)} of {self.shape} on {self.device}, of the models of those that go"
+            )
+        seeds = dict(zip(chosen.tolist(), others.seeds, strict=True))
+        self.seeds = tuple(seeds.get(b, seed) for b, seed in enumerate(self.seeds))
+        self.phase, self.frame = self.phase.copy(), self.frame.copy()
+        self.phase[chosen], self.frame[chosen] = others.phase, others.frame
+        self._pixels = self._pixels.replaced(chosen, others._pixels)
+
     def state(self) -> SensorBatchState:
         """A copy of everything that the next step depends on."""
         return SensorBatchState(
