@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from scenes.planes_on_device import planes_on
 from spikecam_env.envs.cameras_on_host import by_place
@@ -74,10 +73,6 @@ class DeviceCameras:
         if isinstance(values, dict):
             return {name: self.returned(value) for name, value in values.items()}
         return torch.as_tensor(values, device=self.device)
-
-    def on_host(self, actions: Any) -> NDArray[Any]:
-        """Actions as an array, wherever they are."""
-        return np.asarray(actions.cpu() if isinstance(actions, torch.Tensor) else actions)
 
     def _batch_of(self, numbers: Sequence[int]) -> SpikeSensorBatch:
         """Cameras, those among them that begin anew at frame 0: the batch itself for all of them."""

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.envs.observations import Blocks
 from spikecam_env.envs.spike_camera import Each, SpikeCameraEnv, expose
@@ -44,10 +43,6 @@ class HostCameras:
     def returned(self, values: Any) -> Any:
         """Arrays as agents have them."""
         return values
-
-    def on_host(self, actions: Any) -> NDArray[Any]:
-        """Actions as an array."""
-        return np.asarray(actions)
 
 
 def by_place(each: Each, numbers: Sequence[int]) -> Each:

@@ -8,12 +8,13 @@ observations are computed for all streams at once.  The bits are those of as man
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
+from difflib import get_close_matches
 from importlib import import_module
+from inspect import Parameter, signature
 from typing import Any, TypeVar
 
 import numpy as np
@@ -35,7 +36,8 @@ from spikecam_env.envs.vector_inputs import (
     checked_options,
     checked_seeds,
 )
-from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.envs.workers import Workers
+from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.threads import as_many
 
 __all__ = ["SpikeCameraVectorEnv", "batched"]
@@ -112,9 +114,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         threads = as_many(None if workers is None else checked_count(workers, "workers"), self.num_envs)
         make: Any = load_env_creator(single) if isinstance(single, str) else single
         options |= {"render_mode": render_mode, "threads": options.get("threads", 1)}
-        self.envs: list[SpikeCameraEnv] = [make(**{**options, **own}) for own in checked_models(models, self.num_envs)]
-        for env in self.envs:
-            _check_phases(env)
+        self.envs = _made(make, options, checked_models(models, self.num_envs))
         one = self.envs[0]
         self.observation, self.obs_state, self._view = one.observation, one.obs_state, one.view
         self.single_observation_space, self.single_action_space = one.observation_space, one.action_space
@@ -123,7 +123,8 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         for env in self.envs:
             env.observation, env.obs_state = Spikes(), False
         self._cameras: Any = HostCameras(self.envs, threads) if device is None else self._on(device)
-        self._start_threads(threads)
+        self.device: Any = self._view.device
+        self._workers = Workers(threads)
         self._state: Any = None
         self._seen: Any = None  # the last observation, where a part of it may be given again
         self._over = np.zeros(self.num_envs, bool)
@@ -156,7 +157,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
             self._check_part()
         state, self._state = self._state, None  # after a reset that fails nothing can be stepped
         numbers = np.flatnonzero(which).tolist()
-        self._each(lambda n: self.envs[n].begin(seed=seeds[n], options=own[n]), numbers)
+        self.each(lambda n: self.envs[n].begin(seed=seeds[n], options=own[n]), numbers)
         rows, first, infos = self._first_blocks(which)
         self._state = first if which.all() else replaced(state, first, which)
         seen = rows if which.all() else with_rows(self._seen, rows, which)
@@ -177,9 +178,9 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         """
         self._open()
         self._check_steppable()
-        given = checked_actions(self._cameras.on_host(actions), self.action_space.shape)
+        given = checked_actions(actions, self.action_space.shape)
         fresh = self._over & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
-        self._each(lambda n: self.envs[n].begin(), np.flatnonzero(fresh).tolist())
+        self.each(lambda n: self.envs[n].begin(), np.flatnonzero(fresh).tolist())
         for n in np.flatnonzero(~fresh).tolist():
             self.envs[n].turn(given[n])
         if fresh.any():
@@ -215,7 +216,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
             return attribute(*args, **kwargs) if callable(attribute) else attribute
 
         self._open()
-        return tuple(self._each(of, range(self.num_envs)))
+        return tuple(self.each(of, range(self.num_envs)))
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of every environment; see `call`."""
@@ -237,6 +238,10 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         for env, value in zip(self.envs, each, strict=True):
             env.set_wrapper_attr(name, value)
 
+    def each(self, work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
+        """Work of the numbers of environments, each done on the thread of its environment; see `Workers.each`."""
+        return self._workers.each(work, numbers)
+
     @property
     def np_random_seed(self) -> Any:
         """N seeds of the environments' generators."""
@@ -248,23 +253,17 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         return self.get_attr("np_random")
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close every environment on its thread, and end the threads."""
-        if self._process != os.getpid():  # a fork has no threads, and what they hold is not its own
-            return
-        self._each(lambda n: self.envs[n].close(), range(self.num_envs))
-        for worker in self._workers:
-            worker.shutdown()
+        """Close every environment on its thread, and end the threads.
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Without threads; the copy has its own."""
-        return {name: value for name, value in vars(self).items() if name != "_workers"} | {
-            "_threads": len(self._workers)
-        }
+        Args:
+            kwargs: `waits=False` does not wait until that is done.
+        """
+        self._workers.close(lambda n: self.envs[n].close(), range(self.num_envs), **kwargs)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        threads = state.pop("_threads")
-        vars(self).update(state)
-        self._start_threads(threads)
+    def __del__(self) -> None:
+        if hasattr(self, "_workers") and not self.closed:
+            with suppress(RuntimeError):  # at the end of the program there are no threads any more
+                self.close(waits=False)
 
     def _on(self, device: Any) -> Any:
         """The cameras on a torch device."""
@@ -276,16 +275,12 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         self._view = replace(self._view, device=cameras.device)
         return cameras
 
-    def _start_threads(self, count: int) -> None:
-        self._process = os.getpid()
-        self._workers = [ThreadPoolExecutor(1, thread_name_prefix=f"spikecam-envs-{n}") for n in range(count)]
-
     def _next_blocks(
         self, fresh: NDArray[np.bool_]
     ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], list[dict[str, Any]]]:
         """The next block of all, and infos by environment; fresh (N,): which episodes begin with it."""
         numbers = range(self.num_envs)
-        picture, self._state = self.observation.step(self._cameras.exposed(self._each, numbers), self._state)
+        picture, self._state = self.observation.step(self._cameras.exposed(self.each, numbers), self._state)
         outcomes = self._by_scene(lambda n: self._outcome(n, bool(fresh[n])), numbers)
         rewards, terminated, truncated, infos = (list(values) for values in zip(*outcomes, strict=True))
         late = False if self.max_episode_steps is None else self._steps >= self.max_episode_steps
@@ -303,7 +298,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         none begins."""
         numbers = np.flatnonzero(which).tolist()
         self._over[which], self._steps[which] = False, 0
-        blocks = self._cameras.exposed(self._each, numbers)
+        blocks = self._cameras.exposed(self.each, numbers)
         picture, state = self.observation.step(blocks, self.observation.start(self._view, len(numbers)))
         own = self._by_scene(lambda n: self.envs[n].begun()[1], numbers)
         seen = self._observed(picture, state, own)
@@ -316,7 +311,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         """Observation and infos of a step, after which the next episodes begin at once."""
         over = self._over.copy()
         final = self._cameras.returned(seen)
-        self._each(lambda n: self.envs[n].begin(), np.flatnonzero(over).tolist())
+        self.each(lambda n: self.envs[n].begin(), np.flatnonzero(over).tolist())
         rows, state, first = self._first_blocks(over)
         self._state = replaced(self._state, state, over)
         for n in np.flatnonzero(over).tolist():
@@ -343,26 +338,8 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         return seen
 
     def _by_scene(self, work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
-        """As `_each`; on this thread where no scene needs its own."""
-        return (self._each if any(self.envs[n].renders for n in numbers) else in_turn)(work, numbers)
-
-    def _each(self, work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
-        """Work of each of these environments, done on its own thread.
-
-        Args:
-            work: of an environment's number.
-            numbers: of environments.
-
-        Returns:
-            A value for each number.  Where some fail, the first error is raised when all are done.
-        """
-        shares: dict[int, list[int]] = {}
-        for n in numbers:
-            shares.setdefault(n % len(self._workers), []).append(n)
-        futures = {n: self._workers[n].submit(in_turn, work, share) for n, share in shares.items()}
-        wait(futures.values())
-        done = {n: iter(future.result()) for n, future in futures.items()}
-        return [next(done[n % len(self._workers)]) for n in numbers]
+        """As `each`; on this thread where no scene needs its own."""
+        return (self.each if any(self.envs[n].renders for n in numbers) else in_turn)(work, numbers)
 
     def _open(self) -> None:
         if self.closed:
@@ -381,8 +358,24 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         """Raise an error where a part of the environments cannot be reset."""
         if self._state is None:
             raise NotReadyError("the environments have no scene yet; call reset without reset_mask first")
-        if self._view.device is not None and not self.observation.begins_alone:
+        if self.device is not None and not self.observation.begins_alone:
             raise InputError(f"reset_mask selects some and obs is {_law(self)}; on a device reset all of them")
+
+
+def _made(make: Callable[..., SpikeCameraEnv], options: dict[str, Any], own: list[dict[str, Any]]) -> list[Any]:
+    """Environments with these options, and others of their own."""
+    try:
+        envs = [make(**{**options, **its}) for its in own]
+    except (TypeError, InputError) as error:
+        keywords = list(signature(SpikeCameraVectorEnv.__init__).parameters.values())
+        names = [one.name for one in keywords if one.kind is Parameter.KEYWORD_ONLY]
+        for name in options:
+            if repr(name) in str(error) and get_close_matches(name, names):
+                raise unknown_name("keyword of a vector environment", name, names) from error
+        raise
+    for env in envs:
+        _check_phases(env)
+    return envs
 
 
 def _law(env: SpikeCameraVectorEnv) -> str:

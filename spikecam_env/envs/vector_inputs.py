@@ -142,28 +142,37 @@ def checked_options(options: Any, count: int) -> tuple[NDArray[np.bool_], list[d
     return mask, [given] * count
 
 
-def checked_actions(actions: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+def checked_actions(actions: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     """Actions of all environments, of finite numbers; values beyond [-1, 1] are cut by each environment.
 
     Args:
-        actions: as they were given, on the host.
+        actions: as they were given: an array or a tensor, or lists of numbers.
         shape: (N, numbers).
 
     Returns:
-        The actions.
+        An array of this shape.
 
     Raises:
-        InputError: for another shape, for what are no numbers, and for numbers that are not finite.
+        InputError: for another shape, for values of another type, and for numbers that are not finite.
     """
-    if actions.dtype.kind not in "fiub":
-        raise InputError(f"actions are {actions.dtype}, {shown(actions.tolist())}; they must be numbers, {shape}")
-    if actions.shape != shape:
-        raise InputError(f"actions have shape {actions.shape}; they must be one an environment, {shape}")
-    finite = np.isfinite(actions).all(axis=tuple(range(1, actions.ndim)))
+    try:
+        given = _on_host(actions)
+    except ValueError as error:
+        raise InputError(f"actions = {shown(actions)}; they must be numbers, {shape}") from error
+    if given.dtype.kind not in "fiub":
+        raise InputError(f"actions are {given.dtype}, {shown(given.tolist())}; they must be numbers, {shape}")
+    if given.shape != shape:
+        raise InputError(f"actions have shape {given.shape}; they must be one an environment, {shape}")
+    finite = np.isfinite(given).all(axis=tuple(range(1, given.ndim)))
     if not finite.all():
         n = int(finite.argmin())
-        raise InputError(f"actions[{n}] = {shown(actions[n].tolist())}; it must be {_finite(shape[1])} in [-1, 1]")
-    return actions
+        raise InputError(f"actions[{n}] = {shown(given[n].tolist())}; it must be {_finite(shape[1])} in [-1, 1]")
+    return given
+
+
+def _on_host(values: Any) -> NDArray[Any]:
+    """An array, of tensors too, wherever they are."""
+    return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
 
 
 def _finite(count: int) -> str:
@@ -179,7 +188,7 @@ def _checked_dict(options: Any, name: str) -> dict[str, Any]:
 
 
 def _checked_mask(mask: Any, count: int) -> NDArray[np.bool_]:
-    given = np.array(mask.cpu() if hasattr(mask, "cpu") else mask)  # a tensor, where cameras are on a device
+    given = _on_host(mask)
     if given.shape != (count,) or given.dtype != bool:
         raise InputError(f"{RESET_MASK} = {shown(mask)}; it must be true or false for each of {count} environments")
     if not given.any():
