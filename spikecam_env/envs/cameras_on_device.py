@@ -85,9 +85,11 @@ class DeviceCameras:
         return batch
 
     def _check_models(self) -> None:
-        for number, env in enumerate(self._envs):
-            if not isinstance(env.sensor, Seat):
-                raise InputError(f"environment {number} has another model; with a device all episodes keep theirs")
+        others = [n for n, env in enumerate(self._envs) if not isinstance(env.sensor, Seat)]
+        for number in others:  # so that the next reset finds them in the batch
+            self._envs[number].take_seat(Seat(self, number, self._batch.models[number]))
+        if others:
+            raise InputError(f"environment {others[0]} has another model; with a device all episodes keep theirs")
 
     def _light(self, given: Sequence[SpikeCameraEnv], each: Each) -> list[Keyframes]:
         envs: Any = given

@@ -12,6 +12,7 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence
 
 import spikecam_env.envs  # noqa: F401 - registers
+from spikecam_env.bench.learners import bench_learners
 from spikecam_env.errors import InputError
 from tests.envs.kinds import DISK
 
@@ -154,3 +155,10 @@ def test_the_wrappers_are_had_without_stable_baselines() -> None:
     )
     printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
     assert "stable-baselines3 is not installed; pip install 'spikecam-env[sb3]'" in printed
+
+
+def test_the_bench_has_a_row_for_each_vector() -> None:
+    rows = bench_learners(count=2, rollout=4, rounds=1)
+    assert [(row["vector"], row["environments"]) for row in rows] == [("DummyVecEnv", 2), ("SB3Cameras", 2)]
+    assert all(row["steps/s"] > 0 and row["steps/s with PPO"] > 0 for row in rows)
+    assert rows[0]["x DummyVecEnv"] == rows[0]["x DummyVecEnv, PPO"] == 1.0
