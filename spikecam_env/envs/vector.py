@@ -62,7 +62,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     | DISABLED | with `reset(options={"reset_mask": over})`, before which a step is refused |
 
     `envs` are the single environments, to look at; they expose the block, and the observation is made of the blocks
-    of all at once.  Before the first reset a vector environment can be pickled and copied.
+    of all at once.  A vector environment can be pickled and copied.
 
     Args:
         single: makes one environment: a class or its entry point.
@@ -91,7 +91,11 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         >>> cameras.close()
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["rgb_array"],
+        "render_fps": 25,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
@@ -173,12 +177,13 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
             (observation, reward, terminated, truncated, info), each with a leading axis N.
 
         Raises:
-            InputError: for actions of another shape, and for what are no finite numbers; nothing is stepped then.
+            InputError: for actions of another shape or type, and for numbers that are not finite; nothing is stepped
+                then.
             NotReadyError: before the first reset, after `close`, and, where DISABLED, where an episode is over.
         """
         self._open()
         self._check_steppable()
-        given = checked_actions(actions, self.action_space.shape)
+        given = checked_actions(actions, self.action_space.shape or ())
         fresh = self._over & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
         self.each(lambda n: self.envs[n].begin(), np.flatnonzero(fresh).tolist())
         for n in np.flatnonzero(~fresh).tolist():
@@ -247,7 +252,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         """N seeds of the environments' generators."""
         return self.get_attr("np_random_seed")
 
-    @property
+    @property  # type: ignore[misc]  # read alone, as of gymnasium's vectors of environments
     def np_random(self) -> Any:
         """N generators."""
         return self.get_attr("np_random")

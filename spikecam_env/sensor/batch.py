@@ -11,8 +11,8 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.checked import checked_count, checked_seed, checked_shape
-from spikecam_env.errors import InputError
+from spikecam_env.checked import checked_count, checked_seed, checked_shape, checked_whole
+from spikecam_env.errors import InputError, shown
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import cuda
 from spikecam_env.sensor.light import (
@@ -125,11 +125,11 @@ class SpikeSensorBatch:
         """Put the cameras of another batch, mid-stream, in the place of some of these.
 
         Args:
-            cameras: numbers of those that go.
+            cameras: numbers of those that go, each once.
             others: as many, of the same shape, models and device; they are not to be stepped any more.
 
         Raises:
-            InputError: for another number of cameras, and for cameras of another shape, model or device.
+            InputError: for numbers of no camera or of one twice, and for others that do not fit in their places.
 
         Example:
             >>> cameras, others = (SpikeSensorBatch("ideal", (2, 2), seeds, "cpu") for seeds in ([0, 1], [7]))
@@ -137,8 +137,10 @@ class SpikeSensorBatch:
             >>> cameras.seeds
             (0, 7)
         """
-        chosen = np.array(cameras, np.int64)
+        chosen = np.array([checked_whole(b, "camera", 0, len(self) - 1) for b in cameras], np.int64)
         models = tuple(self.models[b] for b in chosen)
+        if len(set(chosen.tolist())) < len(chosen):
+            raise InputError(f"cameras = {shown(list(cameras))}; give each number once")
         if (others.shape, others.device, others.models) != (self.shape, self.device, models):
             raise InputError(
                 f"the other batch has {len(others)} cameras of {others.shape} on {others.device}; it must have "

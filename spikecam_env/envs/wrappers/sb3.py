@@ -103,7 +103,8 @@ class SB3Cameras(VecEnv):
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """A picture of each, where there is a render mode."""
-        return self.cameras.render() or [None] * self.num_envs
+        pictures: Any = self.cameras.render()
+        return [None] * self.num_envs if pictures is None else list(pictures)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of these environments."""
@@ -118,7 +119,7 @@ class SB3Cameras(VecEnv):
         """Call a method of these environments."""
         envs = self._native.envs
         return self._native.each(
-            lambda n: envs[n].get_wrapper_attr(method_name)(*args, **kwargs), self._get_indices(indices)
+            lambda n: envs[n].get_wrapper_attr(method_name)(*args, **kwargs), list(self._get_indices(indices))
         )
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
