@@ -55,6 +55,21 @@ class ManyDnSS:
         for stream in np.flatnonzero(which):
             self._chains[stream] = self._chain()
 
+    def exchange(self, which: NDArray[np.bool_], others: ManyDnSS) -> None:
+        """Put the streams of others, mid-way, in the place of some of these.
+
+        Args:
+            which: (N,) those that go.
+            others: as many streams of the same denoiser; nothing is to be pushed to them any more.
+
+        Raises:
+            InputError: where the denoiser is on a device.
+        """
+        if self._there is not None or others._there is not None:
+            raise InputError("streams on a device lie in one memory and cannot be exchanged; leave device out")
+        for stream, chain in zip(np.flatnonzero(which), others._chains, strict=True):
+            self._chains[stream] = chain
+
     def push(self, spikes: Any) -> list[Any]:
         """(N, K, H, W) uint8 more frames of every stream -> N times the frames (F, H, W) they complete; F may be 0.
 

@@ -38,6 +38,7 @@ class Rate(Observation):
     white: float = field(default=1.0, kw_only=True)
 
     takes_tensors = True
+    begins_alone = False  # on a device the windows of all streams lie in one memory
 
     def __post_init__(self) -> None:
         checked_number(self.white, "white", 0.0, above=True)
@@ -76,9 +77,20 @@ class Denoising:
     def restarted(self, which: Streams) -> Denoising:
         """This, with these streams before their first frame."""
         self._denoiser.restart(which)
-        for array in (self._fired, self._picture, self.pushed, self.finished):
+        for array in self._arrays:
             array[which] = 0
         return self
+
+    def replaced(self, others: Denoising, which: Streams) -> Denoising:
+        """This, with other streams in the place of these."""
+        self._denoiser.exchange(which, others._denoiser)
+        for array, other in zip(self._arrays, others._arrays, strict=True):
+            array[which] = other
+        return self
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        return self._fired, self._picture, self.pushed, self.finished
 
     def seen(self, spikes: Any) -> Any:
         """(N, K, H, W) more frames -> (N, 1, H, W) what is seen after them."""

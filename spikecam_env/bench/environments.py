@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import spikecam_env.envs  # noqa: F401
+from spikecam_env.bench.learners import bench_learners
 from spikecam_env.envs.spike_camera import SpikeCameraEnv, lights_of
 from spikecam_env.sensor import Keyframes, step_together
 from spikecam_env.threads import as_many
@@ -67,8 +68,9 @@ class Contestant:
 
 
 def bench_environments() -> dict[str, list[dict[str, Any]]]:
-    """Tables by title: `bench_vectors` and `bench_episodes`."""
-    return {"one camera and many": bench_vectors(), "episodes of one camera": bench_episodes()}
+    """Tables by title: `bench_vectors`, `bench_episodes` and, with stable-baselines3, `bench_learners`."""
+    tables = {"one camera and many": bench_vectors(), "episodes of one camera": bench_episodes()}
+    return tables | {title: rows for title, rows in {"stable-baselines3": bench_learners()}.items() if rows}
 
 
 def bench_episodes(

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from scenes.planes_on_device import planes_on
+from spikecam_env.envs.cameras_on_host import by_place
 from spikecam_env.envs.observations import Blocks, Observation
 from spikecam_env.envs.spike_camera import Each, SpikeCameraEnv
 from spikecam_env.errors import InputError
@@ -47,32 +47,52 @@ class DeviceCameras:
         """A camera's next frame."""
         return 0 if number in self._new else int(self._batch.frame[number])
 
-    def exposed(self, each: Each) -> Blocks:
-        """The next block of every camera, along the path that it has taken; each: asks scenes that are no planes."""
-        self._begun()
-        light = self._light(each)
-        spikes = self._batch.step(light, self._envs[0].frames_per_step)
-        for env, own, block in zip(self._envs, light, spikes, strict=True):
-            env.take(own, block)
-        there: Any = spikes
-        return Blocks(there, light, self._envs[0].model.frame_rate_hz)
+    def exposed(self, each: Each, numbers: Sequence[int]) -> Blocks:
+        """The next block of some cameras, along the paths that they follow.
 
-    def tensors(self, values: Any) -> Any:
+        Args:
+            each: calls a function of each number, on the thread of that environment.
+            numbers: all, or some whose episodes begin with this block.
+
+        Returns:
+            Their blocks, in this order.
+        """
+        self._check_models()
+        envs = [self._envs[n] for n in numbers]
+        batch = self._batch_of(numbers)
+        light = self._light(envs, by_place(each, numbers))
+        spikes: Any = batch.step(light, envs[0].frames_per_step)
+        if batch is not self._batch:
+            self._batch.exchange(numbers, batch)
+        for env, own, block in zip(envs, light, spikes, strict=True):
+            env.take(own, block)
+        return Blocks(spikes, light, envs[0].model.frame_rate_hz)
+
+    def returned(self, values: Any) -> Any:
         """Arrays, or a table of them, on the device."""
         if isinstance(values, dict):
-            return {name: self.tensors(value) for name, value in values.items()}
+            return {name: self.returned(value) for name, value in values.items()}
         return torch.as_tensor(values, device=self.device)
 
-    def _begun(self) -> None:
-        for number, env in enumerate(self._envs):
-            if not isinstance(env.sensor, Seat):
-                raise InputError(f"environment {number} has another model; with a device all episodes keep theirs")
-        mask = np.array([number in self._new for number in range(len(self._batch))])
-        self._batch.reset([self._new.get(n, seed) for n, seed in enumerate(self._batch.seeds)], mask)
-        self._new = {}
+    def _batch_of(self, numbers: Sequence[int]) -> SpikeSensorBatch:
+        """Cameras, those among them that begin anew at frame 0: the batch itself for all of them."""
+        new = {n: self._new.pop(n) for n in numbers if n in self._new}
+        batch = self._batch
+        if len(numbers) < len(batch):
+            models = [batch.models[n] for n in numbers]
+            return SpikeSensorBatch(models, batch.shape, [new[n] for n in numbers], batch.device)
+        batch.reset([new.get(n, seed) for n, seed in enumerate(batch.seeds)], np.array([n in new for n in numbers]))
+        return batch
 
-    def _light(self, each: Each) -> list[Keyframes]:
-        envs: Any = self._envs
+    def _check_models(self) -> None:
+        others = [n for n, env in enumerate(self._envs) if not isinstance(env.sensor, Seat)]
+        for number in others:  # so that the next reset finds them in the batch
+            self._envs[number].take_seat(Seat(self, number, self._batch.models[number]))
+        if others:
+            raise InputError(f"environment {others[0]} has another model; with a device all episodes keep theirs")
+
+    def _light(self, given: Sequence[SpikeCameraEnv], each: Each) -> list[Keyframes]:
+        envs: Any = given
         flat = [n for n, env in enumerate(envs) if not env.renders]
         other = [n for n, env in enumerate(envs) if env.renders]
         planes = [envs[n].scene.plane(*envs[n].asked) for n in flat]
@@ -98,13 +118,8 @@ class Seat:
 
 
 def check_on_device(law: Observation, render_mode: str | None) -> None:
-    """Raise InputError for an observation that takes no tensors, and for pictures for people."""
+    """Raise InputError for an observation that takes no tensors, and for rendered pictures."""
     if not law.takes_tensors:
         raise InputError(f"obs is {type(law).__name__}; with a device it may be 'spikes', 'multibinary', 'tfp', 'rate'")
     if render_mode is not None:
         raise InputError(f"render_mode is {render_mode!r}; leave it out with a device")
-
-
-def on_host(actions: Any) -> NDArray[Any]:
-    """Actions as an array, wherever they are."""
-    return np.asarray(actions.cpu() if isinstance(actions, torch.Tensor) else actions)

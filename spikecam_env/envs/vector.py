@@ -3,18 +3,18 @@
     env = gymnasium.make_vec("spikecam_env/RotatingDisk-v0", num_envs=64, vectorization_mode="vector_entry_point")
 
 The environments live in this process, each on one of a few threads for good (OpenGL's contexts belong to a thread);
-what agents see is computed for all streams at once.  The bits are those of as many single environments.
+observations are computed for all streams at once.  The bits are those of as many single environments.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
+from difflib import get_close_matches
 from importlib import import_module
-from itertools import chain
+from inspect import Parameter, signature
 from typing import Any, TypeVar
 
 import numpy as np
@@ -24,43 +24,71 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import checked_count
-from spikecam_env.envs.observations import Blocks, Spikes, restarted, with_state
-from spikecam_env.envs.spike_camera import SpikeCameraEnv, expose, in_turn
-from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.envs.cameras_on_host import HostCameras
+from spikecam_env.envs.observations import Spikes, replaced, restarted, with_rows, with_state
+from spikecam_env.envs.spike_camera import SpikeCameraEnv, in_turn
+from spikecam_env.envs.vector_infos import batched
+from spikecam_env.envs.vector_inputs import (
+    checked_actions,
+    checked_limit,
+    checked_mode,
+    checked_models,
+    checked_options,
+    checked_seeds,
+)
+from spikecam_env.envs.workers import Workers
+from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.threads import as_many
+
+__all__ = ["SpikeCameraVectorEnv", "batched"]
 
 T = TypeVar("T")
 Outcome = tuple[float, bool, bool, dict[str, Any]]
 """(reward, terminated, truncated, info) of one environment."""
+Step = tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+"""(observation, reward, terminated, truncated, info) of all."""
 
 
 class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     """N environments of one class; observation, action, info and options as of one, with a leading axis N.
 
-    Autoreset     NEXT_STEP: the step after the end of an episode begins the next one; its action is not used, its
-                  reward is 0.  As gymnasium's `SyncVectorEnv`, whose bits these are.
-    Seeds         `reset(seed=s)`: s, s + 1, ...; or a list of N.
+    `autoreset_mode` says when the next episode begins where one is over.  In every mode the bits are those of
+    gymnasium's `SyncVectorEnv`.
 
-    single              makes one environment: a class or its entry point
-    num_envs            N
-    models              N models (presets, TOML paths, SensorModels), one an environment; default: all have `model`
-    max_episode_steps   after which an episode is truncated; None is never
-    device              a torch device: cameras, planar scenes and observations ("spikes", "multibinary", "tfp", "rate")
-                        are there; actions may be tensors, and all but info are tensors there
-                        (`envs.cameras_on_device`)
-    workers             threads; default NUMBA_NUM_THREADS, N at most
-    options             all else, obs and obs_state too: as `single` has them
+    | mode | the next episode begins |
+    |---|---|
+    | NEXT_STEP | with the next step, whose action is not used and whose reward is 0 |
+    | SAME_STEP | at once; `info` has `final_obs` and `final_info` of the episode that is over |
+    | DISABLED | with `reset(options={"reset_mask": over})`, before which a step is refused |
 
-    `envs` are the single environments, to look at; theirs is the block, what is made of it is made for all at once.
-    Errors: InputError as of `single`, for models that are not N, and actions of another shape; NotReadyError for a step
-    before the first reset, and for anything after `close`.
+    `envs` are the single environments, to look at; they expose the block, and the observation is made of the blocks
+    of all at once.  A vector environment can be pickled and copied.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> cameras = SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24))
-    >>> spikes, infos = cameras.reset(seed=0)
-    >>> spikes.shape
-    (2, 40, 16, 24)
-    >>> cameras.close()
+    Args:
+        single: makes one environment: a class or its entry point.
+        num_envs: N.
+        models: N models (presets, TOML paths, SensorModels), one an environment; default: all have `model`.
+        max_episode_steps: after which an episode is truncated; None or -1 is never.
+        autoreset_mode: an `AutoresetMode` or its value: "NextStep", "SameStep", "Disabled".
+        workers: threads; default NUMBA_NUM_THREADS, N at most.
+        render_mode: as `single` has it.
+        device: a torch device: cameras, planar scenes and observations ("spikes", "multibinary", "tfp", "rate") are on
+            it; actions may be tensors, and all that is returned but info are tensors (`envs.cameras_on_device`).
+        options: all else, obs and obs_state too: as `single` has them.
+
+    Raises:
+        InputError: as of `single`; for an argument out of range, seeds, options, models and actions that are not N, and
+            for the denoiser on a device in SAME_STEP mode.
+        NotReadyError: for a step before the first reset or, where DISABLED, of an episode that is over, and for
+            anything after `close`.
+
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> cameras = SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24))
+        >>> spikes, infos = cameras.reset(seed=0)
+        >>> spikes.shape
+        (2, 40, 16, 24)
+        >>> cameras.close()
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
@@ -76,24 +104,21 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         *,
         models: Sequence[Any] | None = None,
         max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         workers: int | None = None,
         render_mode: str | None = None,
         device: Any = None,
         **options: Any,
     ) -> None:
         self.num_envs = checked_count(num_envs, "num_envs")
-        self.max_episode_steps = max_episode_steps
+        self.max_episode_steps = checked_limit(max_episode_steps)
+        self.autoreset_mode = checked_mode(autoreset_mode)
+        self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
+        threads = as_many(None if workers is None else checked_count(workers, "workers"), self.num_envs)
         make: Any = load_env_creator(single) if isinstance(single, str) else single
         options |= {"render_mode": render_mode, "threads": options.get("threads", 1)}
-        self.envs: list[SpikeCameraEnv] = [make(**{**options, **own}) for own in _own_models(models, self.num_envs)]
-        for env in self.envs:
-            _check_phases(env)
-        self._workers = [
-            ThreadPoolExecutor(1, thread_name_prefix=f"spikecam-envs-{n}")
-            for n in range(as_many(workers, self.num_envs))
-        ]
-        self._process = os.getpid()
+        self.envs = _made(make, options, checked_models(models, self.num_envs))
         one = self.envs[0]
         self.observation, self.obs_state, self._view = one.observation, one.obs_state, one.view
         self.single_observation_space, self.single_action_space = one.observation_space, one.action_space
@@ -101,87 +126,209 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         for env in self.envs:
             env.observation, env.obs_state = Spikes(), False
-        self._there: Any = None if device is None else import_module("spikecam_env.envs.cameras_on_device")
-        if self._there is not None:
-            self._there.check_on_device(self.observation, render_mode)
-            self._cameras = self._there.DeviceCameras(self.envs, device)
-            self._view = replace(self._view, device=self._cameras.device)
-        self._seen: Any = None
+        self._cameras: Any = HostCameras(self.envs, threads) if device is None else self._on(device)
+        self.device: Any = self._view.device
+        self._workers = Workers(threads)
+        self._state: Any = None
+        self._seen: Any = None  # the last observation, where a part of it may be given again
         self._over = np.zeros(self.num_envs, bool)
         self._steps = np.zeros(self.num_envs, int)
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | Sequence[dict[str, Any] | None] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
-        """New episodes everywhere; `options` are given to each."""
-        self._open()
-        seeds = _seeds(seed, self.num_envs)
-        numbers = range(self.num_envs)
-        self._each(lambda n: self.envs[n].begin(seed=seeds[n], options=options), numbers)
-        self._seen = self.observation.start(self._view, self.num_envs)
-        self._over[:], self._steps[:] = False, 0
-        seen, _, _, _, info = self._exposed(np.ones(self.num_envs, bool))
-        return seen, info
+        """New episodes everywhere, or where a mask selects.
 
-    def step(
-        self, actions: ArrayLike
-    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Every environment a step further; where an episode was over, the first block of the next."""
+        Args:
+            seed: s for s, s + 1, ..., or N seeds; None goes on with the generators as they are.
+            options: of one environment, given to each; or N of them.  With "reset_mask", (N,) bool, episodes begin
+                where it is true; the others stay as they are, and the last observation of them is returned.
+
+        Returns:
+            (observation of all, info of those whose episode begins).
+
+        Raises:
+            InputError: for unusable seeds and options.
+            NotReadyError: for a mask before the first whole reset, and after `close`.
+        """
         self._open()
-        if self._seen is None:
-            raise NotReadyError("the environments have no scene yet; call reset first")
-        given = np.asarray(actions) if self._there is None else self._there.on_host(actions)
-        if given.shape[:1] != (self.num_envs,):
-            raise InputError(
-                f"actions have shape {given.shape}; they must be one an environment, ({self.num_envs}, ...)"
-            )
-        fresh = self._over.copy()
-        self._each(lambda n: self.envs[n].begin(), np.flatnonzero(fresh).tolist())
+        which, own = checked_options(options, self.num_envs)
+        seeds = checked_seeds(seed, self.num_envs)
+        if not which.all():
+            self._check_part()
+        state, self._state = self._state, None  # after a reset that fails nothing can be stepped
+        numbers = np.flatnonzero(which).tolist()
+        self.each(lambda n: self.envs[n].begin(seed=seeds[n], options=own[n]), numbers)
+        rows, first, infos = self._first_blocks(which)
+        self._state = first if which.all() else replaced(state, first, which)
+        seen = rows if which.all() else with_rows(self._seen, rows, which)
+        return self._cameras.returned(self._kept(seen)), batched(infos)
+
+    def step(self, actions: ArrayLike) -> Step:
+        """A step of every environment.
+
+        Args:
+            actions: (N, numbers) in [-1, 1]; values beyond are cut.
+
+        Returns:
+            (observation, reward, terminated, truncated, info), each with a leading axis N.
+
+        Raises:
+            InputError: for actions of another shape or type, and for numbers that are not finite; nothing is stepped
+                then.
+            NotReadyError: before the first reset, after `close`, and, where DISABLED, where an episode is over.
+        """
+        self._open()
+        self._check_steppable()
+        given = checked_actions(actions, self.action_space.shape or ())
+        fresh = self._over & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
+        self.each(lambda n: self.envs[n].begin(), np.flatnonzero(fresh).tolist())
         for n in np.flatnonzero(~fresh).tolist():
             self.envs[n].turn(given[n])
         if fresh.any():
-            self._seen = restarted(self.observation, self._view, self._seen, fresh)
+            self._state = restarted(self.observation, self._view, self._state, fresh)
         self._steps = np.where(fresh, 0, self._steps + 1)
-        return self._exposed(fresh)
+        seen, rewards, terminated, truncated, infos = self._next_blocks(fresh)
+        self._over = terminated | truncated
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
+            seen, infos = self._with_next_episodes(seen, infos)
+        return *map(self._cameras.returned, (self._kept(seen), rewards, terminated, truncated)), batched(infos)
 
     def render(self) -> tuple[Any, ...] | None:
         """N pictures (H, W, 3) uint8, or None without a render mode."""
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """An attribute of every environment, called where it can be; as of gymnasium's vector environments.
+
+        Args:
+            name: of the attribute.
+            args: of the call.
+            kwargs: of the call.
+
+        Returns:
+            N values.
+
+        Raises:
+            AttributeError: for an attribute that the environments do not have.
+        """
+
+        def of(n: int) -> Any:
+            attribute = self.envs[n].get_wrapper_attr(name)
+            return attribute(*args, **kwargs) if callable(attribute) else attribute
+
+        self._open()
+        return tuple(self.each(of, range(self.num_envs)))
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of every environment; see `call`."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of every environment.
+
+        Args:
+            name: of the attribute.
+            values: a list or tuple of N, or one value for all.
+
+        Raises:
+            InputError: for a list of another length.
+        """
+        each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
+        if len(each) != self.num_envs:
+            raise InputError(f"values are {len(each)}; give one an environment, {self.num_envs}, or one for all")
+        for env, value in zip(self.envs, each, strict=True):
+            env.set_wrapper_attr(name, value)
+
+    def each(self, work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
+        """Work of the numbers of environments, each done on the thread of its environment; see `Workers.each`."""
+        return self._workers.each(work, numbers)
+
+    @property
+    def np_random_seed(self) -> Any:
+        """N seeds of the environments' generators."""
+        return self.get_attr("np_random_seed")
+
+    @property  # type: ignore[misc]  # read alone, as of gymnasium's vectors of environments
+    def np_random(self) -> Any:
+        """N generators."""
+        return self.get_attr("np_random")
+
     def close_extras(self, **kwargs: Any) -> None:
-        """Close every environment on its thread, and end the threads."""
-        if self._process != os.getpid():  # a fork has no threads, and what they hold is not its own
-            return
-        self._each(lambda n: self.envs[n].close(), range(self.num_envs))
-        for worker in self._workers:
-            worker.shutdown()
+        """Close every environment on its thread, and end the threads.
 
-    def _exposed(
+        Args:
+            kwargs: `waits=False` does not wait until that is done.
+        """
+        self._workers.close(lambda n: self.envs[n].close(), range(self.num_envs), **kwargs)
+
+    def __del__(self) -> None:
+        if hasattr(self, "_workers") and not self.closed:
+            with suppress(RuntimeError):  # at the end of the program there are no threads any more
+                self.close(waits=False)
+
+    def _on(self, device: Any) -> Any:
+        """The cameras on a torch device."""
+        module = import_module("spikecam_env.envs.cameras_on_device")
+        module.check_on_device(self.observation, self.render_mode)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and not self.observation.begins_alone:
+            raise InputError(f"autoreset_mode is SameStep and obs {_law(self)}; on a device take NextStep, or 'tfp'")
+        cameras = module.DeviceCameras(self.envs, device)
+        self._view = replace(self._view, device=cameras.device)
+        return cameras
+
+    def _next_blocks(
         self, fresh: NDArray[np.bool_]
-    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """The next block of all, and what follows; fresh (N,): which episodes begin with it."""
-        blocks = self._blocks() if self._there is None else self._cameras.exposed(self._each)
-        picture, self._seen = self.observation.step(blocks, self._seen)
-        age = np.broadcast_to(self.observation.age(self._seen), (self.num_envs,)).astype(np.float64)
+    ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], list[dict[str, Any]]]:
+        """The next block of all, and infos by environment; fresh (N,): which episodes begin with it."""
         numbers = range(self.num_envs)
-        each = self._each if any(env.renders for env in self.envs) else in_turn
-        outcomes = each(lambda n: self._outcome(n, bool(fresh[n])), numbers)
-        rewards, terminated, truncated, infos = zip(*outcomes, strict=True)
+        picture, self._state = self.observation.step(self._cameras.exposed(self.each, numbers), self._state)
+        outcomes = self._by_scene(lambda n: self._outcome(n, bool(fresh[n])), numbers)
+        rewards, terminated, truncated, infos = (list(values) for values in zip(*outcomes, strict=True))
         late = False if self.max_episode_steps is None else self._steps >= self.max_episode_steps
-        ends = np.array(terminated, bool), np.array(truncated, bool) | (late & ~fresh)
-        self._over = ends[0] | ends[1]
-        info = batched(infos) | {"age": age, "_age": np.ones(self.num_envs, bool)}
-        seen = with_state(picture, info["gaze"], age) if self.obs_state else picture
-        if self._there is None:
-            return seen, np.array(rewards, np.float64), *ends, info
-        of_agents = seen, np.array(rewards, np.float64), *ends
-        return *map(self._cameras.tensors, of_agents), info
+        seen = self._observed(picture, self._state, infos)
+        return (
+            seen,
+            np.array(rewards, np.float64),
+            np.array(terminated, bool),
+            np.array(truncated, bool) | (late & ~fresh),
+            infos,
+        )
 
-    def _blocks(self) -> Blocks:
-        """The next block of all, in memory of its own."""
-        spikes = np.empty((self.num_envs, self._view.frames_per_step, *self._view.shape), np.uint8)
-        expose(self.envs, outs=list(spikes), threads=len(self._workers), each=self._each)
-        return Blocks(spikes, [env.blocks.light[0] for env in self.envs], self._view.frame_rate_hz)
+    def _first_blocks(self, which: NDArray[np.bool_]) -> tuple[Any, Any, list[dict[str, Any]]]:
+        """The blocks with which episodes begin: what is observed of those streams, their state, and infos, empty where
+        none begins."""
+        numbers = np.flatnonzero(which).tolist()
+        self._over[which], self._steps[which] = False, 0
+        blocks = self._cameras.exposed(self.each, numbers)
+        picture, state = self.observation.step(blocks, self.observation.start(self._view, len(numbers)))
+        own = self._by_scene(lambda n: self.envs[n].begun()[1], numbers)
+        seen = self._observed(picture, state, own)
+        infos: list[dict[str, Any]] = [{} for _ in self.envs]
+        for n, info in zip(numbers, own, strict=True):
+            infos[n] = info
+        return seen, state, infos
+
+    def _with_next_episodes(self, seen: Any, infos: list[dict[str, Any]]) -> tuple[Any, list[dict[str, Any]]]:
+        """Observation and infos of a step, after which the next episodes begin at once."""
+        over = self._over.copy()
+        final = self._cameras.returned(seen)
+        self.each(lambda n: self.envs[n].begin(), np.flatnonzero(over).tolist())
+        rows, state, first = self._first_blocks(over)
+        self._state = replaced(self._state, state, over)
+        for n in np.flatnonzero(over).tolist():
+            first[n] = {"final_obs": _row(final, n), "final_info": infos[n]} | first[n]
+        return with_rows(seen, rows, over), [a if b else c for a, b, c in zip(first, over, infos, strict=True)]
+
+    def _observed(self, picture: Any, state: Any, infos: Sequence[dict[str, Any]]) -> Any:
+        """What agents see of some streams; the age of the picture goes into infos."""
+        age = np.broadcast_to(self.observation.age(state), (len(infos),)).astype(np.float64)
+        for info, its in zip(infos, age.tolist(), strict=True):
+            info["age"] = its
+        return with_state(picture, [info["gaze"] for info in infos], age) if self.obs_state else picture
 
     def _outcome(self, n: int, fresh: bool) -> Outcome:
         if fresh:
@@ -189,20 +336,60 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         _, reward, terminated, truncated, info = self.envs[n].outcome()
         return reward, terminated, truncated, info
 
-    def _each(self, work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
-        """What `work` of each of these environments returns, done on its own thread.  Raises what the first that fails
-        raises, when all are done."""
-        shares: dict[int, list[int]] = {}
-        for n in numbers:
-            shares.setdefault(n % len(self._workers), []).append(n)
-        futures = {n: self._workers[n].submit(in_turn, work, share) for n, share in shares.items()}
-        wait(futures.values())
-        done = {n: iter(future.result()) for n, future in futures.items()}
-        return [next(done[n % len(self._workers)]) for n in numbers]
+    def _kept(self, seen: Any) -> Any:
+        """The observation, kept for a reset of a part; where that is the way to go on, as a copy."""
+        disabled = self.autoreset_mode is AutoresetMode.DISABLED
+        self._seen = deepcopy(seen) if disabled else seen
+        return seen
+
+    def _by_scene(self, work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
+        """As `each`; on this thread where no scene needs its own."""
+        return (self.each if any(self.envs[n].renders for n in numbers) else in_turn)(work, numbers)
 
     def _open(self) -> None:
         if self.closed:
             raise NotReadyError("the environments are closed; make new ones")
+
+    def _check_steppable(self) -> None:
+        if self._state is None:
+            raise NotReadyError("the environments have no scene yet; call reset first")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
+            raise NotReadyError(
+                f"the episodes of environments {np.flatnonzero(self._over).tolist()} are over and autoreset_mode is "
+                "Disabled; call reset(options={'reset_mask': terminated | truncated}) first"
+            )
+
+    def _check_part(self) -> None:
+        """Raise an error where a part of the environments cannot be reset."""
+        if self._state is None:
+            raise NotReadyError("the environments have no scene yet; call reset without reset_mask first")
+        if self.device is not None and not self.observation.begins_alone:
+            raise InputError(f"reset_mask selects some and obs is {_law(self)}; on a device reset all of them")
+
+
+def _made(make: Callable[..., SpikeCameraEnv], options: dict[str, Any], own: list[dict[str, Any]]) -> list[Any]:
+    """Environments with these options, and others of their own."""
+    try:
+        envs = [make(**{**options, **its}) for its in own]
+    except (TypeError, InputError) as error:
+        keywords = list(signature(SpikeCameraVectorEnv.__init__).parameters.values())
+        names = [one.name for one in keywords if one.kind is Parameter.KEYWORD_ONLY]
+        for name in options:
+            if repr(name) in str(error) and get_close_matches(name, names):
+                raise unknown_name("keyword of a vector environment", name, names) from error
+        raise
+    for env in envs:
+        _check_phases(env)
+    return envs
+
+
+def _law(env: SpikeCameraVectorEnv) -> str:
+    return type(env.observation).__name__
+
+
+def _row(values: Any, n: int) -> Any:
+    """Of stream n."""
+    return {name: value[n] for name, value in values.items()} if isinstance(values, dict) else values[n]
 
 
 def _check_phases(env: Any) -> None:
@@ -214,54 +401,3 @@ def _check_phases(env: Any) -> None:
                 f"{kind.__name__} has a {name} of its own, which a vector environment would not call; override "
                 f"{parts} instead"
             )
-
-
-def batched(infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Infos of N environments as gymnasium's vectors have them: by name an array (N, ...), and as `_name` who has it.
-
-    Numbers and arrays are 0 where there is none; dictionaries are dictionaries of such; anything else is an object.
-
-    >>> infos = batched([{"on_target": True}, {"on_target": False, "episode_number": 7}])
-    >>> infos["episode_number"].tolist(), infos["_episode_number"].tolist()
-    ([0, 7], [False, True])
-    """
-    together: dict[str, Any] = {}
-    alike = all(info.keys() == infos[0].keys() for info in infos)
-    for name in infos[0] if alike else dict.fromkeys(chain.from_iterable(infos)):
-        values = [info.get(name, MISSING) for info in infos]
-        has = np.ones(len(infos), bool) if alike else np.array([value is not MISSING for value in values])
-        together[name], together[f"_{name}"] = _batched_values(values, has), has
-    return together
-
-
-MISSING = object()
-
-
-def _batched_values(values: list[Any], has: NDArray[np.bool_]) -> Any:
-    """values: N, MISSING where not has."""
-    first = values[int(has.argmax())]
-    if isinstance(first, dict):
-        return batched([{} if value is MISSING else value for value in values])
-    if type(first) not in (int, float, bool) and not isinstance(first, (np.number, np.ndarray)):
-        array = np.full(len(values), None, dtype=object)
-        array[has] = [value for value in values if value is not MISSING]
-        return array
-    nothing = np.zeros_like(first)
-    return np.array([nothing if value is MISSING else value for value in values], dtype=nothing.dtype)
-
-
-def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    if seed is None:
-        return [None] * count
-    seeds: list[int | None] = list(range(seed, seed + count)) if isinstance(seed, int) else list(seed)
-    if len(seeds) != count:
-        raise InputError(f"seed has {len(seeds)} numbers; it must be one an environment, {count}, or one for all")
-    return seeds
-
-
-def _own_models(models: Sequence[Any] | None, count: int) -> list[dict[str, Any]]:
-    if models is None:
-        return [{}] * count
-    if isinstance(models, str) or len(models) != count:
-        raise InputError(f"models are {len(models)}; they must be one an environment, {count}")
-    return [{"model": model} for model in deepcopy(list(models))]

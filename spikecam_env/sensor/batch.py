@@ -11,8 +11,8 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.checked import checked_count, checked_seed, checked_shape
-from spikecam_env.errors import InputError
+from spikecam_env.checked import checked_count, checked_seed, checked_shape, checked_whole
+from spikecam_env.errors import InputError, shown
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import cuda
 from spikecam_env.sensor.light import (
@@ -120,6 +120,37 @@ class SpikeSensorBatch:
             self.phase[b] = generator(self.seeds[b], "phase").random(self.shape)
         self._pixels = self._pixels.replaced(chosen, self._started(chosen))
         self.frame[chosen] = 0
+
+    def exchange(self, cameras: Sequence[int], others: SpikeSensorBatch) -> None:
+        """Put the cameras of another batch, mid-stream, in the place of some of these.
+
+        Args:
+            cameras: numbers of those that go, each once.
+            others: as many, of the same shape, models and device; they are not to be stepped any more.
+
+        Raises:
+            InputError: for numbers of no camera or of one twice, and for others that do not fit in their places.
+
+        Example:
+            >>> cameras, others = (SpikeSensorBatch("ideal", (2, 2), seeds, "cpu") for seeds in ([0, 1], [7]))
+            >>> cameras.exchange([1], others)
+            >>> cameras.seeds
+            (0, 7)
+        """
+        chosen = np.array([checked_whole(b, "camera", 0, len(self) - 1) for b in cameras], np.int64)
+        models = tuple(self.models[b] for b in chosen)
+        if len(set(chosen.tolist())) < len(chosen):
+            raise InputError(f"cameras = {shown(list(cameras))}; give each number once")
+        if (others.shape, others.device, others.models) != (self.shape, self.device, models):
+            raise InputError(
+                f"the other batch has {len(others)} cameras of {others.shape} on {others.device}; it must have "
+                f"{len(chosen)} of {self.shape} on {self.device}, of the models of those that go"
+            )
+        seeds = dict(zip(chosen.tolist(), others.seeds, strict=True))
+        self.seeds = tuple(seeds.get(b, seed) for b, seed in enumerate(self.seeds))
+        self.phase, self.frame = self.phase.copy(), self.frame.copy()
+        self.phase[chosen], self.frame[chosen] = others.phase, others.frame
+        self._pixels = self._pixels.replaced(chosen, others._pixels)
 
     def state(self) -> SensorBatchState:
         """A copy of everything that the next step depends on."""

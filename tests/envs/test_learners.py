@@ -151,3 +151,16 @@ def test_rllib_learns_on_a_local_cluster(name: str) -> None:
     assert printed.returncode == 0, printed.stderr
     print(printed.stdout)
     assert f"{name}: {rllib.STEPS} steps" in printed.stdout
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_skrl_takes_the_native_vector(mode: str) -> None:
+    """skrl is in no extra: it asks for TensorBoard; runs where it is installed."""
+    wrap_env = pytest.importorskip("skrl.envs.wrappers.torch", reason="needs skrl").wrap_env
+    torch = importlib.import_module("torch")
+    cameras = gymnasium.make_vec(TRACK, 2, "vector_entry_point", obs="tfp", autoreset_mode=mode, **SMALL)
+    env = wrap_env(cameras)
+    assert env.num_envs == 2 and env.reset()[0].shape == (2, 36 * 36)
+    seen, rewards, *_ = env.step(torch.zeros(2, 2))
+    assert seen.shape == (2, 36 * 36) and rewards.shape == (2, 1)
+    env.close()

@@ -95,4 +95,5 @@ def test_what_has_no_place_on_a_device_is_refused() -> None:
     env = vector(DISK, obs="spikes")
     with pytest.raises(InputError, match="another model"):
         env.reset(seed=0, options={"model": "ideal"})
+    assert len(env.reset(seed=0)[0]) == 3
     env.close()

@@ -137,6 +137,33 @@ def test_reset_starts_some_cameras_anew_and_leaves_the_others_their_stream() -> 
     assert cameras.frame.tolist() == [FRAMES] * 3
 
 
+def test_exchanged_cameras_go_on_in_another_batch_and_the_others_keep_their_stream() -> None:
+    light = np.random.default_rng(0).random((4, 6), dtype=np.float32)
+    batch, others, alone = (SpikeSensorBatch("scsim", (4, 6), seeds, "cpu") for seeds in ([1, 2, 3], [8], [8]))
+    whole = SpikeSensorBatch("scsim", (4, 6), [1, 2, 3], "cpu")
+    for cameras, frames in ((batch, 30), (whole, 30), (others, 12), (alone, 12)):
+        cameras.step(light, frames)
+    batch.exchange([1], others)
+    assert batch.seeds == (1, 8, 3) and batch.frame.tolist() == [30, 12, 30]
+    spikes = batch.step(light, 40).numpy()
+    np.testing.assert_array_equal(spikes[[0, 2]], whole.step(light, 40).numpy()[[0, 2]])
+    np.testing.assert_array_equal(spikes[1], alone.step(light, 40).numpy()[0])
+
+
+def test_cameras_that_do_not_fit_are_not_exchanged() -> None:
+    batch = SpikeSensorBatch("scsim", (4, 6), [1, 2], "cpu")
+    for numbers, others, message in (
+        ([2], SpikeSensorBatch("scsim", (4, 6), [8], "cpu"), "camera = 2"),
+        ([0, 0], SpikeSensorBatch("scsim", (4, 6), [8, 9], "cpu"), "give each number once"),
+        ([0], SpikeSensorBatch("scsim", (4, 6), [8, 9], "cpu"), "it must have 1 of"),
+        ([0], SpikeSensorBatch("scsim", (6, 4), [8], "cpu"), "it must have 1 of"),
+        ([0], SpikeSensorBatch("ideal", (4, 6), [8], "cpu"), "of the models of those that go"),
+    ):
+        with pytest.raises(InputError, match=message):
+            batch.exchange(numbers, others)
+    assert batch.seeds == (1, 2)
+
+
 def test_clean_twins_are_those_of_the_fast_cameras() -> None:
     film = wild_film(25, 0)
     clean = [SpikeSensor("scsim", SHAPE, seed).clean_twin().step(film, FRAMES) for seed in SEEDS]

@@ -24,6 +24,7 @@ MODULES = (
     "spikecam_env.envs.tasks.base",
     "spikecam_env.envs.vector",
     "spikecam_env.envs.wrappers",
+    "spikecam_env.envs.wrappers.sb3",
     "spikecam_env.agents.agent",
     "spikecam_env.agents.training",
     "spikecam_env.agents.tracker",

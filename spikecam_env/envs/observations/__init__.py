@@ -10,7 +10,7 @@ from spikecam_env.envs.observations.blocks import Multibinary, Packed, Spikes
 from spikecam_env.envs.observations.frame_camera import FrameCamera
 from spikecam_env.envs.observations.intervals import ISI, TFI
 from spikecam_env.envs.observations.playback import TFP
-from spikecam_env.envs.observations.protocol import Blocks, Observation, View, restarted
+from spikecam_env.envs.observations.protocol import Blocks, Observation, View, replaced, restarted, with_rows
 from spikecam_env.envs.observations.state import with_state, with_state_space
 from spikecam_env.errors import InputError, shown, unknown_name
 
@@ -27,7 +27,9 @@ __all__ = [
     "Spikes",
     "View",
     "observation",
+    "replaced",
     "restarted",
+    "with_rows",
     "with_state",
     "with_state_space",
 ]

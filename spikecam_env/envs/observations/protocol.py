@@ -58,6 +58,9 @@ class Observation(ABC):
 
     takes_tensors: ClassVar[bool] = False
 
+    begins_alone: ClassVar[bool] = True
+    """Whether a stream on a device may begin anew between two blocks of the others."""
+
     @abstractmethod
     def space(self, view: View) -> spaces.Space[Any]:
         """Of one stream."""
@@ -82,13 +85,46 @@ def restarted(law: Observation, view: View, state: Any, which: Streams) -> Any:
     """The state with these streams before their first block again."""
     if hasattr(state, "restarted"):
         return state.restarted(which)
-    fresh = law.start(view, 1)
-    arrays = [_exchanged(now, first, which) for now, first in zip(state, fresh, strict=True)]
+    return replaced(state, law.start(view, 1), which)
+
+
+def replaced(state: Any, others: Any, which: Streams) -> Any:
+    """A state in which other streams take the place of some.
+
+    Args:
+        state: of N streams.
+        others: the state of as many streams as `which` selects, or of one that takes every place.
+        which: (N,).
+
+    Returns:
+        The state of N streams; arrays of the one before stay as they were.
+    """
+    if hasattr(state, "replaced"):
+        return state.replaced(others, which)
+    arrays = [with_rows(now, other, which) for now, other in zip(state, others, strict=True)]
     return type(state)(*arrays) if arrays else state
 
 
-def _exchanged(now: NDArray[Any], first: NDArray[Any], which: Streams) -> NDArray[Any]:
-    return np.where(which.reshape(-1, *(1,) * (now.ndim - 1)), first, now)
+def with_rows(values: Any, rows: Any, which: Streams) -> Any:
+    """Values of N streams with others in the place of some.
+
+    Args:
+        values: an array or tensor (N, ...), or a dictionary of such.
+        rows: the same of as many streams as `which` selects, or of one that takes every place.
+        which: (N,).
+
+    Returns:
+        A copy.
+
+    Example:
+        >>> with_rows(np.zeros(3), np.array([7.0]), np.array([False, True, False])).tolist()
+        [0.0, 7.0, 0.0]
+    """
+    if isinstance(values, dict):
+        return {name: with_rows(values[name], rows[name], which) for name in values}
+    changed = values.copy() if isinstance(values, np.ndarray) else values.clone()
+    changed[np.flatnonzero(which).tolist()] = rows
+    return changed
 
 
 def grey(rate: NDArray[Any]) -> NDArray[np.uint8]:

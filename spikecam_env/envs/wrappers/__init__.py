@@ -1,4 +1,9 @@
-"""Wrappers of environments, and their twins for vectors."""
+"""Wrappers of environments, and their twins for vectors.
+
+`SB3Cameras` is imported when it is first used: stable-baselines3 is an optional package.
+"""
+
+from typing import Any
 
 from spikecam_env.envs.wrappers.observe import ObserveSpikes, VectorObserveSpikes
 from spikecam_env.envs.wrappers.progress import ProgressReward, VectorProgressReward
@@ -12,3 +17,11 @@ __all__ = [
     "VectorObserveSpikes",
     "VectorProgressReward",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "SB3Cameras":
+        from spikecam_env.envs.wrappers.sb3 import SB3Cameras
+
+        return SB3Cameras
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,63 @@
+"""The cameras of a vector environment on the processor: planes are painted in one call, cameras stepped in one.
+
+`cameras_on_device` has the same methods for a torch device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from spikecam_env.envs.observations import Blocks
+from spikecam_env.envs.spike_camera import Each, SpikeCameraEnv, expose
+
+
+class HostCameras:
+    """The cameras that environments have of their own.
+
+    Args:
+        envs: N.
+        threads: most that are used.
+    """
+
+    def __init__(self, envs: Sequence[SpikeCameraEnv], threads: int) -> None:
+        self._envs, self._threads = envs, threads
+
+    def exposed(self, each: Each, numbers: Sequence[int]) -> Blocks:
+        """The next block of some cameras, along the paths that they follow, in memory of its own.
+
+        Args:
+            each: calls a function of each number, on the thread of that environment.
+            numbers: of the environments.
+
+        Returns:
+            Their blocks, in this order.
+        """
+        envs = [self._envs[n] for n in numbers]
+        spikes = np.empty((len(envs), envs[0].frames_per_step, *envs[0].shape), np.uint8)
+        expose(envs, outs=list(spikes), threads=self._threads, each=by_place(each, numbers))
+        return Blocks(spikes, [env.blocks.light[0] for env in envs], envs[0].model.frame_rate_hz)
+
+    def returned(self, values: Any) -> Any:
+        """Arrays as agents have them."""
+        return values
+
+
+def by_place(each: Each, numbers: Sequence[int]) -> Each:
+    """Work of places in a list of environments, on the threads of those.
+
+    Args:
+        each: calls a function of each number, on the thread of that environment.
+        numbers: of the environments in the list.
+
+    Returns:
+        The same of places in the list.
+    """
+
+    def of_places(work: Callable[[int], Any], places: Sequence[int]) -> list[Any]:
+        place_of = {numbers[place]: place for place in places}
+        return each(lambda n: work(place_of[n]), list(place_of))
+
+    return of_places

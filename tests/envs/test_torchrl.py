@@ -1,0 +1,77 @@
+"""The native vector environment in TorchRL: `GymWrapper` takes it, and its specs are those of what it returns."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+
+import spikecam_env.envs  # noqa: F401 - registers
+
+pytest.importorskip("torchrl", reason="needs torchrl")
+from tensordict.nn import TensorDictModule
+from torchrl.envs import GymWrapper
+from torchrl.envs.utils import check_env_specs
+
+ENVS, STEPS = 2, 70
+CATCH = "spikecam_env/Catch-v1"
+"""An episode has 60 steps at most."""
+
+
+def native(mode: str, **options: Any) -> Any:
+    given = {"shape": (24, 24), "obs": "tfp", "autoreset_mode": mode, **options}
+    return gymnasium.make_vec(CATCH, ENVS, "vector_entry_point", **given)
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
+@pytest.mark.parametrize("options", [{}, {"obs_state": True}, {"obs": "spikes"}, {"obs": "multibinary"}], ids=str)
+def test_specs_are_those_of_what_is_returned(mode: str, options: dict[str, Any]) -> None:
+    env = GymWrapper(native(mode, **options))
+    check_env_specs(env)
+    env.close()
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
+def test_a_rollout_over_the_ends_of_episodes_is_that_of_the_environment(mode: str) -> None:
+    env = GymWrapper(native(mode))
+    env.set_seed(3)
+    policy = TensorDictModule(lambda seen: torch.full((ENVS, 1), 0.3), ["observation"], ["action"])
+    rollout = env.rollout(STEPS, policy, break_when_any_done=False)
+    env.close()
+    assert rollout["next", "done"].any(), "no episode ended"
+    plain = native("SameStep")
+    plain.reset(seed=3)  # by `set_seed`; a rollout begins with a reset of its own
+    seen = [plain.reset()[0]]
+    rewards = []
+    for _ in range(STEPS):
+        picture, reward, *_ = plain.step(np.full((ENVS, 1), 0.3, np.float32))
+        seen.append(picture)
+        rewards.append(reward)
+    plain.close()
+    np.testing.assert_array_equal(rollout["observation"].numpy(), np.stack(seen[:-1], axis=1))
+    np.testing.assert_array_equal(
+        rollout["next", "reward"][..., 0].numpy(), np.stack(rewards, axis=1).astype(np.float32)
+    )
+
+
+def test_an_environment_that_torchrl_drops_is_closed_by_the_garbage_collector() -> None:
+    """The collector clears weak references first, and threads that know their pool by one end then."""
+    program = (
+        "import gc, gymnasium, spikecam_env.envs\n"
+        "class Holder:\n"
+        "    def __init__(self, env): self.env, self.cycle = env, self\n"
+        "    def __del__(self): self.env.close()\n"
+        "env = gymnasium.make_vec('spikecam_env/RotatingDisk-v0', 3, 'vector_entry_point', shape=(16, 16))\n"
+        "env.reset(seed=0)\n"
+        "env.holder = Holder(env)\n"
+        "del env\n"
+        "gc.collect()\n"
+        "print('collected')\n"
+    )
+    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300).stdout
+    assert "collected" in printed
