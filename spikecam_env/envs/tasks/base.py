@@ -67,6 +67,7 @@ class Task:
     frames_per_step  from action to action
     axes             that the camera turns about: pan and tilt, or pan alone
     further          numbers of the action after those
+    answers          answers that an action can give: `further` is then 1 (say) and one number an answer
     stream           of random numbers: tasks that begin their draws with the same thing have different ones, so that
                      none is tested on what another is trained on
 
@@ -84,6 +85,7 @@ class Task:
     frames_per_step: ClassVar[int] = 40
     axes: ClassVar[int] = 2
     further: ClassVar[int] = 0
+    answers: ClassVar[int] = 0
     stream: ClassVar[int] = 0
 
     def draw(self, rng: np.random.Generator, view: View) -> Episode:

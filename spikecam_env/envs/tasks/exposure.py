@@ -107,9 +107,9 @@ class Lit(Episode):
     most: float = 0.0
     iris: Iris = Iris()
 
-    def acted(self, rest: tuple[float, ...], first: int, stop: int) -> Lit:
+    def acted(self, rest: tuple[float, ...], standing: Standing, stop: int) -> Lit:
         """With the iris on its way."""
-        before = self.iris.values[1]
+        before, first = self.iris.values[1], standing.frame
         after = float(np.clip(before + rest[0] * self.rate * (stop - first), -self.most, self.most))
         return replace(self, iris=Iris((before, after), (first, stop)))
 
