@@ -35,13 +35,13 @@ def player(name: str) -> Player:
     if name in BASELINES:
         return Player(BASELINES[name])
     from spikecam_env.agents.agent import Agent, is_file, shipped
-    from spikecam_env.agents.playing import policy_of
+    from spikecam_env.agents.playing import acting
 
     if not is_file(name) and name not in shipped():
         raise unknown_name("policy", name, (*BASELINES, *shipped()))
     agent = Agent.load(name)
     sees = (("obs", agent.obs), ("obs_state", True))
-    return Player(policy_of(agent), sees, agent.policy.recipe.actions)
+    return Player(acting(agent), sees, agent.policy.recipe.actions)
 
 
 def steering(held: Iterable[str]) -> Policy:
