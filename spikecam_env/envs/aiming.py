@@ -47,6 +47,8 @@ class AimingEnv(SpikeCameraEnv):
     """
 
     settles: ClassVar[tuple[str, ...]] = ("make_scene", "judge")
+    answers: int = 0
+    """Answers that an action can give: the action's last numbers, after the number that says one."""
 
     def __init__(
         self,

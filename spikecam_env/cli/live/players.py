@@ -48,6 +48,12 @@ def steering(held: Iterable[str]) -> Policy:
     """Whoever holds these keys down: the action of a step is that of the keys as they are when it begins."""
 
     def act(seen: Any, env: AimingEnv) -> NDArray[np.float32]:
-        return action_of(held, env.axes, env.action_space.shape[0] - env.axes)  # type: ignore[index]
+        return action_of(held, env.axes, _further(env), env.answers)
 
     return act
+
+
+def _further(env: AimingEnv) -> int:
+    """Numbers of the action after those that turn the camera."""
+    (count,) = env.action_space.shape or (0,)
+    return count - env.axes

@@ -66,6 +66,7 @@ class TaskEnv(AimingEnv):
     ) -> None:
         check_settled(type(self), camera)
         self.task = _task(task)
+        self.answers = self.task.answers
         self.split = _split(split)
         top = self.task.top_sides_s * min(checked_shape(shape))
         super().__init__(
