@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS
 from denoiser.recipe import RECIPES
-from spikecam_env.errors import InputError, NotReadyError, unknown_name
+from spikecam_env.envs.observations import block_shape
+from spikecam_env.errors import NotReadyError, unknown_name
 
 OUTPUTS = ("spikes", "rate")
 WARM_UPS = ("black", "noisy")
@@ -52,10 +53,7 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
             raise unknown_name("output", output, OUTPUTS)
         if not isinstance(warm_up, str) or warm_up not in WARM_UPS:
             raise unknown_name("warm_up", warm_up, WARM_UPS)
-        if space.shape is None or len(space.shape) != 3:
-            raise InputError(
-                f"observations are {space}; the denoiser needs unpacked spike blocks (frames, rows, columns)"
-            )
+        block_shape(space)
         self._denoiser: OnlineDnSS | None = _denoiser(mode, output)
         self._type = space.dtype if output == "spikes" else np.dtype(np.float32)
         self._warm_up = warm_up

@@ -13,8 +13,8 @@ import torch
 
 import spikecam_env  # noqa: F401  (registers the environments)
 from denoiser.run import Run
+from spikecam_env.agents import evaluate
 from spikecam_env.agents.agent import Agent
-from spikecam_env.agents.playing import score_of
 from spikecam_env.agents.policy import Recipe
 from spikecam_env.agents.ppo import PPO, train
 
@@ -43,6 +43,5 @@ train(cameras, run, PPO(steps=STEPS), seed=0, save=report)
 cameras.close()
 
 agent = Agent("Catch-v1", "tfp", policy)
-score = score_of(agent, agent.make(split="test"), EPISODES)
-print(f"score on {EPISODES} test episodes: {score:.2f}  (0: doing nothing, 1: the oracle)")
+print(evaluate(agent, "Catch-v1", episodes=EPISODES))  # 0 is doing nothing, 1 the oracle
 agent.save("catch.pt")

@@ -77,6 +77,45 @@ def checked_number(
     return number
 
 
+def checked_numbers(
+    values: Any, name: str, count: int, least: float = -math.inf, most: float = math.inf, *, unit: str = ""
+) -> tuple[float, ...]:
+    """So many finite numbers from `least` to `most`, as a list, tuple or array.
+
+    Args:
+        values: The numbers.
+        name: Begins the error's text.
+        count: How many there have to be.
+        least: Smallest number that is allowed.
+        most: Largest number that is allowed.
+        unit: Unit of the numbers, for the error's text.
+
+    Returns:
+        The numbers as floats.
+
+    Raises:
+        InputError: For text, another count, and a number that is not finite or out of range.
+
+    Example:
+        >>> checked_numbers([1, 2.5], "offset", 2)
+        (1.0, 2.5)
+    """
+    numbers = [] if isinstance(values, (str, bytes, dict, set)) else _listed(values)
+    found = tuple(map(as_number, numbers))
+    if len(found) != count or not all(math.isfinite(n) and least <= n <= most for n in found):
+        rule = "finite numbers" if least == -math.inf else f"numbers from {least:g} to {most:g}"
+        raise InputError(f"{_said(name, values)}; it must be {count} {rule}{unit and f' {unit}'}")
+    return found
+
+
+def _listed(values: Any) -> list[Any]:
+    """Its parts; none where it has none."""
+    try:
+        return list(values)
+    except Exception:  # whatever an object of someone else's raises that has no parts
+        return []
+
+
 def checked_above_zero(value: Any, name: str) -> float:
     """A number above 0, which may be infinite."""
     number = as_number(value)

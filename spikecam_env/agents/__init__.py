@@ -5,4 +5,10 @@ ppo         the learner
 agent       a trained policy that acts, one environment or many; the shipped ones by the id of their task
 tracker     no learning: the target's centroid and a motor law
 study       scores of agents by task, observation and light
+evaluation  the score of any policy, in one call: `evaluate`
 """
+
+from spikecam_env.agents.evaluation import evaluate
+from spikecam_env.envs.evaluation import Evaluation
+
+__all__ = ["Evaluation", "evaluate"]

@@ -1,8 +1,10 @@
-"""What acts, on test episodes: the policy that `envs.score` plays, and the score that it reaches."""
+"""What acts, as `envs.score` plays it, and the score that it reaches."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Sequence
+from importlib import import_module
+from inspect import signature
 from typing import Any, Protocol
 
 import gymnasium
@@ -10,7 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.envs.aiming import AimingEnv
-from spikecam_env.envs.score import Policy, ends, play, score
+from spikecam_env.envs.evaluation import Evaluation
+from spikecam_env.envs.score import BASELINES, Policy, ends, play
+from spikecam_env.errors import InputError, shown
 
 EPISODES = {"Catch": 100, "Saccade": 50, "ReadSpin": 50}
 """Of the test split, those of the first seeds; others 10, which are long: each has 500 steps."""
@@ -26,8 +30,36 @@ class Actor(Protocol):
         """The action."""
 
 
-def policy_of(actor: Actor) -> Policy:
-    """As `envs.score.play` takes it."""
+def policy_of(policy: Any) -> tuple[Policy, dict[str, Any]]:
+    """Anything that acts, as `envs.score.play` takes it.
+
+    Args:
+        policy: As of `agents.evaluate`.
+
+    Returns:
+        The policy, and the keywords of the environment that it needs.
+
+    Raises:
+        InputError: For anything that cannot act.
+    """
+    if isinstance(policy, str):
+        if policy in BASELINES:
+            return BASELINES[policy], {}
+        policy = import_module("spikecam_env.agents.agent").Agent.load(policy)
+    if hasattr(policy, "begin") and hasattr(policy, "act"):
+        obs = getattr(policy, "obs", None)
+        return acting(policy), {} if obs is None else {"obs": obs, "obs_state": True}
+    if hasattr(policy, "predict"):
+        return _predicting(policy), {}
+    if callable(policy):
+        return lambda seen, env: policy(seen), {}
+    raise InputError(
+        f"policy is {shown(policy)}; give a callable, a model with predict, an Agent, or a name: {', '.join(BASELINES)}"
+    )
+
+
+def acting(actor: Actor) -> Policy:
+    """An actor, which forgets at the beginning of every episode."""
 
     def policy(observation: Any, env: AimingEnv) -> ArrayLike:
         if env.standing.step == 0:
@@ -37,25 +69,38 @@ def policy_of(actor: Actor) -> Policy:
     return policy
 
 
+def _predicting(model: Any) -> Policy:
+    """The deterministic actions of a model with `predict`, and its memory if it has one."""
+    known = signature(model.predict).parameters
+    memory: list[Any] = [None]
+
+    def policy(observation: Any, env: AimingEnv) -> ArrayLike:
+        begins = env.standing.step == 0
+        memory[0] = None if begins else memory[0]
+        given = {"state": memory[0], "episode_start": np.array([begins]), "deterministic": True}
+        found = model.predict(observation, **{name: value for name, value in given.items() if name in known})
+        action, memory[0] = found if isinstance(found, tuple) else (found, None)
+        return np.asarray(action)
+
+    return policy
+
+
+def judged(
+    policy: Policy, env: gymnasium.Env[Any, Any], seeds: Sequence[int], *, progress: bool | None = False
+) -> Evaluation:
+    """The policy's episodes of these seeds, beside those of nothing and the oracle."""
+    played = play(env, policy, seeds, progress)
+    spec = env.spec
+    task = type(env.unwrapped).__name__ if spec is None else spec.id.removeprefix("spikecam_env/")
+    nothing, best = ends(env, seeds)
+    return Evaluation.of(task, played.performances, nothing, best, success=played.success, returns=played.returns)
+
+
 def score_of(actor: Actor, env: gymnasium.Env[Any, Any], episodes: int) -> float:
     """On the episodes of seeds 0, 1, ...; env: of the test split."""
-    reached = play(env, policy_of(actor), range(episodes)).performance
-    inner: Any = env.unwrapped
-    return score(reached, *_ends(inner.task, inner.shape, inner.frames_per_step, episodes))
+    return judged(acting(actor), env, range(episodes)).score
 
 
 def episodes_of(task: str) -> int:
     """How many judge an agent; task: an id."""
-    return EPISODES.get(task.split("-")[0], 10)
-
-
-@lru_cache(maxsize=64)
-def _ends(task: Any, shape: tuple[int, int], frames_per_step: int, episodes: int) -> tuple[float, float]:
-    """Performance of doing nothing and of the oracle, who do not look at pictures."""
-    from spikecam_env.envs.tasks.env import TaskEnv
-
-    env = TaskEnv(task, shape=shape, frames_per_step=frames_per_step, split="test")
-    try:
-        return ends(env, range(episodes))
-    finally:
-        env.close()
+    return EPISODES.get(task.removeprefix("spikecam_env/").split("-")[0], 10)

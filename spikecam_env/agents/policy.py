@@ -35,7 +35,7 @@ class Recipe(Declared):
     pool      pixels squared that are averaged before anything else
     maps      whose places are found
     width     of the convolutions and, times four, of what steers
-    answers   that an action can give, its last numbers; 0 where the task asks nothing
+    answers   that an action can give, its last numbers, after the number that says it; 0 where the task asks nothing
     """
 
     channels: Annotated[int, Field(ge=1, le=256)]
@@ -81,7 +81,8 @@ class Policy(nn.Module):
         self.mean, self.value, self.place = (nn.Linear(4 * width, numbers) for numbers in (recipe.actions, 1, 2))
         nn.init.orthogonal_(self.mean.weight, 0.01)
         nn.init.zeros_(self.mean.bias)
-        self.mean.bias.data[recipe.actions - recipe.answers :] = SILENCE
+        if recipe.answers:
+            self.mean.bias.data[recipe.actions - recipe.answers - 1] = SILENCE
         self.log_sigma = nn.Parameter(torch.full((recipe.actions,), LOG_SIGMA))
 
     def forward(self, pictures: Tensor, state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -128,8 +129,7 @@ GAIN = 2.0
 SHARPNESS = 4.0
 """Of the softmax at the start."""
 SILENCE = -1.0
-"""Mean, at the start, of the numbers that answer: at 0 more than half of the steps say something by chance, which ends
-the episode before the camera has come anywhere."""
+"""Mean, at the start, of the number that says an answer: with sigma 0.6 one step in twenty answers by chance."""
 LOG_SIGMA = -0.5
 """Of the actions at the start, sigma 0.6: the whole range is tried."""
 

@@ -22,7 +22,7 @@ from spikecam_env.agents.agent import Agent
 from spikecam_env.agents.policy import Recipe
 from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
-from spikecam_env.envs.tasks import TASKS, ReadSpin
+from spikecam_env.envs.tasks import TASKS
 from spikecam_env.errors import unknown_name
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
@@ -107,7 +107,7 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
         lags=LAGS.get(name, (0, 4)),
         actions=action.shape[0],
         pool=POOL.get(name, 2),
-        answers=task.further if issubclass(task, ReadSpin) else 0,
+        answers=task.answers,
     )
 
 

@@ -46,7 +46,7 @@ class Tasks:
         from spikecam_env.cli.files import write_json
         from spikecam_env.cli.table import table
         from spikecam_env.envs.registration import ENVIRONMENTS, SMALL_TASKS, TASK_ENVIRONMENTS
-        from spikecam_env.envs.score import evaluate
+        from spikecam_env.envs.score import baselines
         from spikecam_env.whole import check_file
 
         known = (*TASK_ENVIRONMENTS, *ENVIRONMENTS)
@@ -58,8 +58,8 @@ class Tasks:
             check_file(self.json)
         scenes = tuple(ENVIRONMENTS) if self.scenes else ()
         asked = [name for name in dict.fromkeys(asked) if name not in scenes]
-        rows = evaluate(asked, self.episodes, self.seed, True, **self._shape(()))
-        rows += evaluate(scenes, self.episodes, self.seed, self.scenes, **self._shape((64, 64)))
+        rows = baselines(asked, self.episodes, self.seed, True, **self._shape(()))
+        rows += baselines(scenes, self.episodes, self.seed, self.scenes, **self._shape((64, 64)))
         print(table(rows))
         if self.json is not None:
             write_json(self.json, {"episodes": self.episodes, "seed": self.seed, "rows": rows})

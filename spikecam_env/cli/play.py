@@ -34,8 +34,8 @@ class Play:
     """Steer a spike camera with the keyboard, or watch a policy steer it.
 
     In a window where there is a display; else, and with --film, a film is written.  In the window: arrow keys or WASD
-    turn the camera, 1 to 4 answer (ReadSpin), E and Q open and close the iris (Exposure), space pauses, N begins
-    another episode, Esc ends.
+    turn the camera, 1 to 4 answer (ReadSpin), 0 to 9 answer (ReadDigit), E and Q open and close the iris (Exposure),
+    space pauses, N begins another episode, Esc ends.
 
     example:  spikecam play Track-v1
               spikecam play Catch-v1 --policy oracle --denoise --film catch.mp4
@@ -101,7 +101,11 @@ class Play:
         from spikecam_env.cli.live.screen import Screen
 
         camera: Any = env.unwrapped
-        keys = explained(camera.axes, camera.action_space.shape[0] - camera.axes) if who == KEYBOARD else ""
+        keys = (
+            explained(camera.axes, camera.action_space.shape[0] - camera.axes, camera.answers)
+            if who == KEYBOARD
+            else ""
+        )
         name = self.id.rpartition("/")[2]
         return Screen(name, who, denoise=self.denoise, show_target=self.show_target, keys=keys)
 

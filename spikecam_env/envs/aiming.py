@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -12,15 +11,13 @@ from gymnasium.utils.seeding import np_random
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.protocol import Gaze, Scene
+from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.course import Course, Drive
 from spikecam_env.envs.episode import Episode, Standing
-from spikecam_env.envs.motor import Motor, cut
+from spikecam_env.envs.motor import Motor
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
-from spikecam_env.envs.task import REWARDS
-from spikecam_env.errors import InputError, unknown_name
-
-OUTCOME = 10.0
-"""Reward, beside the other, of a success that ends an episode; a failure that ends one takes nothing."""
+from spikecam_env.envs.task import OUTCOME, REWARDS
+from spikecam_env.errors import unknown_name
 
 SUCCESS_SHARE = 1 / 8
 """Of the shorter side: a target nearer to the middle than this is being looked at, where a task says nothing else."""
@@ -36,9 +33,9 @@ class AimingEnv(SpikeCameraEnv):
                   the task's further numbers, if it has any.  What the motor makes of it: `envs.motor`.
     Reward        `reward`: "progress" or "distance", see `envs.task`; OUTCOME more for a success that ends the episode.
     Terminated    the episode is decided: lost or done (`Episode.end`).
-    Truncated     its last step is over (`Episode.steps`) and it is not decided.
+    Truncated     its last step is over (`Episode.steps` and `beyond`) and it is not decided.
     Info          target (2,) float64, where it is seen [pixels]; distance_px, from the middle; is_success, the task is
-                  done as things stand; performance, 0 to 1, of the episode if it ended here; gaze_rate (2,) float64
+                  done as things stand; performance, 1 at best, of the episode if it ended here; gaze_rate (2,) float64
                   [pixels/s]; what `SpikeCameraEnv` has.
 
     draw      see `DrawEpisode`
@@ -48,6 +45,10 @@ class AimingEnv(SpikeCameraEnv):
     further   numbers of the action beyond the axes
     camera    keywords of `SpikeCameraEnv`
     """
+
+    settles: ClassVar[tuple[str, ...]] = ("make_scene", "judge")
+    answers: int = 0
+    """Answers that an action can give: the action's last numbers, after the number that says one."""
 
     def __init__(
         self,
@@ -153,11 +154,8 @@ class AimingEnv(SpikeCameraEnv):
 
     def _checked_action(self, action: ArrayLike) -> list[float]:
         """In [-1, 1]: values beyond are cut."""
-        given = np.asarray(action, np.float64)
-        numbers = given.reshape(-1).tolist()
-        if given.shape != self.action_space.shape or not all(map(isfinite, numbers)):
-            raise InputError(f"action is {action!r}; it must be {_numbers(self.action_space.shape)} in [-1, 1]")
-        return [cut(number, 1.0) for number in numbers]
+        (count,) = self.action_space.shape or (0,)
+        return checked_action(action, count)
 
     def _of_standing(self) -> dict[str, Any]:
         course = self.course
@@ -173,11 +171,3 @@ class AimingEnv(SpikeCameraEnv):
 def _undecided(scene: Scene, frame: float, gaze: Gaze) -> tuple[float, bool]:
     """A judge that leaves it to the episode."""
     return 0.0, False
-
-
-def _numbers(shape: tuple[int, ...] | None) -> str:
-    """As messages have it."""
-    count = shape[0] if shape else 0
-    return {1: "one finite number", 2: "two finite numbers", 3: "three finite numbers"}.get(
-        count, f"{count} finite numbers"
-    )

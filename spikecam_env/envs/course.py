@@ -67,7 +67,7 @@ class Course:
         """A step later.  action: axes + further numbers, in [-1, 1]."""
         drive, first, top = self.drive, self.standing.frame, self.drive.motor.top_px_s
         stop = first + drive.frames_per_step
-        episode = self.episode.acted(tuple(action[drive.axes :]), first, stop)
+        episode = self.episode.acted(tuple(action[drive.axes :]), self.standing, stop)
         wanted = [number * top for number in action[: drive.axes]] + [0.0] * (2 - drive.axes)
         pan, tilt = drive.motor.after(self.rate_px_s, wanted, drive.step_s)
         gaze = turned(self.gaze.stop, (pan / top, tilt / top), top / drive.frame_rate_hz, (first, stop))
@@ -91,7 +91,7 @@ class Course:
     @property
     def truncated(self) -> bool:
         """Its last step is over, and it is not decided."""
-        return self.end is None and self.standing.step >= self.episode.steps
+        return self.end is None and self.standing.step >= self.episode.steps + self.episode.beyond
 
     @property
     def is_success(self) -> bool:
@@ -104,9 +104,19 @@ class Course:
         return float(self.episode.performance(self.standing))
 
 
-def steps_of(course: Course, act: Callable[[Course], NDArray[np.float32]]) -> Iterator[Course]:
-    """The courses after each step, up to the one that is over.  act: the next action."""
-    while not (course.terminated or course.truncated):
+def steps_of(course: Course, act: Callable[[Course], NDArray[np.float32]], most: int | None = None) -> Iterator[Course]:
+    """The courses after each step, up to the one that is over.
+
+    Args:
+        course: The episode's beginning.
+        act: Gives the next action.
+        most: Steps at most; by default `Episode.steps`.
+
+    Returns:
+        An iterator over the courses.
+    """
+    last = course.episode.steps if most is None else most
+    while not (course.terminated or course.truncated) and course.standing.step < last:
         course = course.after(np.clip(act(course), -1.0, 1.0).tolist())
         yield course
 

@@ -37,14 +37,20 @@ class Standing:
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """scene; target: its name in `places`; success_px: how near is on it [pixels]; steps: the most there are; number:
-    of the episode, where a task numbers them."""
+    """A scene, and the place in it that is to come to the middle of the view."""
 
     scene: Placed
     target: str
+    """Its name in `places`."""
     success_px: float
+    """How near counts as on it [pixels]."""
     steps: int
+    """Steps of which `performance` is a share."""
     number: int = 0
+    """Of the episode within its split, where a task numbers them."""
+    beyond: float = 0
+    """Steps that may follow after `steps`, until it is truncated; infinite where others set the end
+    (`max_episode_steps` of `gymnasium.make`)."""
 
     def aim(self, frame: float, gaze: Gaze) -> tuple[float, float]:
         """Where the target is seen, (x, y) [pixels]."""
@@ -67,11 +73,17 @@ class Episode:
         return standing.on_target
 
     def performance(self, standing: Standing) -> float:
-        """0 to 1, of the whole episode if it ended here: the share of its steps that ended on the target."""
-        return standing.steps_on / self.steps
+        """Of the whole episode if it ended here, 1 at best: the share of its steps that ended on the target."""
+        return standing.steps_on / max(self.steps, standing.step)
 
-    def acted(self, rest: tuple[float, ...], first: int, stop: int) -> Episode:
-        """The episode in which the action's further numbers, in [-1, 1], apply over frames [first, stop]."""
+    def acted(self, rest: tuple[float, ...], standing: Standing, stop: int) -> Episode:
+        """The episode after an action.
+
+        Args:
+            rest: The action's further numbers, in [-1, 1].
+            standing: At the beginning of the step.
+            stop: Frame of the step's end.
+        """
         return self
 
     def through(self, scene: Scene) -> Scene:

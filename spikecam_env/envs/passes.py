@@ -32,8 +32,18 @@ class Passes:
         return float(later[0]) if later.size else np.inf
 
 
-def passes(scene: Placed, target: str, last: int) -> Passes:
-    """Of a target, from frame 0 to `last`."""
+def passes(scene: Placed, target: str, last: int, cuts_to: int | None = None) -> Passes:
+    """Passes of a target.
+
+    Args:
+        scene: Shows the target.
+        target: Its name.
+        last: Last frame of which the top speed counts.
+        cuts_to: Last frame at which the scene may start over; by default `last`.
+
+    Returns:
+        The passes from frame 0 on.
+    """
     every = max(1, round(EVERY_S * scene.frame_rate_hz))
     rows, columns = scene.shape
     middle = np.array([(columns - 1) / 2, (rows - 1) / 2])
@@ -42,13 +52,14 @@ def passes(scene: Placed, target: str, last: int) -> Passes:
         return np.array(scene.places(frame, Gaze.fixed(float(gaze[0]), float(gaze[1])))[target])
 
     gaze, speeds, cuts = np.zeros(2), [], []
-    for frame in range(0, last + every, every):
+    for frame in range(0, max(last, cuts_to or 0) + every, every):
         place = seen(frame, gaze)
         if frame and not is_inside((place[0], place[1]), scene.shape):
             cuts.append(frame - every)
         gaze = gaze + place - middle
         velocity = _slower(seen(frame + 0.5, gaze) - middle, seen(frame + 1, gaze) - middle)
-        speeds.append(float(np.hypot(*velocity)))
+        if frame < last + every:
+            speeds.append(float(np.hypot(*velocity)))
         gaze = gaze + every * velocity
     return Passes(max(speeds) * scene.frame_rate_hz, np.array(cuts, np.int64))
 

@@ -52,7 +52,8 @@ TASK_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
     for name in TASK_NAMES
     for size, options in (("", {}), ("-Full", {"shape": FULL_SHAPE}))
 }
-"""As ENVIRONMENTS.  Their episodes end by themselves, in the task's time whatever `frames_per_step` is."""
+"""As ENVIRONMENTS.  Their episodes end by themselves, in the task's time whatever `frames_per_step` is: so `spec` of an
+environment that was made has the right `max_episode_steps`, and the registered one has none."""
 
 SMALL_TASKS = tuple(name for name in TASK_ENVIRONMENTS if "-Full" not in name)
 
@@ -68,5 +69,6 @@ def register() -> None:
     for name, (entry_point, options) in (ENVIRONMENTS | TASK_ENVIRONMENTS).items():
         if name not in gymnasium.registry:
             vector = f"spikecam_env.envs.vector_of:{entry_point.replace(':', '.')}"
-            steps = MAX_EPISODE_STEPS if name in ENVIRONMENTS else None
-            gymnasium.register(name, entry_point, max_episode_steps=steps, kwargs=options, vector_entry_point=vector)
+            is_scene = name in ENVIRONMENTS
+            steps, given = (MAX_EPISODE_STEPS, {**options, "steps": None}) if is_scene else (None, options)
+            gymnasium.register(name, entry_point, max_episode_steps=steps, kwargs=given, vector_entry_point=vector)

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any
+from math import inf
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from scenes.disk import RotatingDisk
+from spikecam_env.checked import checked_count, checked_number
 from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
 from spikecam_env.envs.episode import Episode
+from spikecam_env.envs.keywords import check_settled
 from spikecam_env.envs.registration import MAX_EPISODE_STEPS
-from spikecam_env.envs.task import DRIFT, drawn_within
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.envs.reset_options import checked_options, pair
+from spikecam_env.envs.task import DRIFT, checked_limit, drawn_within
 
 
 class RotatingDiskEnv(AimingEnv):
     """The disk starts off the middle and drifts slowly; the camera turns after it.
 
     The reward is "distance" of `envs.task` unless `reward="progress"`: 1 in the middle, 0 in a corner.  The episode
-    terminates when the disk's centre leaves the picture, and is truncated after 500 steps (0.5 s at 40 frames a step).
-    On the target: within an eighth of the shorter side.
+    terminates when the disk's centre leaves the picture.  On the target: within an eighth of the shorter side.
+    `gymnasium.make` truncates it after 500 steps (0.5 s at 40 frames a step), or after its `max_episode_steps`.
 
     start_offset_px   most the disk starts off the middle; default a quarter of the shorter side
     drift_px_s        most it drifts; default 0.8 of the shorter side a second
     shape, rpm, radius, light, texture, background, texture_seed: as `scenes.RotatingDisk` has them
+    steps             after which the class itself truncates an episode; None, as the ids have it: it never does
     camera            keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
 
     Options of reset: centre (x, y) [pixels], drift_px_s (x, y), angle [radians] fix what is drawn otherwise.
@@ -35,6 +39,8 @@ class RotatingDiskEnv(AimingEnv):
     >>> spikes.shape, spikes.dtype
     ((40, 16, 24), dtype('int8'))
     """
+
+    settles: ClassVar[tuple[str, ...]] = ("draw",)
 
     def __init__(
         self,
@@ -48,11 +54,15 @@ class RotatingDiskEnv(AimingEnv):
         texture_seed: int = 0,
         start_offset_px: float | None = None,
         drift_px_s: float | None = None,
+        steps: int | None = MAX_EPISODE_STEPS,
         **camera: Any,
     ) -> None:
+        check_settled(type(self), camera)
         super().__init__(self._draw, shape=shape, **camera)
-        self.start_offset_px = _limit("start_offset_px", start_offset_px, 0.25 * min(self.shape))
-        self.drift_px_s = _limit("drift_px_s", drift_px_s, DRIFT * min(self.shape))
+        self.steps = None if steps is None else checked_count(steps, "steps")
+        side = min(self.shape)
+        self.start_offset_px = checked_limit("start_offset_px", start_offset_px, 0.25 * side)
+        self.drift_px_s = checked_limit("drift_px_s", drift_px_s, DRIFT * side)
         self._disk = RotatingDisk(
             self.shape, rpm, radius, light, texture, background, texture_seed, self.model.frame_rate_hz
         )
@@ -66,16 +76,7 @@ class RotatingDiskEnv(AimingEnv):
             "drift_px_s": drawn_within(rng, self.drift_px_s),
             "angle": float(rng.uniform(0, 2 * np.pi)),
         }
-        for name in options:
-            if name not in drawn:
-                raise unknown_name("option of reset", name, drawn)
-        disk = self._disk.placed(**{**drawn, **options})
-        return Episode(disk, "disk", SUCCESS_SHARE * min(self.shape), MAX_EPISODE_STEPS)
-
-
-def _limit(name: str, value: float | None, default: float) -> float:
-    if value is None:
-        return default
-    if not 0 <= value < np.inf:
-        raise InputError(f"{name} is {value}; it must be 0 or more, and finite")
-    return float(value)
+        given = checked_options(options, {"centre": pair, "drift_px_s": pair, "angle": checked_number})
+        disk, success_px = self._disk.placed(**{**drawn, **given}), SUCCESS_SHARE * min(self.shape)
+        beyond = inf if self.steps is None else 0
+        return Episode(disk, "disk", success_px, self.steps or MAX_EPISODE_STEPS, beyond=beyond)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from math import inf
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,15 +14,21 @@ from scenes.later import Later
 from scenes.protocol import Placed
 from scenes.renderers.choose import chosen
 from scenes.world import World
+from spikecam_env.checked import checked_count, checked_seed, checked_whole
 from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
 from spikecam_env.envs.episode import Episode
+from spikecam_env.envs.keywords import check_settled
 from spikecam_env.envs.passes import Passes, passes
 from spikecam_env.envs.registration import MAX_EPISODE_STEPS
-from spikecam_env.envs.task import DRIFT, drawn_within, is_inside, polar
+from spikecam_env.envs.reset_options import Rule, checked_options, pair
+from spikecam_env.envs.task import DRIFT, checked_limit, drawn_within, is_inside, polar
 from spikecam_env.errors import InputError, unknown_name
 
 LATEST_START = 40_000
 """Frames: a second into the scene."""
+
+CUTS_KNOWN = 60_000
+"""Frames: every scene of the catalogue that starts over does so between LATEST_START and this, the train last."""
 
 LEAST_STEPS = 40
 """Steps that an episode has before the scene starts over, where one of the moments drawn has as many."""
@@ -49,9 +56,10 @@ class SceneEnv(AimingEnv):
 
     The reward is "distance" of `envs.task` unless `reward="progress"`: 1 in the middle, 0 in a corner, less beyond.
     On the target: within an eighth of the shorter side.  The episode terminates when the target's middle leaves the
-    picture.  It is truncated when the scene starts over (a ball is thrown again), and after 500 steps (0.5 s at 40
-    frames a step).  At first the camera, on a mount that drifts slowly, looks past the target by `start_offset_px` or
-    half of it.
+    picture.  It is truncated when the scene starts over (a ball is thrown again), whatever `max_episode_steps` is, and
+    `info["scene_over"]` says so.  `gymnasium.make` truncates it after 500 steps (0.5 s at 40 frames a step), or after
+    its `max_episode_steps`.  At first the camera, on a mount that drifts slowly, looks past the target by
+    `start_offset_px` or half of it.
 
     scene               a name of `scenes.catalogue.SCENES`; "random" is another world in every episode
     target              name of what is to be followed (`poses` of the truth has them); default: the first that moves
@@ -61,10 +69,12 @@ class SceneEnv(AimingEnv):
     mean_interval       of the exposure [frames]
     shape               (rows, columns)
     max_gaze_rate_px_s  default twice the target's top speed, 4 of the shorter side a second at least
+    steps               after which the class itself truncates an episode; None, as the ids have it: it never does
     camera              keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
 
     Options of reset: start_frame, offset (pan, tilt) [pixels], drift_px_s (pan, tilt) and, of random worlds, seed fix
     what is drawn otherwise.
+    Info: scene_over, whether the episode is truncated because its scene starts over; the others of `AimingEnv`.
     Errors: InputError for an unknown scene or target, and for a scene in which nothing moves.
 
     >>> env = SceneEnv(scene="disk", shape=(16, 24))
@@ -72,6 +82,8 @@ class SceneEnv(AimingEnv):
     >>> spikes.shape, env.action_space.shape
     ((40, 16, 24), (2,))
     """
+
+    settles: ClassVar[tuple[str, ...]] = ("draw",)
 
     def __init__(
         self,
@@ -83,14 +95,16 @@ class SceneEnv(AimingEnv):
         start_offset_px: float | None = None,
         mean_interval: float = 10.0,
         max_gaze_rate_px_s: float | None = None,
+        steps: int | None = MAX_EPISODE_STEPS,
         **camera: Any,
     ) -> None:
+        check_settled(type(self), camera)
         super().__init__(self._draw, shape=shape, max_gaze_rate_px_s=max_gaze_rate_px_s, **camera)
         if scene not in SCENES:
             raise unknown_name("scene", scene, SCENES)
-        self.start_offset_px = 0.25 * min(self.shape) if start_offset_px is None else float(start_offset_px)
-        if not 0 <= self.start_offset_px < np.inf:
-            raise InputError(f"start_offset_px is {start_offset_px}; it must be 0 or more, and finite")
+        self.start_offset_px = checked_limit("start_offset_px", start_offset_px, 0.25 * min(self.shape))
+        self.steps = None if steps is None else checked_count(steps, "steps")
+        scene_seed = checked_seed(scene_seed, "scene_seed")
         self.scene_name, self.target, self.mean_interval = scene, target, checked_interval(mean_interval)
         self._unexposed = None if scene == "random" else self._build(scene_seed)
         self._named: Placed | None = None
@@ -119,19 +133,34 @@ class SceneEnv(AimingEnv):
         seed, starts = int(rng.integers(2**31)), rng.integers(LATEST_START, size=_STARTS)
         past = polar(self.start_offset_px * rng.uniform(0.5, 1.0), rng.uniform(0, 2 * np.pi))
         drift = drawn_within(rng, DRIFT * min(self.shape))
-        known = ("start_frame", "offset", "drift_px_s", *(("seed",) if self._unexposed is None else ()))
-        for name in options:
-            if name not in known:
-                raise unknown_name("option of reset", name, known)
-        scene = self._named or self._exposed(int(options.get("seed", seed)))
+        given = checked_options(options, self._rules)
+        scene = self._named or self._exposed(given.get("seed", seed))
         target = self.target or next(iter(scene.places(0.0)))
-        start = int(options["start_frame"]) if "start_frame" in options else self._start(scene, target, starts)
-        pan, tilt = options["offset"] if "offset" in options else self._beside(scene, target, start, past)
-        across, down = (float(rate) / self.model.frame_rate_hz for rate in options.get("drift_px_s", drift))
-        frames = min(self._passes.end(start) - start, (MAX_EPISODE_STEPS + 1) * self.frames_per_step)
-        steps = max(1, int(frames // self.frames_per_step) - 1)  # the first block is reset's
-        later = Later(scene, start, (float(pan), float(tilt)), (across, down))
-        return Episode(later, target, SUCCESS_SHARE * min(self.shape), steps)
+        start = given["start_frame"] if "start_frame" in given else self._start(scene, target, starts)
+        offset = given["offset"] if "offset" in given else self._beside(scene, target, start, past)
+        across, down = (float(rate) / self.model.frame_rate_hz for rate in given.get("drift_px_s", drift))
+        later = Later(scene, start, offset, (across, down))
+        steps, beyond = self._length(start)
+        return Episode(later, target, SUCCESS_SHARE * min(self.shape), steps, beyond=beyond)
+
+    @property
+    def _rules(self) -> dict[str, Rule]:
+        """Of the options of reset."""
+        of_all: dict[str, Rule] = {"start_frame": _start_frame, "offset": pair, "drift_px_s": pair}
+        return of_all | ({"seed": checked_seed} if self._unexposed is None else {})
+
+    def _length(self, start: int) -> tuple[int, float]:
+        """(`Episode.steps`, `Episode.beyond`) of an episode that begins at this frame of the scene."""
+        left = self._passes.end(start) - start
+        whole = inf if left == inf else max(1, int(left // self.frames_per_step) - 1)  # the first block is reset's
+        most = self.steps or MAX_EPISODE_STEPS
+        steps = int(min(most, whole))
+        return steps, 0 if self.steps is not None else whole - steps
+
+    def _of_standing(self) -> dict[str, Any]:
+        course, scenes = self.course, self.episode.steps + self.episode.beyond
+        over = course.truncated and (self.steps is None or scenes < self.steps)
+        return super()._of_standing() | {"scene_over": over}
 
     def _start(self, scene: Placed, target: str, starts: Any) -> int:
         """The first moment with the target in the scene's own view and time left; else the one with most time left."""
@@ -156,6 +185,11 @@ class SceneEnv(AimingEnv):
         return scene
 
 
+def _start_frame(value: Any, name: str) -> int:
+    """A rule of `reset_options`."""
+    return checked_whole(value, name, 0, LATEST_START)
+
+
 def _followed(name: str, target: str | None, shape: tuple[int, int], seed: int, frame_rate_hz: float) -> Placed:
     scene = unexposed_scene(name, shape, seed, frame_rate_hz)
     places = scene.places(0.0) if isinstance(scene, Placed) else {}
@@ -177,7 +211,7 @@ def _followable(
     scene = _followed(name, target, shape, seed, frame_rate_hz)
     found: dict[str, Passes] = {}
     for each in scene.places(0.0) if target is None else (target,):
-        found[each] = passes(scene, each, last)
+        found[each] = passes(scene, each, last, max(last, CUTS_KNOWN))
         if found[each].top_px_s <= FASTEST_TARGET * min(shape):
             return each, found[each]
     slowest = min(found, key=lambda each: found[each].top_px_s)

@@ -15,11 +15,14 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
+from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.aiming import AimingEnv
+from spikecam_env.envs.course import Course, steps_of
 from spikecam_env.envs.oracle import oracle
+from spikecam_env.errors import InputError
 
 Policy = Callable[[Any, AimingEnv], ArrayLike]
 """(observation, environment) -> action.  An agent looks at the observation alone; the oracle at the environment."""
@@ -45,7 +48,7 @@ BASELINES: dict[str, Policy] = {"oracle": act_oracle, "nothing": act_nothing, "r
 
 @dataclass(frozen=True)
 class Played:
-    """Means over episodes.
+    """Means over episodes, and the performance in each.
 
     returns      undiscounted sum of rewards
     performance  `info["performance"]` at the end, 0 to 1
@@ -53,6 +56,7 @@ class Played:
     distance_px  over all steps
     ms_a_step    of the environment alone [ms]
     steps        an episode
+    performances in each episode
     """
 
     returns: float
@@ -61,14 +65,27 @@ class Played:
     distance_px: float
     ms_a_step: float
     steps: float
+    performances: tuple[float, ...]
 
 
-def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int]) -> Played:
-    """A policy's episodes, one a seed.  env: of an id of this package, wrapped or not."""
-    inner = env.unwrapped
-    if not isinstance(inner, AimingEnv):
-        raise TypeError(f"{type(inner).__name__} is no AimingEnv: it has no performance")
-    rows = [_episode(env, inner, policy, seed) for seed in seeds]
+def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], progress: bool | None = False) -> Played:
+    """A policy's episodes.
+
+    Args:
+        env: Of an id of this package, wrapped or not.
+        policy: Gives the actions.
+        seeds: One an episode.
+        progress: Whether a bar is shown; None: in a terminal.
+
+    Returns:
+        Means over the episodes.
+
+    Raises:
+        InputError: For an environment without a performance.
+    """
+    inner = _aiming(env)
+    bar = tqdm(seeds, desc="episodes", unit="episode", leave=False, disable=None if progress is None else not progress)
+    rows = [_episode(env, inner, policy, seed) for seed in bar]
     returns, performance, success, distance, seconds, steps = (np.array(column) for column in zip(*rows, strict=True))
     return Played(
         returns=float(returns.mean()),
@@ -77,7 +94,16 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int]) -> 
         distance_px=float(distance.sum() / steps.sum()),
         ms_a_step=float(1e3 * seconds.sum() / steps.sum()),
         steps=float(steps.mean()),
+        performances=tuple(performance.tolist()),
     )
+
+
+def _aiming(env: gymnasium.Env[Any, Any]) -> AimingEnv:
+    """The environment of this package below all wrappers; raises InputError where there is none."""
+    inner = env.unwrapped
+    if not isinstance(inner, AimingEnv):
+        raise InputError(f"{type(inner).__name__} is no AimingEnv and has no performance; take an id of this package")
+    return inner
 
 
 def score(performance: float, nothing: float, best: float) -> float:
@@ -85,10 +111,29 @@ def score(performance: float, nothing: float, best: float) -> float:
     return (performance - nothing) / (best - nothing) if best > nothing else float("nan")
 
 
-def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[float, float]:
-    """Performance of doing nothing and of the oracle on these episodes: where a score is 0, and where it is 1."""
-    nothing, best = (play(env, BASELINES[name], seeds).performance for name in ("nothing", "oracle"))
+def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[list[float], list[float]]:
+    """Performance of doing nothing and of the oracle: where a score is 0, and where it is 1.
+
+    They look at no pictures, so that no camera is exposed (`envs.course`).
+
+    Args:
+        env: As of `play`.
+        seeds: One an episode.
+
+    Returns:
+        (nothing's, the oracle's), of each episode.
+    """
+    inner = _aiming(env)
+    still = np.zeros(inner.action_space.shape or (), np.float32)
+    most = None if env.spec is None else env.spec.max_episode_steps
+    begun = [inner.opening(seed) for seed in seeds]
+    nothing, best = ([_end(course, act, most) for course in begun] for act in (lambda _: still, oracle))
     return nothing, best
+
+
+def _end(course: Course, act: Callable[[Course], NDArray[np.float32]], most: int | None) -> float:
+    """Performance at the end of an episode of `most` steps at most."""
+    return [course, *steps_of(course, act, most)][-1].performance
 
 
 def _episode(
@@ -96,10 +141,11 @@ def _episode(
 ) -> tuple[float, float, bool, float, float, int]:
     """(return, performance, success, distances' sum, seconds in steps, steps)."""
     inner.action_space.seed(seed)
+    (count,) = inner.action_space.shape or (0,)
     observation, _ = env.reset(seed=seed)
     total, distance, seconds, steps, over = 0.0, 0.0, 0.0, 0, False
     while not over:
-        action = np.asarray(policy(observation, inner), np.float32)
+        action = np.array(checked_action(policy(observation, inner), count), np.float32)
         began = time.perf_counter()
         observation, reward, terminated, truncated, info = env.step(action)
         seconds += time.perf_counter() - began
@@ -108,7 +154,7 @@ def _episode(
     return total, info["performance"], info["is_success"], distance, seconds, steps
 
 
-def evaluate(
+def baselines(
     ids: Sequence[str], episodes: int = 20, seed: int = 0, progress: bool = False, **options: Any
 ) -> list[dict[str, Any]]:
     """The baselines of every id, on the episodes of seeds `seed`, `seed` + 1, ...; test episodes where an id has them.

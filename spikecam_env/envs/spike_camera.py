@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import isfinite
 from os import PathLike
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import gymnasium
 import numpy as np
@@ -17,8 +17,11 @@ from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
 from spikecam_env.checked import as_number, checked_number, checked_shape
+from spikecam_env.envs.action import checked_action
+from spikecam_env.envs.keywords import check_keywords
 from spikecam_env.envs.motor import turned
 from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
+from spikecam_env.envs.reset_options import as_dictionary
 from spikecam_env.errors import InputError, NotReadyError, OwnCodeError, shown, unknown_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
 
@@ -45,8 +48,8 @@ RENDER_FRAMES = 40
 class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     """Each step exposes `frames_per_step` spike frames while the camera turns at the rate the action gives.
 
-    Observation   what `obs` names; a fresh array each step.  By default the step's frames, (K, H, W) int8 of 0 and 1
-                  (`MultiBinary`).  With `obs_state` a Dict: picture, gaze, age (`observations.with_state_space`).
+    Observation   what `obs` names; a fresh array each step.  By default "spikes", the step's frames, (K, H, W) int8 of
+                  0 and 1.  With `obs_state` a Dict: picture, gaze, age (`observations.with_state_space`).
     Action        (2,) float32, gaze rate (pan, tilt) in [-1, 1] of `max_gaze_rate_px_s`; pan is to the right,
                   tilt is down.  Values beyond are cut, as a motor saturates.
     Reward, end   from `judge`.
@@ -66,7 +69,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     model                a preset's name, a TOML path or a SensorModel
     frames_per_step      K: the control rate is frame rate / K
     max_gaze_rate_px_s   default 4 of the shorter side a second
-    obs                  a name of `observations.OBSERVATIONS` or an `Observation`; packed=True is obs="packed"
+    obs                  a name of `observations.OBSERVATIONS` or an `Observation`; default `usual_obs` of the class;
+                         packed=True is obs="packed"
     engine, threads      of the sensor: "auto", "fast" or "reference"; as `SpikeSensor` has them
 
     `sensor`, `scene` and `blocks` are open to look at: `env.unwrapped.sensor.clean_twin()`,
@@ -77,6 +81,10 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012
+    usual_obs: ClassVar[str] = "spikes"
+    """Name of the observation where none is given."""
+    settles: ClassVar[tuple[str, ...]] = ()
+    """Keywords of parents that this class sets itself, so that its users cannot."""
 
     def __init__(
         self,
@@ -87,25 +95,29 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         model: SensorModel | str | PathLike[str] = "scsim",
         frames_per_step: int = 40,
         packed: bool = False,
-        obs: str | Observation = "multibinary",
+        obs: str | Observation | None = None,
         obs_state: bool = False,
         ground_truth: bool = False,
         max_gaze_rate_px_s: float | None = None,
         engine: str = "auto",
         threads: int | None = None,
         render_mode: str | None = None,
+        **unknown: Any,
     ) -> None:
+        check_keywords(type(self), unknown)
         self.shape = checked_shape(shape)
-        if frames_per_step < 1 or frames_per_step != int(frames_per_step):
-            raise InputError(f"frames_per_step is {frames_per_step}; it must be a whole number, 1 or more")
+        if not (as_number(frames_per_step) >= 1 and as_number(frames_per_step).is_integer()):
+            raise InputError(f"frames_per_step is {shown(frames_per_step)}; it must be a whole number, 1 or more")
+        self.frames_per_step = int(frames_per_step)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render_mode", render_mode, self.metadata["render_modes"])
-        self.max_gaze_rate_px_s = 4.0 * min(self.shape) if max_gaze_rate_px_s is None else max_gaze_rate_px_s
-        if not 0 < self.max_gaze_rate_px_s < np.inf:
-            raise InputError(f"max_gaze_rate_px_s is {max_gaze_rate_px_s}; it must be positive and finite")
+        rate = 4.0 * min(self.shape) if max_gaze_rate_px_s is None else max_gaze_rate_px_s
+        if not 0 < as_number(rate) < np.inf:
+            raise InputError(f"max_gaze_rate_px_s is {shown(rate)}; it must be positive and finite")
+        self.max_gaze_rate_px_s = rate
         self.model = _loaded(model)
-        self.frames_per_step, self.ground_truth = int(frames_per_step), ground_truth
-        self.observation, self.obs_state = _observation(obs, packed), obs_state
+        self.ground_truth = ground_truth
+        self.observation, self.obs_state = _observation(obs, packed, self.usual_obs), obs_state
         self.render_mode = render_mode
         self._make_scene, self._judge = make_scene, judge
         self._engine, self._threads = engine, threads
@@ -138,7 +150,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         So a vector environment exposes the blocks of all its cameras in one call (`expose`).
         """
         self._open()
-        given = dict(options or {})
+        given = as_dictionary(options)
         model = self._checked_model(given.pop("model", self.model))
         light = checked_number(given.pop("light", 1.0), "light", 0.0, MOST_LIGHT, above=True)
         super().reset(seed=seed)
@@ -156,10 +168,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def turn(self, action: ArrayLike) -> None:
         """What `step` does before the block is exposed: the camera's path is set."""
-        given = np.asarray(action, np.float64)
-        rates = given.reshape(-1).tolist()
-        if given.shape != (2,) or not all(map(isfinite, rates)):
-            raise InputError(f"action is {action!r}; it must be two finite numbers in [-1, 1], (pan, tilt)")
+        rates = checked_action(action, 2, "(pan, tilt)")
         frames = self.sensor.frame, self.sensor.frame + self.frames_per_step
         self._gaze = turned(self._position, rates, self.max_gaze_rate_px_s / self.model.frame_rate_hz, frames)
 
@@ -352,11 +361,15 @@ def lights_of(envs: Sequence[SpikeCameraEnv], *, threads: int | None = 1, each: 
     return [light[n] for n in range(len(envs))]
 
 
-def _observation(obs: str | Observation, packed: bool) -> Observation:
-    if packed and obs not in ("multibinary", "packed"):
+def _observation(obs: str | Observation | None, packed: bool, usual: str) -> Observation:
+    if packed and obs not in (None, "packed"):
         raise InputError(f"packed is True and obs is {shown(obs)}; give one of the two")
-    return observation("packed" if packed else obs)
+    return observation("packed" if packed else usual if obs is None else obs)
 
 
 def _loaded(model: SensorModel | str | PathLike[str]) -> SensorModel:
-    return model if isinstance(model, SensorModel) else SensorModel.load(model)
+    if isinstance(model, SensorModel):
+        return model
+    if not isinstance(model, (str, PathLike)):
+        raise InputError(f"model is {shown(model)}; give a preset's name, the path of a TOML file, or a SensorModel")
+    return SensorModel.load(model)

@@ -13,9 +13,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from spikecam_env.checked import as_number
+from spikecam_env.errors import InputError, shown
+
 PROGRESS = 20.0
 """Reward for the whole way from a corner to the middle: of the order of ten, so that usual learning rates fit."""
 
+OUTCOME = 10.0
+"""Reward, beside the other, of a success that ends an episode; a failure that ends one takes nothing."""
 
 DRIFT = 0.8
 """[shorter sides/s] Most that a disk, or the mount of a camera, drifts: nothing stays in view by itself, also where the
@@ -25,6 +30,15 @@ target turns on the spot."""
 def drawn_within(rng: np.random.Generator, most: float) -> tuple[float, float]:
     """A point drawn evenly from the disc of this radius."""
     return polar(most * np.sqrt(rng.random()), rng.uniform(0, 2 * np.pi))
+
+
+def checked_limit(name: str, value: float | None, default: float) -> float:
+    """The most that something is [pixels, pixels/s], or the default for None; raises InputError below 0."""
+    if value is None:
+        return default
+    if not 0 <= as_number(value) < np.inf:
+        raise InputError(f"{name} is {shown(value)}; it must be 0 or more, and finite")
+    return float(value)
 
 
 def polar(distance: float, direction: float) -> tuple[float, float]:

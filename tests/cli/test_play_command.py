@@ -16,7 +16,7 @@ import pytest
 from denoiser import OnlineDnSS
 from spikecam_env.cli.live.episodes import environment, episode, most_seconds, pictures_due
 from spikecam_env.cli.live.filming import watch
-from spikecam_env.cli.live.keys import action_of, plain
+from spikecam_env.cli.live.keys import action_of, explained, plain
 from spikecam_env.cli.live.pictures import Denoised, Noisy
 from spikecam_env.cli.live.players import Player, player, steering
 from spikecam_env.cli.live.screen import AIM, TARGET, Screen
@@ -110,6 +110,14 @@ def test_what_is_wrong_is_said_in_a_line(args: tuple[str, ...], message: str, ca
 )
 def test_keys_that_are_held_make_an_action(held: set[str], action: list[float]) -> None:
     np.testing.assert_array_equal(action_of(held, 2, 1), action)
+
+
+def test_a_number_key_says_its_answer() -> None:
+    """In ReadSpin the second of four, in ReadDigit the digit itself: what the episode hears."""
+    np.testing.assert_array_equal(action_of({"2", "a", "e"}, 2, 5, 4), [-1, 0, 1, 0, 1, 0, 0])
+    np.testing.assert_array_equal(action_of({"0"}, 2, 11, 10), [0, 0, 1, 1, *[0] * 9])
+    np.testing.assert_array_equal(action_of({"5", "q"}, 2, 5, 4), np.zeros(7))
+    assert "1 to 4: answer" in explained(2, 5, 4) and "0 to 9: answer" in explained(2, 11, 10)
 
 
 def test_keys_have_no_meaning_where_the_action_has_no_such_number() -> None:

@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 import spikecam_env.envs  # noqa: F401
+from spikecam_env.agents import evaluate
+from spikecam_env.agents.evaluation import stacked
 from spikecam_env.envs.observations import OBSERVATIONS
 from spikecam_env.envs.registration import SMALL_TASKS, TASK_ENVIRONMENTS
 from tests.envs import rllib
@@ -106,26 +108,37 @@ def example() -> ModuleType:
 
 
 def test_the_example_learns_and_is_judged() -> None:
-    """A few hundred steps teach it nothing; that it changes, acts within its range and is judged is what is asked."""
+    """A few hundred steps teach it nothing; the model changes, acts within its range, and gets a score."""
     sb3_ppo = example()
     model = sb3_ppo.learned("Catch-v1", 256, count=4, rollout=64)
-    assert model.num_timesteps == 256
-
-    def act(seen: np.ndarray) -> np.ndarray:
-        assert seen.shape == (1, sb3_ppo.PICTURES, 64, 64) and seen.dtype == np.uint8
-        action: np.ndarray = model.predict(seen, deterministic=True)[0]
-        assert np.abs(action).max() <= 1
-        return action
-
-    assert 0 <= sb3_ppo.performance("Catch-v1", act, 2) <= 1
+    assert model.num_timesteps == 256 and model.observation_space.shape == (sb3_ppo.PICTURES, 64, 64)
+    result = evaluate(model, "Catch-v1", stack=sb3_ppo.PICTURES, episodes=3)
+    assert 0 <= result.performance <= 1 and len(result.performances) == 3
 
 
-def test_the_example_judges_as_the_score_does() -> None:
-    """Doing nothing, at Track: its performance is small, and the same as of `envs.score` on the same seed."""
-    from spikecam_env.envs.score import act_nothing, play
+def test_a_model_of_stable_baselines_is_scored_on_what_its_frame_stack_shows() -> None:
+    """Bit for bit, over the first steps of an episode."""
+    vectors = pytest.importorskip("stable_baselines3.common.vec_env", reason="needs stable-baselines3")
+    env = gymnasium.make(TRACK, **SMALL)
+    theirs = vectors.VecFrameStack(vectors.DummyVecEnv([lambda: env]), 3)
+    theirs.seed(5)
+    expected = [theirs.reset()[0], *(theirs.step(np.full((1, 2), 0.2, np.float32))[0][0] for _ in range(4))]
+    ours = stacked(gymnasium.make(TRACK, **SMALL), 3)
+    found = [ours.reset(seed=5)[0], *(ours.step(np.full(2, 0.2, np.float32))[0] for _ in range(4))]
+    np.testing.assert_array_equal(found, expected)
 
-    of_example = example().performance("Track-v1", lambda seen: np.zeros((1, 2), np.float32), 1)
-    assert of_example == play(gymnasium.make(TRACK, split="test"), act_nothing, [0]).performance
+
+@pytest.mark.parametrize("name", [*SMALL_TASKS, DISK, "spikecam_env/Disk-v0"])
+def test_no_default_observation_is_refused(name: str) -> None:
+    """By stable-baselines3's learner; blocks of spikes are no pictures for its check, which warns of their type."""
+    check = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs stable-baselines3").check_env
+    env = gymnasium.make(name, **SMALL)
+    check(env, warn=False)
+    if name in SMALL_TASKS:
+        checked(name)
+        assert env.observation_space == gymnasium.spaces.Box(0, 255, (1, 36, 36), np.uint8)
+    else:
+        assert env.observation_space == gymnasium.spaces.Box(0, 1, (8, 36, 36), np.int8)
 
 
 def test_processes_of_stable_baselines_give_the_bits_of_one_process() -> None:

@@ -265,9 +265,15 @@ def turn_a_step(_: Any) -> float:
     return max(read_spin.RPM) * 6 * ReadSpin.frames_per_step / RATE_HZ
 
 
-def silence(_: Any) -> float:
-    """Random actions say nothing in a third of the steps."""
-    return float(((read_spin.SAID + 1) / 2) ** ReadSpin.further)
+def guesses(_: Any) -> float:
+    """Who says one speed after another gives three answers, one fewer than there are speeds."""
+    begun = Course.begin(Drive(Motor(640.0, 0.01), 2, 40, RATE_HZ), drawn(ReadSpin(), 1)[0])
+
+    def guess(course: Course) -> Any:
+        wrong = [float(n == (course.episode.truth + 1) % 4) for n in range(4)]  # type: ignore[attr-defined]
+        return np.array([*oracle(course)[:2], 1.0, *wrong])
+
+    return float(list(steps_of(begun, guess))[-1].episode.wrong)  # type: ignore[attr-defined]
 
 
 def dark_spikes(_: Any) -> float:
@@ -372,7 +378,7 @@ def lean(_: Any) -> float:
 def outcome_over_way(_: Any) -> float:
     """Success is worth about as much as the way to it: Saccade's, from a third of the side away."""
     way = np.mean(Saccade().start) / (np.hypot(1, 1) / 2)
-    return float(aiming.OUTCOME / (task.PROGRESS * way))
+    return float(task.OUTCOME / (task.PROGRESS * way))
 
 
 def drifting_off(_: Any) -> float:
@@ -432,6 +438,11 @@ def no_good_moment(_: Any) -> float:
 def rounds(_: Any) -> float:
     """Car, whose passes are the longest but Train's, may be met in two of them."""
     return scene.LATEST_START / float(np.diff(passes_of("car")[1].cuts).mean())
+
+
+def after_the_train(_: Any) -> float:
+    """The end of the pass of Train in which the latest episode begins is known: its frame is less."""
+    return scene.CUTS_KNOWN / passes_of("train")[1].end(scene.LATEST_START)
 
 
 @lru_cache
@@ -536,7 +547,7 @@ NUMBERS = (
     Number(catch, "LINE_SIDES", rows_of_line, 3, 5),
     Number(exposure, "IRIS_BEYOND", room_for_error, 1, 2.5),
     Number(read_spin, "RPM", turn_a_step, 30, 90),
-    Number(read_spin, "SAID", silence, 0.2, 0.5),
+    Number(read_spin, "LOCK_SHARE", guesses, 3, 3),
     Number(things, "DARK", dark_spikes, 1.5, 3),
     Number(things, "BRIGHT", contrast, 10, 20),
     Number(things, "BACKGROUND.0", dark_background, 1.5, 3),
@@ -553,7 +564,7 @@ NUMBERS = (
     Number(digits, "SLANT", lean, 0.15, 0.3),
     Number(task, "PROGRESS", outcome_over_way, 0.8, 1.5),
     Number(task, "DRIFT", drifting_off, 0.25, 0.4),
-    Number(aiming, "OUTCOME", outcome_over_way, 0.8, 1.5),
+    Number(task, "OUTCOME", outcome_over_way, 0.8, 1.5),
     Number(aiming, "SUCCESS_SHARE", drifting_off, 0.25, 0.4),
     Number(scene, "SLOWEST_GAZE", over_drift, 4, 8),
     Number(scene, "FASTEST_TARGET", beside, 4, 8),
@@ -562,6 +573,7 @@ NUMBERS = (
     Number(scene, "LEAST_STEPS", moments_of_dice, 0.1, 0.35),
     Number(scene, "_STARTS", no_good_moment, 0.01, 0.1),
     Number(scene, "LATEST_START", rounds, 1.5, 3),
+    Number(scene, "CUTS_KNOWN", after_the_train, 1.05, 1.5),
     Number(passes, "EVERY_S", bend, 0.1, 0.5),
 )
 

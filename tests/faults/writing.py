@@ -118,7 +118,7 @@ TRUTH: Work = {
     "denoiser.evaluate.truth:evaluate_truth": _result,
     "denoiser.evaluate.truth:report": lambda _: "figures\n" * 200,
 }
-TASKS: Work = {"spikecam_env.envs.score:evaluate": lambda *_, **__: [{"task": "x" * 9000}]}
+TASKS: Work = {"spikecam_env.envs.score:baselines": lambda *_, **__: [{"task": "x" * 9000}]}
 LIVE: Work = {"denoiser.live.session:Session": Session}
 PLAYED: Work = {"spikecam_env.cli.live.filming:pictures": _film}
 VIEWED: Work = {"spikecam_env.cli.live.rerun_log:recorded": lambda *_: bytes(9000)}

@@ -113,7 +113,8 @@ class Scored:
 def scored(env: gymnasium.Env[Any, Any], ended: Sequence[Moment]) -> Scored:
     """Plays the oracle and nothing on the episodes of which these are the last moments."""
     nothing, best = ends(env, [last.seed for last in ended])
-    return Scored(float(np.mean([last.info["performance"] for last in ended])), nothing, best)
+    mean = float(np.mean([last.info["performance"] for last in ended]))
+    return Scored(mean, float(np.mean(nothing)), float(np.mean(best)))
 
 
 def pictures_due(before_s: float, after_s: float, slow: float) -> int:

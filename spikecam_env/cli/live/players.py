@@ -35,19 +35,25 @@ def player(name: str) -> Player:
     if name in BASELINES:
         return Player(BASELINES[name])
     from spikecam_env.agents.agent import Agent, is_file, shipped
-    from spikecam_env.agents.playing import policy_of
+    from spikecam_env.agents.playing import acting
 
     if not is_file(name) and name not in shipped():
         raise unknown_name("policy", name, (*BASELINES, *shipped()))
     agent = Agent.load(name)
     sees = (("obs", agent.obs), ("obs_state", True))
-    return Player(policy_of(agent), sees, agent.policy.recipe.actions)
+    return Player(acting(agent), sees, agent.policy.recipe.actions)
 
 
 def steering(held: Iterable[str]) -> Policy:
     """Whoever holds these keys down: the action of a step is that of the keys as they are when it begins."""
 
     def act(seen: Any, env: AimingEnv) -> NDArray[np.float32]:
-        return action_of(held, env.axes, env.action_space.shape[0] - env.axes)  # type: ignore[index]
+        return action_of(held, env.axes, _further(env), env.answers)
 
     return act
+
+
+def _further(env: AimingEnv) -> int:
+    """Numbers of the action after those that turn the camera."""
+    (count,) = env.action_space.shape or (0,)
+    return count - env.axes

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 
-from spikecam_env.envs.observations.blocks import Multibinary, Packed, Spikes
+from spikecam_env.envs.observations.blocks import Multibinary, Packed, Spikes, block_shape
 from spikecam_env.envs.observations.frame_camera import FrameCamera
 from spikecam_env.envs.observations.intervals import ISI, TFI
 from spikecam_env.envs.observations.playback import TFP
@@ -26,6 +26,7 @@ __all__ = [
     "Packed",
     "Spikes",
     "View",
+    "block_shape",
     "observation",
     "replaced",
     "restarted",

@@ -10,7 +10,25 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from spikecam_env.envs.observations.protocol import Blocks, Observation, View
+from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import packed_bytes
+
+
+def block_shape(space: spaces.Space[Any]) -> tuple[int, int, int]:
+    """(frames, rows, columns) of the spike blocks that fill a space.
+
+    Raises:
+        InputError: For a space of anything else: packed spikes, pictures, numbers that are not 0 or 1.
+    """
+    shape = space.shape
+    grey = isinstance(space, spaces.Box) and float(np.max(space.high, initial=0)) > 1
+    if shape is None or len(shape) != 3 or space.dtype not in (np.int8, np.uint8, np.bool_) or grey:
+        raise InputError(
+            f"observations are {space}; they must be unpacked spike blocks (frames, rows, columns) of 0 and 1, "
+            'as of obs="spikes"'
+        )
+    frames, rows, columns = shape
+    return frames, rows, columns
 
 
 @dataclass(frozen=True)
@@ -30,7 +48,7 @@ class Spikes(Observation):
 
 @dataclass(frozen=True)
 class Multibinary(Spikes):
-    """The same as a `MultiBinary` space: what environments give where nothing else is asked for."""
+    """The same as a `MultiBinary` space, which stable-baselines3 and TorchRL refuse."""
 
     def space(self, view: View) -> spaces.Space[Any]:
         return spaces.MultiBinary((view.frames_per_step, *view.shape))

@@ -59,32 +59,35 @@ class View:
 class Task:
     """The base of all tasks; a subclass adds its own numbers and `draw`.
 
-    top_sides_s   the gaze's top rate [shorter sides/s]
-    rise_s        of the motor, from rest to it [s]
-    duration_s    of an episode at most [s]
-    success_side  how near to the middle the target counts as looked at [shorter sides]
+    Its docstring says Scene, Observation, Action, Reward, End and Success, so that one file describes a task.
 
-    frames_per_step  from action to action
-    axes             that the camera turns about: pan and tilt, or pan alone
-    further          numbers of the action after those
-    stream           of random numbers: tasks that begin their draws with the same thing have different ones, so that
-                     none is tested on what another is trained on
-
-    >>> from spikecam_env.envs.tasks import TASKS
-    >>> view = View((64, 64), 40_000.0, frames_per_step=40, pictures=range(1))
-    >>> TASKS["Track"]().draw(np.random.default_rng(0), view).steps
-    500
+    Example:
+        >>> from spikecam_env.envs.tasks import TASKS
+        >>> view = View((64, 64), 40_000.0, frames_per_step=40, pictures=range(1))
+        >>> TASKS["Track"]().draw(np.random.default_rng(0), view).steps
+        500
     """
 
     top_sides_s: float = 10.0
+    """Top rate of the gaze [shorter sides/s]."""
     rise_s: float = 0.01
+    """Time of the motor from rest to the top rate [s]."""
     duration_s: float = 0.5
+    """Time of an episode at most [s]."""
     success_side: float = 1 / 8
+    """Distance from the middle below which the target counts as looked at [shorter sides]."""
 
     frames_per_step: ClassVar[int] = 40
+    """Frames from action to action."""
     axes: ClassVar[int] = 2
+    """Axes that the camera turns about: pan and tilt, or pan alone."""
     further: ClassVar[int] = 0
+    """Numbers of the action after those of the axes."""
+    answers: ClassVar[int] = 0
+    """Answers that an action can give; `further` is then 1 (say) and one number an answer."""
     stream: ClassVar[int] = 0
+    """Stream of random numbers: tasks whose draws begin alike have different ones, so that no task is tested on the
+    episodes that another is trained on."""
 
     def draw(self, rng: np.random.Generator, view: View) -> Episode:
         """An episode; everything in it follows from the generator."""

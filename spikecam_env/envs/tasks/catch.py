@@ -20,21 +20,37 @@ from spikecam_env.envs.tasks.things import BRIGHT, background, disc_of, number_o
 
 @dataclass(frozen=True)
 class Catch(Task):
-    """crossing_s: earliest and latest [s]; paddle: half its width, `success_side`; away: nearest that the ball crosses
-    from where the paddle begins, and farthest, which is less where the motor cannot be in time; radius: of the ball;
-    start, line: rows where it is first seen and where the line is; spread: most that it is first seen beside the
-    middle.  All but the first in shorter sides."""
+    """Be where a ball crosses a line.
+
+    Scene: a ball flies towards a bright line, and crosses it 5 to 20 ms after it is first seen.
+    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action: one number in [-1, 1]: pan, the wanted gaze rate over the top rate. That is 100 sides/s, reached from rest
+        in 2 ms. A step is 20 frames (0.5 ms).
+    Reward: "progress": 20 times how much closer the place of the crossing has come to the middle column, as a share of
+        half the diagonal; 10 more for the success.
+    End: terminated when the ball crosses; 60 steps at most.
+    Success: the ball crosses within 1/16 side of the middle column. A ball that crosses early crosses near: a motor
+        that starts 2.5 ms after the first picture is in time. Performance: 1 for a success.
+    """
 
     top_sides_s: float = 100.0
     rise_s: float = 0.002
     duration_s: float = 0.03
     success_side: float = 1 / 16
+    """Half the paddle's width [shorter sides]."""
     crossing_s: tuple[float, float] = (0.005, 0.02)
+    """Earliest and latest crossing [s]."""
     away: tuple[float, float] = (0.12, 0.45)
+    """Distance of the crossing from the paddle's first place: nearest, farthest [shorter sides]. The farthest is less
+    where the motor cannot be in time."""
     radius: float = 1 / 16
+    """Radius of the ball [shorter sides]."""
     start: float = 0.1
+    """Row in which the ball is first seen [shorter sides]."""
     line: float = 0.85
+    """Row of the line [shorter sides]."""
     spread: float = 0.2
+    """Largest distance from the middle column at which the ball is first seen [shorter sides]."""
 
     frames_per_step: ClassVar[int] = 20
     axes: ClassVar[int] = 1

@@ -23,13 +23,26 @@ from spikecam_env.sensor import Keyframes
 
 @dataclass(frozen=True)
 class Exposure(Track):
-    """decades: of the light, from its middle to its ends; period_s: shortest and longest [s]; iris_decades_s: the
-    iris's top rate [decades/s], its range; tolerance: factor of light either way that is well exposed."""
+    """Keep a disc in the middle of the view, and the light on the sensor even.
+
+    Scene: that of `Track`, while the light changes a thousandfold, in 0.2 to 0.4 s to and fro.
+    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action: three numbers in [-1, 1]: pan and tilt as of `Track`; the rate of an iris, of 50 decades of light a second.
+    Reward: "progress" as of `Track`, of a closeness that is less by the share of the iris's range (two decades either
+        way) by which the light is off.
+    End: that of `Track`: terminated when the disc's middle leaves the picture; truncated after 500 steps.
+    Success: the disc's middle is within 1/8 side of the picture's, and the light on the sensor within a factor of 2 of
+        the light of `Track`. Performance: share of the 500 steps that end so.
+    """
 
     decades: float = 1.5
+    """Decades of light from its middle to its ends."""
     period_s: tuple[float, float] = (0.2, 0.4)
+    """Shortest and longest period of the light [s]."""
     iris_decades_s: float = 50.0
+    """Top rate of the iris [decades/s]."""
     tolerance: float = 2.0
+    """Factor of light, either way, that is well exposed."""
 
     further: ClassVar[int] = 1
     stream: ClassVar[int] = 2
@@ -107,9 +120,9 @@ class Lit(Episode):
     most: float = 0.0
     iris: Iris = Iris()
 
-    def acted(self, rest: tuple[float, ...], first: int, stop: int) -> Lit:
+    def acted(self, rest: tuple[float, ...], standing: Standing, stop: int) -> Lit:
         """With the iris on its way."""
-        before = self.iris.values[1]
+        before, first = self.iris.values[1], standing.frame
         after = float(np.clip(before + rest[0] * self.rate * (stop - first), -self.most, self.most))
         return replace(self, iris=Iris((before, after), (first, stop)))
 

@@ -16,9 +16,18 @@ from spikecam_env.envs.tasks.track import Track
 
 @dataclass(frozen=True)
 class LowLight(Track):
-    """mean_interval: shortest and longest of an episode [frames]; drawn evenly in its logarithm."""
+    """Keep a disc in the middle of the view, in little light.
+
+    Scene: that of `Track`, in which a pixel fires every 20 to 200 frames: half a step to five steps.
+    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action: that of `Track`: pan and tilt.
+    Reward: that of `Track`.
+    End: that of `Track`: terminated when the disc's middle leaves the picture; truncated after 500 steps.
+    Success: that of `Track`: the disc's middle is within 1/8 side of the picture's. Performance: share of the steps.
+    """
 
     mean_interval: tuple[float, float] = (20.0, 200.0)
+    """Shortest and longest mean interval of an episode [frames], drawn evenly in its logarithm."""
 
     stream: ClassVar[int] = 1
 

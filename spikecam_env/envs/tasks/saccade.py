@@ -18,16 +18,28 @@ OTHERS = ("rings", "halves", "islands")
 
 @dataclass(frozen=True)
 class Saccade(Task):
-    """hold_s: how long the cued disc is to be held [s]; speed: of the discs, over the gaze's top speed; radius, start,
-    room: as of `Track`."""
+    """Look at the disc with spokes, and hold it.
+
+    Scene: four discs with different textures turn and bounce, at 0.2 to 0.5 of the gaze's top rate. One has spokes.
+    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action: that of `Track`: pan and tilt.
+    Reward: "progress" as of `Track`, towards the disc with spokes; 10 more for the success.
+    End: terminated by the success; truncated after 200 steps. A disc that leaves the picture may come back.
+    Success: its middle is within 1/16 side of the picture's for 20 ms without a break. Performance: 1 for a success.
+    """
 
     duration_s: float = 0.2
     success_side: float = 1 / 16
     hold_s: float = 0.02
+    """Time for which the disc is to be held [s]."""
     speed: tuple[float, float] = (0.2, 0.5)
+    """Speed of the discs over the gaze's top rate: least, most."""
     radius: float = 1 / 9
+    """Radius of the discs [shorter sides]."""
     start: tuple[float, float] = (0.25, 0.35)
+    """Distance of the discs from the middle at first: least, most [shorter sides]."""
     room: float = 0.6
+    """Distance from the middle to the walls at which the discs turn back [shorter sides]."""
 
     def draw(self, rng: np.random.Generator, view: View) -> Episode:
         """See `Task.draw`."""

@@ -14,13 +14,25 @@ from spikecam_env.envs.tasks.things import background, disc_of, number_of, wande
 
 @dataclass(frozen=True)
 class Track(Task):
-    """speed: of the target, over the gaze's top speed (least, most); radius, start: [shorter sides]; room: of the box
-    in which it bounces, from its middle to its walls [shorter sides]."""
+    """Keep a disc in the middle of the view.
+
+    Scene: a disc with bright islands turns and bounces before a soft background, at 0.2 to 0.8 of the gaze's top rate.
+    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action: two numbers in [-1, 1]: pan (to the right) and tilt (down), the wanted gaze rate over the top rate. That is
+        10 sides/s, reached from rest in 10 ms. A step is 40 frames (1 ms).
+    Reward: "progress": 20 times how much closer the disc has come to the middle, as a share of half the diagonal.
+    End: terminated when the disc's middle leaves the picture; truncated after 500 steps.
+    Success: the disc's middle is within 1/8 side of the picture's. Performance: share of the 500 steps that end so.
+    """
 
     speed: tuple[float, float] = (0.2, 0.8)
+    """Speed of the disc over the gaze's top rate: least, most."""
     radius: float = 1 / 8
+    """Radius of the disc [shorter sides]."""
     start: tuple[float, float] = (0.15, 0.25)
+    """Distance of the disc from the middle at first: least, most [shorter sides]."""
     room: float = 1.0
+    """Distance from the middle to the walls at which the disc turns back [shorter sides]."""
 
     def draw(self, rng: np.random.Generator, view: View) -> Episode:
         """See `Task.draw`."""

@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.envs.observations import Blocks, Observation, View, observation, restarted
+from spikecam_env.envs.observations import Blocks, Observation, View, block_shape, observation, restarted
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.sensor import Keyframes
@@ -102,9 +102,7 @@ class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
 
 def viewed(space: spaces.Space[Any], env: Any) -> View:
     """The camera whose blocks fill a space; raises InputError where they are no blocks of spikes."""
-    if space.shape is None or len(space.shape) != 3 or space.dtype not in (np.int8, np.uint8, np.bool_):
-        raise InputError(f"observations are {space}; they must be unpacked spike blocks (frames, rows, columns)")
-    frames, rows, columns = space.shape
+    frames, rows, columns = block_shape(space)
     one = getattr(env.unwrapped, "envs", [env])[0].unwrapped
     rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else View.frame_rate_hz
     return View((rows, columns), frames, rate)

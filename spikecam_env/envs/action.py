@@ -1,0 +1,43 @@
+"""Actions as users give them: one check for every environment."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from spikecam_env.envs.motor import cut
+from spikecam_env.errors import InputError, shown
+
+NUMBERS = {1: "one finite number", 2: "two finite numbers", 3: "three finite numbers"}
+"""Counts as messages have them; others are figures."""
+
+
+def checked_action(action: Any, count: int, names: str = "") -> list[float]:
+    """The numbers of an action, cut to [-1, 1].
+
+    Args:
+        action: Numbers (count,): an array, a list, or a torch tensor on the host.
+        count: How many an action has.
+        names: Of the numbers, for the error's text, e.g. "(pan, tilt)".
+
+    Returns:
+        The numbers as floats.
+
+    Raises:
+        InputError: For anything else: text, another shape, NaN, infinity.
+
+    Example:
+        >>> checked_action([0.5, 3], 2)
+        [0.5, 1.0]
+    """
+    try:
+        given = np.asarray(action)
+        numbers = given.astype(np.float64).reshape(-1).tolist() if given.dtype.kind in "biuf" else []
+    except (TypeError, ValueError, RuntimeError):  # ragged lists, tensors elsewhere
+        given, numbers = np.empty(0), []
+    if given.shape != (count,) or len(numbers) != count or not all(map(isfinite, numbers)):
+        wanted = NUMBERS.get(count, f"{count} finite numbers")
+        raise InputError(f"action is {shown(action)}; it must be {wanted} in [-1, 1]{names and f', {names}'}")
+    return [cut(number, 1.0) for number in numbers]

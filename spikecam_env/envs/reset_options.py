@@ -1,0 +1,55 @@
+"""Options of `reset` as users give them: one check for every environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from scenes.protocol import MOST_PLACE
+from spikecam_env.checked import checked_numbers
+from spikecam_env.errors import InputError, shown, unknown_name
+
+Rule = Callable[[Any, str], Any]
+"""(value, name) -> the value to use; raises InputError for an unusable one."""
+
+OF_EVERY = ("light", "model")
+"""Options of every environment, which `SpikeCameraEnv` takes before the scene gets the others."""
+
+
+def pair(value: Any, name: str) -> tuple[float, float]:
+    """A rule: two numbers, e.g. (x, y) [pixels]."""
+    first, second = checked_numbers(value, name, 2, -MOST_PLACE, MOST_PLACE)
+    return first, second
+
+
+def checked_options(options: Any, rules: Mapping[str, Rule]) -> dict[str, Any]:
+    """Options by name, each checked by its rule.
+
+    Args:
+        options: A dictionary, or None for no options.
+        rules: The options that this environment knows.
+
+    Returns:
+        The checked values of those that were given.
+
+    Raises:
+        InputError: For an unknown name, an unusable value, and for options that are no dictionary.
+
+    Example:
+        >>> checked_options({"offset": [1, 2]}, {"offset": pair})
+        {'offset': (1.0, 2.0)}
+    """
+    given = as_dictionary(options)
+    for name in given:
+        if name not in rules:
+            raise unknown_name("option of reset", name, (*rules, *OF_EVERY))
+    return {name: rules[name](value, name) for name, value in given.items()}
+
+
+def as_dictionary(options: Any) -> dict[str, Any]:
+    """A copy of the options; raises InputError unless they are a dictionary or None."""
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise InputError(f"options is {shown(options)}; it must be a dictionary of names and values, or None")
+    return dict(options)
