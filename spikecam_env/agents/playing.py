@@ -49,6 +49,15 @@ def episodes_of(task: str) -> int:
     return EPISODES.get(task.split("-")[0], 10)
 
 
+def episodes_along(episodes: int) -> int:
+    """How many of so many judge each agent on the way: a quarter, and four or more where there are four.
+
+    >>> episodes_along(100), episodes_along(10), episodes_along(2)
+    (25, 4, 2)
+    """
+    return min(episodes, max(4, episodes // 4))
+
+
 @lru_cache(maxsize=64)
 def _ends(task: Any, shape: tuple[int, int], frames_per_step: int, episodes: int) -> tuple[float, float]:
     """Performance of doing nothing and of the oracle, who do not look at pictures."""
