@@ -55,7 +55,7 @@ def test_a_recording_reads_back_and_denoises(suffix: str, tmp_path: Path, capsys
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert names == {"denoised.h5", "pictures.png", "film.mp4", "summary.json"}
     assert read_recording(tmp_path / "out" / "denoised.h5").spikes.shape == spikes.shape
-    assert len(json.loads((tmp_path / "out" / "summary.json").read_text())["rows"]) == 3
+    assert len(json.loads((tmp_path / "out" / "summary.json").read_text())["rows"]) == 4
 
 
 def test_the_same_seed_records_the_same_bits(tmp_path: Path) -> None:
