@@ -154,16 +154,16 @@ def _camera(
 
 def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:
     """One picture a shown block: noisy, denoised, true light, with PSNR against the true light."""
-    corner = f"{run.mode}: denoised online at {run.times_real:.3f} x real time"
-    return [_picture(run, block, corner) for block in run.shown]
+    return [_picture(run, block) for block in run.shown]
 
 
 def last_picture(run: Streamed) -> NDArray[np.uint8]:
     """The last block that is shown, as `film_frames` has it: the denoiser has seen most before it."""
-    return _picture(run, run.shown[-1], f"{run.mode}: denoised online")
+    return _picture(run, run.shown[-1])
 
 
-def _picture(run: Streamed, block: int, corner: str) -> NDArray[np.uint8]:
+def _picture(run: Streamed, block: int) -> NDArray[np.uint8]:
+    corner = f"{run.mode}: denoised online, {run.latency} frames later"
     return compose(_panels(run, block), white_of(run.truths[0]), corner)
 
 
