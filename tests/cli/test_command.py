@@ -100,6 +100,7 @@ def test_a_quick_demo_makes_a_picture_alone(tmp_path: Path, capsys) -> None:
         (("record", "--out", "x.h5", "--model", "no.toml"), "cannot read model file no.toml"),
         (("record", "--out", "x.h5", "--frames", "0"), "--frames 0"),
         (("record", "--out", "x.h5", "--size", "0", "400"), "--size 0 400"),
+        (("record", "--out", "x.h5", "--size", "2", "400"), "shape is (2, 400); the disk's radius"),
         (("demo", "--frames", "10"), "10 frames are too few to show; ask for 500 or more"),
         (("demo", "--quick", "--frames", "10"), "10 frames are too few to show; ask for 175 or more"),
         (("demo", "--model", "scs"), "unknown preset 'scs'"),
