@@ -39,6 +39,9 @@ from spikecam_env.errors import InputError
 MOST_RADIUS = 6000.0
 """[pixels] Texels are counted in 32 bits, TEXELS_PER_PIXEL^2 of them to a pixel of the disk's square."""
 
+RADIUS = 0.44
+"""Of the disk, as a share of the shorter side: the whole disk is seen."""
+
 _RANGES = {
     "rpm": (-MOST_RPM, MOST_RPM),
     "radius": (1.0, MOST_RADIUS),
@@ -93,7 +96,7 @@ class RotatingDisk(PlanarScene):
         motion_per_key: float = 0.6,
     ) -> None:
         self.shape, seed = checked_shape(shape), checked_seed(seed, most=LARGEST_DERIVED_SEED)
-        self.radius = _checked("radius", 0.44 * min(self.shape) if radius is None else radius)
+        self.radius = _checked("radius", _default_radius(self.shape) if radius is None else radius)
         self.rpm, self.frame_rate_hz = _checked("rpm", rpm), _checked("frame_rate_hz", frame_rate_hz)
         checked_number(light[0], "light[0]", 0.0, MOST_LIGHT)
         checked_number(light[1], "light[1]", light[0], MOST_LIGHT, above=True)
@@ -192,6 +195,13 @@ class RotatingDisk(PlanarScene):
         x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
         disk = Laid(self._disk, self.radius, x, y, self.angle_at(frame))
         return Plane(self.shape, frame, self._tile, *gaze.at(frame), [disk], self._background)
+
+
+def _default_radius(shape: tuple[int, int]) -> float:
+    radius = RADIUS * min(shape)
+    if radius < _RANGES["radius"][0]:
+        raise InputError(f"shape is {shape}; the disk's radius, {RADIUS} of the shorter side, needs 3 pixels there")
+    return radius
 
 
 def _checked(name: str, value: float) -> float:

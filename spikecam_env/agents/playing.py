@@ -104,3 +104,13 @@ def score_of(actor: Actor, env: gymnasium.Env[Any, Any], episodes: int) -> float
 def episodes_of(task: str) -> int:
     """How many judge an agent; task: an id."""
     return EPISODES.get(task.removeprefix("spikecam_env/").split("-")[0], 10)
+
+
+def episodes_along(episodes: int) -> int:
+    """Episodes that judge each agent on the way, of those that judge the last: a quarter, but four if there are four.
+
+    Example:
+        >>> episodes_along(100), episodes_along(10), episodes_along(2)
+        (25, 4, 2)
+    """
+    return min(episodes, max(4, episodes // 4))

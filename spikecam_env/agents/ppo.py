@@ -59,8 +59,24 @@ class PPO:
     most_gradient: float = 0.5
 
 
-def train(envs: Cameras, run: Run, ppo: PPO, seed: int, save: Callable[[], None]) -> None:
-    """Go on learning until `ppo.steps`.  run: of a `Policy`; `save` is called after every leg."""
+def train(
+    envs: Cameras,
+    run: Run,
+    ppo: PPO,
+    seed: int,
+    save: Callable[[], None],
+    watch: Callable[[int], None] = lambda _: None,
+) -> None:
+    """Go on learning until `ppo.steps`.
+
+    Args:
+        envs: The cameras that play.
+        run: Of a `Policy`.
+        ppo: How to learn.
+        seed: Of all that is drawn.
+        save: Called after every leg.
+        watch: Called after every update, with the steps so far; it must leave the policy as it is.
+    """
     policy, a_rollout = run.network, ppo.rollout * envs.num_envs
     assert isinstance(policy, Policy)
     for weights in policy.parameters():  # all have moments, also those that a loss leaves alone: a run is one of all
@@ -77,6 +93,7 @@ def train(envs: Cameras, run: Run, ppo: PPO, seed: int, save: Callable[[], None]
             ended += episodes
             seen = [*seen, batch] if ppo.imitate else [batch]
             _learn(policy, run.optimiser, seen, ppo)
+            watch((update + 1) * a_rollout)
         run.step, run.seconds = last * a_rollout, run.seconds + time.process_time() - began
         means = np.mean(ended or [(0.0, 0.0, 0.0)], axis=0).tolist()
         row = dict(zip(("return", "performance", "success"), means, strict=True))

@@ -15,24 +15,36 @@ from spikecam_env.agents.playing import Actor
 from spikecam_env.agents.study import Result
 from spikecam_env.whole import whole_file
 
+COLUMNS = 3
+"""Panels of curves in a row."""
+
 
 def draw_curves(results: Sequence[Result], path: Path) -> None:
-    """A panel a task: performance in training over processor minutes, a line a run, a colour a sight."""
-    learned = [result for result in results if result.curve]
+    """Draw learning curves: a panel a task, a line a run, a colour a sight.
+
+    Args:
+        results: Of a study; those without agents on the way are left out.
+        path: The PNG to write; the score on test episodes over the steps of training.
+    """
+    learned = [result for result in results if result.along]
     tasks = sorted({result.case.task for result in learned}) or [""]
     sights = sorted({result.case.sight for result in learned})
-    figure = Figure(figsize=(4.2 * len(tasks), 3.4), layout="constrained")
-    for axes, task in zip(figure.subplots(1, len(tasks), squeeze=False)[0], tasks, strict=True):
-        seen: set[str] = set()
-        for result in (result for result in learned if result.case.task == task):
-            sight = result.case.sight
-            minutes = [row["cpu_s"] / 60 for row in result.curve]
-            label = None if sight in seen else sight
-            axes.plot(minutes, [row["performance"] for row in result.curve], f"C{sights.index(sight)}", label=label)
-            seen.add(sight)
-        axes.set(title=task, xlabel="processor time [min]", ylabel="performance in training", ylim=(0, 1))
-        if seen:
+    rows, columns = -(-len(tasks) // COLUMNS), min(len(tasks), COLUMNS)
+    figure = Figure(figsize=(3.4 * columns, 2.8 * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes, task in zip(panels, tasks, strict=False):
+        of_task = [result for result in learned if result.case.task == task]
+        for sight in sights:
+            for number, result in enumerate(result for result in of_task if result.case.sight == sight):
+                steps, scores = ([row[name] for row in result.along] for name in ("steps", "score"))
+                label = None if number else sight
+                axes.plot(np.divide(steps, 1000), scores, f"C{sights.index(sight)}.-", label=label)
+        axes.set(title=task, xlabel="steps of training [thousand]", ylabel="score on test episodes", ylim=(None, 1.05))
+        axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
+        if of_task:
             axes.legend(frameon=False)
+    for axes in panels[len(tasks) :]:
+        axes.axis("off")
     with whole_file(path) as beside:
         figure.savefig(beside, format="png", dpi=110)
 

@@ -19,10 +19,10 @@ from pydantic import Field
 from tqdm import tqdm
 
 from spikecam_env.agents.agent import Agent, shipped
-from spikecam_env.agents.playing import Actor, episodes_of, score_of
+from spikecam_env.agents.playing import Actor, episodes_along, episodes_of, score_of
 from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.tracker import Tracker
-from spikecam_env.agents.training import SIGHTS, Study, learner, train_agent
+from spikecam_env.agents.training import SIGHTS, Study, agents_along, learner, train_agent
 from spikecam_env.checked import checked_number
 from spikecam_env.datasets.ray_cluster import connected
 from spikecam_env.envs.tasks.low_light import LowLight
@@ -95,12 +95,18 @@ class Case(Declared):
 
 
 class Result(Declared):
-    """score: on the test split; cpu_s: of training [s]; curve: as of `training`."""
+    """score: on the test split; cpu_s: of training [s]; curve: as of `training`; along: rows of steps and of the score
+    on the first test episodes (`playing.episodes_along`) of the agents on the way."""
 
     case: Case
     score: Annotated[float, Field(ge=-100, le=100)]
     cpu_s: Annotated[float, Field(ge=0)] = 0.0
     curve: Annotated[tuple[dict[Name, float], ...], Field(strict=False)] = ()
+    along: Annotated[tuple[dict[Name, float], ...], Field(strict=False)] = ()
+
+
+POINTS = 12
+"""Of a learning curve, evenly over its steps: of the 48 updates of a training, every fourth."""
 
 
 def cases(
@@ -162,16 +168,25 @@ def _curve(case: Case, out: Path) -> tuple[dict[str, float], ...]:
     if case.sight in READY:
         return ()
     ppo = learner(case.steps, imitate=case.imitate)
-    return tuple(train_agent(case.learned, out / case.folder, ppo, case.seed).training["curve"])
+    return tuple(train_agent(case.learned, out / case.folder, ppo, case.seed, points=POINTS).training["curve"])
 
 
 def _played(case: Case, curve: tuple[dict[str, float], ...], out: Path) -> Result:
-    env = case.played.make(split="test")
+    env, episodes = case.played.make(split="test"), case.episodes or episodes_of(case.task)
     try:
-        score = score_of(actor_of(case, out, env), env, case.episodes or episodes_of(case.task))
+        score = score_of(actor_of(case, out, env), env, episodes)
+        along = _along(case, env, episodes_along(episodes), out)
     finally:
         env.close()
-    return Result(case=case, score=score, cpu_s=curve[-1]["cpu_s"] if curve else 0.0, curve=curve)
+    return Result(case=case, score=score, cpu_s=curve[-1]["cpu_s"] if curve else 0.0, curve=curve, along=along)
+
+
+def _along(case: Case, env: gymnasium.Env[Any, Any], episodes: int, out: Path) -> tuple[dict[str, float], ...]:
+    """Of a case whose agent was trained: the score of the agents on the way."""
+    if case.sight in READY:
+        return ()
+    agents = agents_along(out / case.folder)
+    return tuple({"steps": steps, "score": score_of(Agent.load(path), env, episodes)} for steps, path in agents.items())
 
 
 def actor_of(case: Case, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:

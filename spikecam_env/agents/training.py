@@ -3,6 +3,7 @@
 OUT/last.pt     to go on from (`denoiser.run`)
 OUT/agent.pt    the agent so far (`agents.agent`)
 OUT/curve.json  rows: steps, processor seconds, episodes, their mean return, performance and success
+OUT/along/      agents on the way, by their steps, where they are asked for
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from gymnasium.spaces import Box, Dict
 from gymnasium.vector import VectorEnv
 
 from denoiser.run import Run
-from spikecam_env.agents.agent import Agent
+from spikecam_env.agents.agent import ENDING, Agent
 from spikecam_env.agents.policy import Recipe
 from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
@@ -126,15 +127,18 @@ def learner(steps: int | None = None, *, imitate: bool = False, plain: bool = Fa
     return PPO(**given, place=0.0 if plain else PPO.place)
 
 
-def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16) -> Agent:
+def train_agent(
+    study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, environments: int = 16, points: int = 0
+) -> Agent:
     """Train, or go on from `out/last.pt`.
 
     Args:
-        study: what the learner is put before.
+        study: task and observation of the learner.
         out: folder of the run, made if needed.
         ppo: the method; default `PPO()`.
         seed: of network, actions, episodes and cameras.
         environments: cameras that are stepped together.
+        points: agents to keep along the training, evenly over its steps (`agents_along`).
 
     Returns:
         The agent.
@@ -169,5 +173,18 @@ def train_agent(study: Study, out: Path, ppo: PPO | None = None, seed: int = 0, 
             trained().save(out / "agent.pt")
             write_text_whole(out / "curve.json", json.dumps(run.curve, indent=1) + "\n")
 
-        train(envs, run, ppo, seed, save)
+        def keep(steps: int) -> None:
+            if steps * points // ppo.steps > (steps - ppo.rollout * environments) * points // ppo.steps:
+                (out / ALONG).mkdir(exist_ok=True)
+                trained().save(out / ALONG / f"{steps:09d}{ENDING}")
+
+        train(envs, run, ppo, seed, save, keep)
         return trained()
+
+
+ALONG = "along"
+
+
+def agents_along(out: Path) -> dict[int, Path]:
+    """Files of the agents that `train_agent` kept on the way, by their steps, in order."""
+    return {int(path.stem): path for path in sorted((out / ALONG).glob(f"*{ENDING}"))}

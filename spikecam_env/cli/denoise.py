@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
@@ -12,10 +12,19 @@ from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Count
 from spikecam_env.cli.reading import Reading
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from spikecam_env.cli.restore import Restored
+    from spikecam_env.streams.recording import Recording
+
 
 @dataclass
 class Denoise:
     """Denoise a recording: writes the denoised stream, a picture before and after, a film and the figures.
+
+    Where a recording has the true light of a frame (as those of `spikecam record` do), it is shown beside them.
 
     example:  spikecam denoise recording.dat --flip --out denoised
     """
@@ -29,76 +38,68 @@ class Denoise:
     """Which DnSS: `best`, `fast` (a quarter of its weights), or `paper` (the paper's network; slower)."""
     engine: Literal["torch", "openvino"] = "torch"
     """What computes the network; `openvino` (pip install 'spikecam-env[openvino]') takes no `paper`."""
-    window: Count = 41
-    """Frames averaged in the pictures (TFP window); odd."""
+    window: Count | None = None
+    """Frames averaged in the pictures of spikes (TFP window); odd.  Default: 41, or all of a shorter recording.
+    Pictures of the rate are of one frame."""
     overlap: bool = False
     """Not for `paper`: passes that overlap by half: less error, no seams, twice the time."""
     calibration: Path | None = None
     """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     film: bool = True
-    """Also write film.mp4, noisy beside denoised."""
+    """Also write film.mp4, noisy beside denoised: at most 240 pictures, evenly over the recording."""
     reading: Reading = field(default_factory=Reading)
 
     def run(self) -> None:
-        import numpy as np
-        from tqdm import tqdm
-
-        from denoiser.niqe import niqe
         from spikecam_env.cli.files import out_folder, write_json
-        from spikecam_env.cli.panels import Panel, compose, display, write_film, write_picture
-        from spikecam_env.cli.restore import picture_frames, restore
         from spikecam_env.cli.table import table
-        from spikecam_env.errors import InputError
-        from spikecam_env.streams import SpikeWriter, middleTFP, read_recording
+        from spikecam_env.streams import read_recording
 
-        if self.window % 2 == 0:
-            raise InputError(f"--window {self.window}; it must be odd and at least 1 (41 is usual)")
         recording = read_recording(self.file, **self.reading.options())
         print(f"{self.file}: {recording}")
-        noisy = recording.spikes
-        frames = picture_frames(len(noisy), self.window)
         with out_folder(self.out) as folder:
-            options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
-            clean, rates = restore(noisy, self.mode, self.window, frames, **options)
-
-            attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
-            attributes |= {"denoiser": self.mode, "source": self.file.name}
-            with SpikeWriter(folder / "denoised.h5", clean.shape[1:], recording.frame_rate_hz, **attributes) as writer:
-                writer.append(clean)
-
-            white = float(np.percentile(noisy.mean(axis=0), 99.5)) or 1.0
-            streams = {
-                "noisy spikes": {t: middleTFP(noisy, t, self.window) for t in frames},
-                "denoised spikes": {t: middleTFP(clean, t, self.window) for t in frames},
-                "denoised rate": rates,
-            }
-            judged = frames[:: -(-len(frames) // 12)]
-            rows: list[dict[str, Any]] = []
-            for name, pictures in tqdm(streams.items(), desc="judge", unit="stream", leave=False):
-                rate = float(np.mean([p.mean() for p in pictures.values()]))
-                row: dict[str, Any] = {"picture": name, "spikes/frame": rate}
-                try:
-                    scores = [niqe(display(pictures[t], white) / 255) for t in judged]
-                    row |= {"NIQE": float(np.mean(scores)), "+-": float(np.std(scores)), "pictures": len(scores)}
-                except InputError as error:
-                    why = str(error)
-                    row |= {"NIQE": None, "+-": None, "pictures": 0}
-                rows.append(row)
-
-            def side_by_side(frame: int) -> np.ndarray:
-                shown = [
-                    Panel(pictures[frame], row["picture"], "" if row["NIQE"] is None else f"NIQE {row['NIQE']:.2f}")
-                    for row, pictures in zip(rows, streams.values(), strict=True)
-                ]
-                return compose(shown, white, f"{self.mode}, {self.window} frames about frame {frame}")
-
-            write_picture(folder / "pictures.png", side_by_side(frames[len(frames) // 2]))
-            if self.film:
-                write_film(folder / "film.mp4", (side_by_side(t) for t in frames), total=len(frames))
-            summary = {"file": str(self.file), "mode": self.mode, "window": self.window, "rows": rows}
+            found = self._restored(recording)
+            self._write_stream(folder, recording, found)
+            self._write_pictures(folder, found)
+            rows, speed = found.rows(), found.speed()
+            summary = {"file": str(self.file), "mode": self.mode, "window": found.window, "speed": speed, "rows": rows}
             write_json(folder / "summary.json", summary)
             written = sorted(path.name for path in folder.iterdir())
         print(table(rows))
-        if rows[0]["NIQE"] is None:
-            print(f"no NIQE: {why}")
+        print()
+        print(table([speed]))
         print(f"wrote {', '.join(written)} in {self.out}")
+
+    def _restored(self, recording: Recording) -> Restored:
+        from denoiser import OnlineDnSS
+        from spikecam_env.cli.restore import Restored, checked_window, light_at, picture_frames, restore, whole_windows
+
+        noisy = recording.spikes
+        window = checked_window(self.window, len(noisy))
+        light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:])
+        options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
+        online = OnlineDnSS.pretrained(self.mode, output="both", **options)
+        denoised, planes, seconds = restore(noisy, online, [*picture_frames(len(noisy), window), *light])
+        return Restored(noisy, denoised, planes, light, window, recording.frame_rate_hz, seconds, online.latency)
+
+    def _write_stream(self, folder: Path, recording: Recording, found: Restored) -> None:
+        from spikecam_env.streams import SpikeWriter
+
+        attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
+        attributes |= {"denoiser": self.mode, "source": self.file.name}
+        shape = found.denoised.shape[1:]
+        with SpikeWriter(folder / "denoised.h5", shape, recording.frame_rate_hz, **attributes) as writer:
+            writer.append(found.denoised)
+
+    def _write_pictures(self, folder: Path, found: Restored) -> None:
+        from spikecam_env.cli.before_after import instant
+        from spikecam_env.cli.panels import compose, write_film, write_picture
+
+        white, rate_hz = found.white, found.frame_rate_hz
+
+        def picture(frame: int, *, light: bool) -> NDArray[np.uint8]:
+            return compose(found.panels(frame, light=light), white, f"{self.mode}: {instant(frame, rate_hz)}")
+
+        write_picture(folder / "pictures.png", picture(found.middle, light=True))
+        if self.film:
+            frames = found.film_frames
+            write_film(folder / "film.mp4", (picture(t, light=False) for t in frames), total=len(frames))

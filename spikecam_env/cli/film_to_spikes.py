@@ -61,12 +61,13 @@ class FilmToSpikes:
     camera: Camera = field(default_factory=Camera)
     seed: Seed = 0
     """Seed of the camera unit and its noise."""
-    truth_every: Whole = 0
-    """Frames between ground truths (the film's light) in an .h5 file; 0: none."""
+    truth_every: Whole | None = None
+    """Frames between ground truths (the film's light) in an .h5 file; 0: none.  Default: the frame in the middle alone,
+    beside which `spikecam denoise` shows its pictures."""
 
     def run(self) -> None:
         from scenes import VideoScene
-        from spikecam_env.cli.recording import check_out, record_scene
+        from spikecam_env.cli.recording import check_out, record_scene, truth_frames
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
 
@@ -90,8 +91,8 @@ class FilmToSpikes:
         check_out(self.out, frames, self.size)
         attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
         attributes |= {"film": self.film.name, "transfer": scene.transfer, "gain": scene.gain}
-        what = f"record {self.film.name}"
-        spikes = record_scene(self.out, scene, sensor, frames, what, attributes, self.truth_every)
+        truth, what = truth_frames(self.out, frames, self.truth_every), f"record {self.film.name}"
+        spikes = record_scene(self.out, scene, sensor, frames, what, attributes, truth)
         self._warn_if_off(frames * math.prod(self.size), spikes)
         done = self._done(scene, frames, sensor.engine, spikes)
         print(table([{"film to spikes": name, "": value} for name, value in done.items()]))

@@ -30,12 +30,13 @@ class Record:
     """Rows and columns."""
     seed: Seed = 0
     """Seed of the camera unit, its noise and the scene."""
-    truth_every: Whole = 0
-    """Frames between ground truths (radiance, flow, object number ...) in an .h5 file; 0: none."""
+    truth_every: Whole | None = None
+    """Frames between ground truths (radiance, flow, object number ...) in an .h5 file; 0: none.  Default: the frame in
+    the middle alone, beside which `spikecam denoise` shows its pictures."""
 
     def run(self) -> None:
         from spikecam_env.cli.named_scene import scene_named
-        from spikecam_env.cli.recording import check_out, record_scene
+        from spikecam_env.cli.recording import check_out, record_scene, truth_frames
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
 
@@ -44,7 +45,7 @@ class Record:
         sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
         scene = scene_named(self.scene, self.size, self.seed, model.frame_rate_hz, self.rpm)
         attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
-        what = f"record {self.scene}"
-        spikes = record_scene(self.out, scene, sensor, self.frames, what, attributes, self.truth_every)
+        truth = truth_frames(self.out, self.frames, self.truth_every)
+        spikes = record_scene(self.out, scene, sensor, self.frames, f"record {self.scene}", attributes, truth)
         rate = spikes / (self.frames * math.prod(self.size))
         print(table([{"file": str(self.out), "frames": self.frames, "engine": sensor.engine, "spikes/frame": rate}]))

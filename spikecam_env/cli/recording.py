@@ -21,7 +21,20 @@ BLOCK = 64
 HDF5 = (".h5", ".hdf5")
 
 
-def check_out(out: Path, frames: int, shape: tuple[int, int], truth_every: int = 0) -> None:
+def truth_frames(out: Path, frames: int, every: int | None) -> range:
+    """Frames of a recording whose true light is kept.
+
+    Args:
+        out: The recording; .h5 alone has room for truth.
+        frames: Its length.
+        every: Frames between two; 0: none; None: the frame in the middle, where there is room.
+    """
+    if every is None:
+        return range(frames // 2, frames // 2 + 1) if out.suffix.lower() in HDF5 else range(0)
+    return range(0, frames, every) if every else range(0)
+
+
+def check_out(out: Path, frames: int, shape: tuple[int, int], truth_every: int | None = 0) -> None:
     """Errors: InputError for a file type that no recording has, or that has no room for truth where there is to be
     some, a place that cannot be written to, and more frames than the disk has room for, or for a .npz the memory."""
     from spikecam_env.streams.packing import packed_bytes
@@ -48,17 +61,15 @@ def record_scene(
     frames: int,
     what: str,
     attributes: dict[str, object],
-    truth_every: int = 0,
+    truth: range = range(0),
 ) -> int:
     """Write `frames` frames of spikes to a .h5, .dat or .npz file, which appears whole; returns how many spikes.
 
     Beside a .dat file, its geometry and frame rate go to `<name>.dat.json`, so that it opens without options.
 
-    what: for the progress bar.  attributes: of a .h5 file.  truth_every: frames between ground truths in it; 0: none.
+    what: for the progress bar.  attributes: of a .h5 file.  truth: frames whose ground truth it has too.
     """
     from tqdm import trange
-
-    from spikecam_env.datasets.write import truth_frames
 
     spikes = 0
     with _appending(out, scene, sensor, attributes) as (append, append_truth):
@@ -66,8 +77,9 @@ def record_scene(
             count = min(BLOCK, frames - start)
             block = sensor.step(scene.radiance(start, start + count), count)
             append(block)
-            for frame in truth_frames(truth_every, start, start + count):
-                append_truth(frame)
+            for frame in range(start, start + count):
+                if frame in truth:
+                    append_truth(frame)
             spikes += int(block.sum())
     return spikes
 

@@ -1,56 +1,191 @@
-"""A whole recording through the online denoiser: its spikes, and pictures of its rate planes at chosen frames."""
+"""A recording through the online denoiser: its spikes, rate planes of chosen frames, and figures of both."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from denoiser import OnlineDnSS
+from spikecam_env.cli.before_after import (
+    WINDOW,
+    Picture,
+    Spikes,
+    instant_panel,
+    light_db,
+    light_panel,
+    mean_panel,
+    over,
+    white_of,
+)
+from spikecam_env.cli.panels import Panel
+from spikecam_env.cli.recording import HDF5
 from spikecam_env.errors import InputError
+from spikecam_env.streams import middleTFI, middleTFP, read_truth
+from spikecam_env.streams.hdf5 import is_recording
 
 CHUNK = 16
 """Frames pushed at a time."""
 MOST_PICTURES = 240
 """In a film: 8 seconds."""
+MOST_JUDGED = 12
+"""Frames that the table is of, evenly over the recording."""
+
+
+@dataclass(frozen=True)
+class Restored:
+    """A recording before and after the denoiser."""
+
+    noisy: Spikes
+    """(T, H, W), as recorded."""
+    denoised: Spikes
+    """(T, H, W)."""
+    planes: dict[int, Picture]
+    """Rate planes (H, W) [spikes/frame] by frame."""
+    light: dict[int, Picture]
+    """True light (H, W) [spikes/frame] in the middle of frames, where the recording has it."""
+    window: int
+    """Frames of the pictures that are means."""
+    frame_rate_hz: float | None
+    """Of the recording, where it is known."""
+    seconds: float
+    """That the denoiser took."""
+    latency: int
+    """Of the denoiser [frames]."""
+
+    @property
+    def film_frames(self) -> list[int]:
+        """At most MOST_PICTURES frames, evenly over the recording."""
+        return picture_frames(len(self.noisy), self.window)
+
+    @property
+    def middle(self) -> int:
+        """The frame nearest the middle; of those with true light where there are any."""
+        return min(self.light or self.film_frames, key=lambda frame: abs(frame - len(self.noisy) // 2))
+
+    def panels(self, frame: int, *, light: bool = True) -> list[Panel]:
+        """Before and after at a frame; light: beside the true light, where it is known."""
+        known = self.light.get(frame) if light else None
+        shown = [
+            mean_panel("noisy spikes", self.noisy, frame, self.window, known),
+            mean_panel("denoised spikes", self.denoised, frame, self.window, known),
+            instant_panel("denoised rate", self.planes[frame], known),
+        ]
+        return shown if known is None else [*shown, light_panel(known, frame, self.frame_rate_hz)]
+
+    @property
+    def white(self) -> float:
+        """The light that pictures show white."""
+        return white_of([self.planes[frame] for frame in evenly(list(self.planes), MOST_JUDGED)])
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row a picture: mean rate [spikes/frame], and PSNR [dB] where the true light is known; means over the frames
+        with true light, or else over MOST_JUDGED of the planes."""
+        frames = list(self.light) or evenly(list(self.planes), MOST_JUDGED)
+        pictures = {
+            ("noisy spikes", over(self.window)): lambda t: middleTFP(self.noisy, t, self.window),
+            ("noisy spikes", "one interval"): lambda t: middleTFI(self.noisy, t),
+            ("denoised spikes", over(self.window)): lambda t: middleTFP(self.denoised, t, self.window),
+            ("denoised rate", over(1)): lambda t: self.planes[t],
+        }
+        rows = []
+        for (name, of), picture in pictures.items():
+            shown = [picture(t) for t in frames]
+            row: dict[str, Any] = {"picture": name, "of": of, "spikes/frame": float(np.mean(shown))}
+            if self.light:
+                scores = [light_db(one, self.light[t]) for one, t in zip(shown, frames, strict=True)]
+                row["PSNR, light [dB]"] = float(np.mean(scores))
+            rows.append(row)
+        return rows
+
+    def speed(self) -> dict[str, Any]:
+        """How fast the denoiser was, and how late; by the camera's clock too where its frame rate is known."""
+        frames, rate = len(self.noisy), self.frame_rate_hz
+        known = {} if rate is None else {"camera's time, ms": 1e3 * frames / rate}
+        real = {} if rate is None else {"x real time": frames / rate / self.seconds}
+        late = {} if rate is None else {"latency, ms": 1e3 * self.latency / rate}
+        work = {"denoiser, s": self.seconds, "frames/s": frames / self.seconds}
+        return {"frames": frames, **known, **work, **real, "latency, frames": self.latency, **late}
+
+
+def checked_window(window: int | None, frames: int) -> int:
+    """Frames of a mean: WINDOW, or as many as a shorter recording has; odd.
+
+    Raises InputError for a given one that is even, or longer than the recording.
+    """
+    if window is None:
+        return min(WINDOW, frames - 1 + frames % 2)
+    if window % 2 == 0:
+        raise InputError(f"--window {window}; it must be odd and at least 1 (41 is usual)")
+    if window > frames:
+        raise InputError(f"--window {window}: the recording has {frames} frames; give a window of at most that")
+    return window
+
+
+def evenly(items: Sequence[int], most: int) -> list[int]:
+    """At most so many of the items, evenly over them.
+
+    >>> evenly(range(10), 3)
+    [0, 4, 8]
+    """
+    return list(items[:: -(-len(items) // most) or 1])
 
 
 def picture_frames(frames: int, window: int) -> list[int]:
-    """Frames at the middle of whole windows, at least 8 apart and at most MOST_PICTURES of them.
+    """Frames at the middle of whole windows, at most MOST_PICTURES of them, evenly over a recording."""
+    return evenly(whole_windows(frames, window), MOST_PICTURES)
 
-    Raises InputError for a recording shorter than the window.
+
+def whole_windows(frames: int, window: int) -> range:
+    """Frames at the middle of windows that lie in a recording of so many frames."""
+    return range(window // 2, frames - window // 2)
+
+
+def light_at(path: Path, frames: Sequence[int], shape: tuple[int, int]) -> dict[int, Picture]:
+    """True light of a recording in the middle of some of these frames, at most MOST_JUDGED, by frame.
+
+    Empty for a file that is not of this package or has none.  Raises InputError where it is damaged.
     """
-    if frames < window:
-        raise InputError(f"the recording has {frames} frames, fewer than the picture window of {window}; give --window")
-    apart = max(8, -(-(frames - window + 1) // MOST_PICTURES))
-    return list(range(window // 2, frames - window // 2, apart))
+    if path.suffix.lower() not in HDF5 or not is_recording(path):
+        return {}
+    instants = read_truth(path, ("frame",)).get("frame", np.empty(0))
+    rows = {int(at): row for row, at in enumerate(instants.ravel().tolist()) if at % 1 == 0.5}
+    known = evenly([frame for frame in rows if frame in frames], MOST_JUDGED)
+    return {frame: _light(path, rows[frame], shape) for frame in known}
 
 
-def restore(
-    noisy: NDArray[np.uint8], mode: str, window: int, at: Sequence[int], **options: Any
-) -> tuple[NDArray[np.uint8], dict[int, NDArray[np.float32]]]:
-    """Denoise (T, H, W) spikes; returns the spikes and, by frame of `at`, the mean rate (H, W) over `window` frames.
+def _light(path: Path, row: int, shape: tuple[int, int]) -> Picture:
+    light = read_truth(path, ("radiance",), slice(row, row + 1)).get("radiance", np.empty(0))
+    if light.shape != (1, *shape) or light.dtype.kind not in "iuf" or not np.isfinite(light).all():
+        raise InputError(f"{path}: truth: radiance must be finite numbers of shape {shape} at each instant")
+    return np.asarray(light[0], np.float32)
 
-    options: of the denoiser.  Rate planes are four bytes a pixel: only those of one window are held at a time.
+
+def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spikes, dict[int, Picture], float]:
+    """Denoise a stream.
+
+    Args:
+        noisy: (T, H, W) spikes.
+        online: The denoiser, with output "both".
+        at: Frames whose rate plane is kept: planes are four bytes a pixel.
+
+    Returns:
+        (T, H, W) denoised spikes, rate planes (H, W) [spikes/frame] by frame in order, and the denoiser's time [s].
     """
-    online = OnlineDnSS.pretrained(mode, output="both", **options)
     wanted = set(at)
-    recent: deque[NDArray[np.float32]] = deque(maxlen=window)
-    pictures: dict[int, NDArray[np.float32]] = {}
+    planes: dict[int, Picture] = {}
     spikes = np.empty_like(noisy)
-    ready = 0
-    with tqdm(total=len(noisy), desc=f"denoise ({mode})", unit="frame", leave=False) as bar:
+    ready, began = 0, time.perf_counter()
+    with tqdm(total=len(noisy), desc="denoise", unit="frame", leave=False) as bar:
         for start in range(0, len(noisy) + CHUNK, CHUNK):
-            fired, planes = online.push(noisy[start : start + CHUNK]) if start < len(noisy) else online.flush()
+            fired, rates = online.push(noisy[start : start + CHUNK]) if start < len(noisy) else online.flush()
             spikes[ready : ready + len(fired)] = fired
-            for frame, plane in enumerate(planes, ready):
-                recent.append(plane)
-                if frame - window // 2 in wanted:
-                    pictures[frame - window // 2] = np.mean(recent, axis=0)
+            planes |= {frame: plane for frame, plane in enumerate(rates, ready) if frame in wanted}
             ready += len(fired)
             bar.update(len(fired))
-    return spikes, pictures
+    return spikes, planes, time.perf_counter() - began

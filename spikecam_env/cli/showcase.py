@@ -15,6 +15,16 @@ from denoiser import OnlineDnSS
 from denoiser.metrics import psnr_db
 from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory
+from spikecam_env.cli.before_after import (
+    WINDOW,
+    Picture,
+    Spikes,
+    instant_panel,
+    light_db,
+    light_panel,
+    mean_panel,
+    white_of,
+)
 from spikecam_env.cli.panels import Panel, compose
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
@@ -33,8 +43,6 @@ FILM_FRAMES = 500
 TABLE_FRAMES = 250
 """Stretch that the table is of: the paper's network takes 20 times as long as `best`, so it sees no more."""
 
-Spikes = NDArray[np.uint8]
-Picture = NDArray[np.float32]
 Planes = NDArray[np.float32]
 
 
@@ -146,26 +154,25 @@ def _camera(
 
 def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:
     """One picture a shown block: noisy, denoised, true light, with PSNR against the true light."""
-    white = float(np.percentile(run.truths[0], 99.8))
-    corner = f"denoised online at {run.times_real:.3f} x real time"
-    return [compose(_panels(run, b), white, corner) for b in run.shown]
+    return [_picture(run, block) for block in run.shown]
 
 
 def last_picture(run: Streamed) -> NDArray[np.uint8]:
     """The last block that is shown, as `film_frames` has it: the denoiser has seen most before it."""
-    white = float(np.percentile(run.truths[0], 99.8))
-    return compose(_panels(run, run.shown[-1]), white)
+    return _picture(run, run.shown[-1])
+
+
+def _picture(run: Streamed, block: int) -> NDArray[np.uint8]:
+    corner = f"{run.mode}: denoised online, {run.latency} frames later"
+    return compose(_panels(run, block), white_of(run.truths[0]), corner)
 
 
 def _panels(run: Streamed, block: int) -> list[Panel]:
-    frame = block * BLOCK + BLOCK // 2
-    truth = run.truths[block]
-    peak = float(truth.max())
-    noisy, plane = middleTFP(run.noisy, frame, 41), run.planes[block]
+    frame, light = block * BLOCK + BLOCK // 2, run.truths[block]
     return [
-        Panel(noisy, "noisy spikes (TFP 41)", f"PSNR {psnr_db(noisy, truth, peak):.2f} dB"),
-        Panel(plane, f"DnSS online ({run.mode}, rate plane)", f"PSNR {psnr_db(plane, truth, peak):.2f} dB"),
-        Panel(truth, "true light", f"{1e3 * frame / run.frame_rate_hz:.2f} ms"),
+        mean_panel("noisy spikes", run.noisy, frame, WINDOW, light),
+        instant_panel("denoised rate", run.planes[block], light),
+        light_panel(light, frame, run.frame_rate_hz),
     ]
 
 
@@ -191,11 +198,11 @@ def comparison(run: Streamed) -> list[dict[str, Any]]:
         for at in middles:
             truth = run.truths[first + at // BLOCK]
             peak = float(truth.max())
-            instant = middleTFI(spikes, at) if planes is None else planes[at]
-            scores.setdefault("instant, light", []).append(psnr_db(instant, truth, peak))
-            for window in (21, 41):
+            one = middleTFI(spikes, at) if planes is None else planes[at]
+            scores.setdefault("instant, light", []).append(light_db(one, truth))
+            for window in (21, WINDOW):
                 picture, twin = middleTFP(spikes, at, window), middleTFP(clean, at, window)
-                scores.setdefault(f"TFP {window}, light", []).append(psnr_db(picture, truth, peak))
+                scores.setdefault(f"TFP {window}, light", []).append(light_db(picture, truth))
                 scores.setdefault(f"TFP {window}, twin", []).append(psnr_db(picture, twin, peak))
         rows.append(row | {measure: float(np.mean(values)) for measure, values in scores.items()})
     return rows

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -191,14 +191,28 @@ def read_hdf5(
         return unpack_frames(packed, recording.shape), recording.attributes
 
 
-def read_truth(path: str | Path) -> dict[str, NDArray[Any]]:
-    """Ground truth beside a recording: name -> (N, ...), with "frame" (N,); empty where there is none.
+def read_truth(
+    path: str | Path, names: Collection[str] | None = None, rows: slice | None = None
+) -> dict[str, NDArray[Any]]:
+    """Ground truth beside a recording; empty where there is none.
 
-    >>> with SpikeWriter("disk.h5", (2, 3), 40_000.0) as writer:
-    ...     writer.append(np.zeros((8, 2, 3), np.uint8))
-    ...     writer.append_truth(4.5, radiance=np.full((2, 3), 0.2, np.float32))
-    >>> {name: array.shape for name, array in read_truth("disk.h5").items()}
-    {'frame': (1,), 'radiance': (1, 2, 3)}
+    Args:
+        path: The recording.
+        names: Arrays to read, those of them that there are; default all.
+        rows: Instants to read, by their place in "frame"; default all.
+
+    Returns:
+        name -> (N, ...), with "frame" (N,).
+
+    Raises:
+        InputError: As `read_hdf5`.
+
+    Example:
+        >>> with SpikeWriter("disk.h5", (2, 3), 40_000.0) as writer:
+        ...     writer.append(np.zeros((8, 2, 3), np.uint8))
+        ...     writer.append_truth(4.5, radiance=np.full((2, 3), 0.2, np.float32))
+        >>> {name: array.shape for name, array in read_truth("disk.h5").items()}
+        {'frame': (1,), 'radiance': (1, 2, 3)}
     """
     with open_recording(path) as recording, _damage_named(path):
         if "truth" not in recording.file.keys():  # noqa: SIM118 - `in` follows links
@@ -206,7 +220,8 @@ def read_truth(path: str | Path) -> dict[str, NDArray[Any]]:
         group = hdf5_item(recording.file, "truth", str(path))
         if not isinstance(group, h5py.Group):
             raise InputError(f"{path}: truth is an array; it must be a group of arrays")
-        return {name: hdf5_values(group, name, f"{path}: truth") for name in group}
+        wanted = [name for name in group if names is None or name in names]
+        return {name: hdf5_values(group, name, f"{path}: truth", () if rows is None else rows) for name in wanted}
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,11 @@ from spikecam_env.agents import ppo
 from spikecam_env.agents import study as studies
 from spikecam_env.agents.agent import Agent, shipped
 from spikecam_env.agents.history import History
-from spikecam_env.agents.playing import score_of
+from spikecam_env.agents.playing import episodes_along, score_of
 from spikecam_env.agents.policy import LOG_SIGMA, Recipe
 from spikecam_env.agents.ppo import PPO, _gain
 from spikecam_env.agents.tracker import Tracker
-from spikecam_env.agents.training import Study, learner, train_agent
+from spikecam_env.agents.training import Study, agents_along, learner, train_agent
 from spikecam_env.cli.main import run as command
 from spikecam_env.errors import InputError
 
@@ -91,7 +91,8 @@ def test_a_run_that_was_stopped_and_resumed_is_the_run_that_was_not(how: PPO, tm
     study, whole, parts = Study("Catch-v1", options={"shape": (16, 16)}), tmp_path / "whole", tmp_path / "parts"
     whole.mkdir()
     parts.mkdir()
-    train_agent(study, whole, how, seed=3, environments=2)
+    train_agent(study, whole, how, seed=3, environments=2, points=4)
+    assert list(agents_along(whole)) == [80, 144, 208, 272]  # the updates in which a quarter is full
     save = Run.save
 
     def stop(run: Run, path: Path) -> None:
@@ -224,6 +225,18 @@ def test_a_study_goes_on_from_its_record(tmp_path: Path, monkeypatch, capsys) ->
     assert sorted(film.name for film in tmp_path.glob("*.mp4")) == ["Catch-v1-frame30-0.mp4", "Catch-v1-tracker-0.mp4"]
     rows = [row.split() for row in first.splitlines() if row.startswith("Catch-v1")]
     assert [row[1] for row in rows] == ["tracker", "frame30"] and float(rows[0][3]) == 1.0
+
+
+def test_a_learning_curve_has_a_point_for_every_agent_on_the_way(tmp_path: Path) -> None:
+    wanted = studies.cases(["Track-v1"], ["tfp", "tracker"], [], [0], 3 * 1024, 2, shape=(16, 16))
+    learned, tracked = studies.study(wanted, tmp_path)
+    print([(row["steps"], round(row["score"], 3)) for row in learned.along], f"at the end {learned.score:.3f}")
+    assert [row["steps"] for row in learned.along] == [1024, 2048, 3072] and len(learned.curve) == 1
+    env = wanted[0].played.make(split="test")
+    last = score_of(Agent.load(tmp_path / wanted[0].folder / "agent.pt"), env, episodes_along(2))
+    env.close()
+    assert learned.along[-1]["score"] == last and not tracked.along
+    assert studies.read_record(tmp_path / studies.RECORD)[0].along == learned.along
 
 
 def test_one_training_is_played_at_every_light(tmp_path: Path) -> None:

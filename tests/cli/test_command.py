@@ -55,7 +55,7 @@ def test_a_recording_reads_back_and_denoises(suffix: str, tmp_path: Path, capsys
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert names == {"denoised.h5", "pictures.png", "film.mp4", "summary.json"}
     assert read_recording(tmp_path / "out" / "denoised.h5").spikes.shape == spikes.shape
-    assert len(json.loads((tmp_path / "out" / "summary.json").read_text())["rows"]) == 3
+    assert len(json.loads((tmp_path / "out" / "summary.json").read_text())["rows"]) == 4
 
 
 def test_the_same_seed_records_the_same_bits(tmp_path: Path) -> None:
@@ -100,6 +100,7 @@ def test_a_quick_demo_makes_a_picture_alone(tmp_path: Path, capsys) -> None:
         (("record", "--out", "x.h5", "--model", "no.toml"), "cannot read model file no.toml"),
         (("record", "--out", "x.h5", "--frames", "0"), "--frames 0"),
         (("record", "--out", "x.h5", "--size", "0", "400"), "--size 0 400"),
+        (("record", "--out", "x.h5", "--size", "2", "400"), "shape is (2, 400); the disk's radius"),
         (("demo", "--frames", "10"), "10 frames are too few to show; ask for 500 or more"),
         (("demo", "--quick", "--frames", "10"), "10 frames are too few to show; ask for 175 or more"),
         (("demo", "--model", "scs"), "unknown preset 'scs'"),

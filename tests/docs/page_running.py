@@ -20,12 +20,12 @@ from types import ModuleType
 from typing import Any
 
 import tyro
-from page_blocks import COMMANDS, PYTHON, ROOT, Block, command_lines
 from page_sizes import BROUGHT, ONLY_READ, SMALL
 from pytest import MonkeyPatch
 
 from spikecam_env.cli.main import run, understood
 from spikecam_env.cli.options import check_options
+from tools.page_blocks import COMMANDS, PYTHON, ROOT, Block, command_lines
 
 INSTALLED = f"{sys.executable} -m spikecam_env"
 ENVIRONMENT = re.compile(r"^[A-Z_]+=\S+ ")

@@ -7,7 +7,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from page_blocks import NAMES, PAGES, ROOT, without_code
+
+from tools.page_blocks import NAMES, PAGES, ROOT, without_code
 
 LINK = re.compile(r"\[[^\]]*\]\((?P<path>[^)#\s]*)(?:#(?P<anchor>[^)\s]*))?\)|src=\"(?P<src>[^\"]+)\"")
 HEADING = re.compile(r"^#{1,6} (.+?)$", re.MULTILINE)

@@ -13,11 +13,11 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from page_blocks import COMMANDS, NAMES, PAGES, PYTHON, ROOT, blocks_of, inline_commands
 from page_running import Page, alternatives, is_name_alone, read
 
 from spikecam_env.cli.first_words import check_words
 from spikecam_env.cli.main import COMMANDS as SPIKECAM
+from tools.page_blocks import COMMANDS, NAMES, PAGES, PYTHON, ROOT, blocks_of, inline_commands
 from tools.site.commands import every_command, examples_of
 
 SLOW = {

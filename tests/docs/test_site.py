@@ -10,8 +10,8 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from page_blocks import ROOT
 
+from tools.page_blocks import ROOT
 from tools.site.public import MODULES, home_of, kind_of, names_of
 
 pytestmark = pytest.mark.slow

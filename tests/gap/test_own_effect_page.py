@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page_blocks import COMMANDS, PYTHON, blocks_of, command_lines
 
 from spikecam_env import cache_folder
 from spikecam_env.cli.main import run
 from spikecam_env.gap.fit import standard_case, standard_templates
 from spikecam_env.sensor import CATALOGUE, effects_from
+from tools.page_blocks import COMMANDS, PYTHON, blocks_of, command_lines
 
 PAGE = Path(__file__).parents[2] / "docs" / "own_effect.md"
 BLOCKS = blocks_of(PAGE.read_text(encoding="utf-8"))

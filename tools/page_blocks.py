@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from textwrap import dedent
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 PAGES = tuple(
     sorted(
         [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]

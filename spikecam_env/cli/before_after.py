@@ -1,0 +1,80 @@
+"""Pictures of a stream before and after the denoiser, and their captions: what `demo` and `denoise` share.
+
+A picture is a mean over a window of frames (TFP), or of one instant (TFI of spikes, the denoiser's rate plane).  Every
+caption says which: what moves is smeared in the first, and crisp in the second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denoiser.metrics import psnr_db
+from spikecam_env.cli.panels import Panel
+from spikecam_env.streams import middleTFP
+
+Spikes = NDArray[np.uint8]
+Picture = NDArray[np.float32]
+
+WINDOW = 41
+"""Frames of a mean (TFP): the width of the denoiser's own window in the paper."""
+WHITE = 99.8
+"""Percentile of light that is shown white: the few pixels above it are highlights."""
+
+
+def white_of(pictures: Picture | Sequence[Picture]) -> float:
+    """The light that is shown white, in the unit of the pictures; 1 where they are all dark."""
+    return float(np.percentile(pictures, WHITE)) or 1.0
+
+
+def mean_panel(title: str, spikes: Spikes, frame: int, window: int, light: Picture | None = None) -> Panel:
+    """A panel of the mean over the window about a frame.
+
+    Args:
+        title: Its first line.
+        spikes: (T, H, W).
+        frame: The middle of the window.
+        window: [frames]; the whole window lies in the stream.
+        light: (H, W) true light at the frame, where it is known.
+    """
+    picture = middleTFP(spikes, frame, window)
+    return Panel(picture, title, _line(over(window), picture, light))
+
+
+def instant_panel(title: str, picture: Picture, light: Picture | None = None) -> Panel:
+    """A panel of one frame's picture (H, W); light: true light at the frame, where it is known."""
+    return Panel(picture, title, _line(over(1), picture, light))
+
+
+def light_panel(light: Picture, frame: int, frame_rate_hz: float | None) -> Panel:
+    """A panel of the true light (H, W) in the middle of a frame."""
+    return Panel(light, "true light", instant(frame, frame_rate_hz))
+
+
+def over(window: int) -> str:
+    """How many frames a picture is of, in words.
+
+    >>> over(41), over(1)
+    ('mean of 41 frames', 'one frame')
+    """
+    return "one frame" if window == 1 else f"mean of {window} frames"
+
+
+def instant(frame: int, frame_rate_hz: float | None) -> str:
+    """The middle of a frame by its number, and by the camera's clock where its rate is known.
+
+    >>> instant(187, 40_000.0), instant(187, None)
+    ('frame 187, 4.69 ms', 'frame 187')
+    """
+    return f"frame {frame}" + ("" if frame_rate_hz is None else f", {1e3 * (frame + 0.5) / frame_rate_hz:.2f} ms")
+
+
+def light_db(picture: Picture, light: Picture) -> float:
+    """PSNR [dB] of a picture against the true light (H, W), whose brightest pixel is the peak."""
+    return psnr_db(picture, light, float(light.max()) or 1.0)
+
+
+def _line(what: str, picture: Picture, light: Picture | None) -> str:
+    return what if light is None else f"{what}, PSNR {light_db(picture, light):.2f} dB"
