@@ -117,7 +117,6 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self.max_gaze_rate_px_s = rate
         self.model = _loaded(model)
         self.ground_truth = ground_truth
-        self.observation, self.obs_state = _observation(obs, packed, self.usual_obs), obs_state
         self.render_mode = render_mode
         self._make_scene, self._judge = make_scene, judge
         self._engine, self._threads = engine, threads
@@ -129,7 +128,17 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._gaze = Gaze.fixed(0.0, 0.0)  # the path of the block that is exposed last, or next
         self._recent: list[NDArray[np.uint8]] = []
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        picture = self._picture_space = self.observation.space(self.view)
+        self.observe(_observation(obs, packed, self.usual_obs), obs_state)
+
+    def observe(self, law: Observation, obs_state: bool = False) -> None:
+        """Set the observation, and its space.
+
+        Args:
+            law: makes pictures of blocks of spikes.
+            obs_state: whether gaze and age of the picture are observed beside it.
+        """
+        self.observation, self.obs_state = law, obs_state
+        picture = self._picture_space = law.space(self.view)
         self.observation_space: spaces.Space[Any] = with_state_space(picture) if obs_state else picture
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:

@@ -125,7 +125,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         for env in self.envs:
-            env.observation, env.obs_state = Spikes(), False
+            env.observe(Spikes())
         self._cameras: Any = HostCameras(self.envs, threads) if device is None else self._on(device)
         self.device: Any = self._view.device
         self._workers = Workers(threads)
