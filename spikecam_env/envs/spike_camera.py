@@ -117,7 +117,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._gaze = Gaze.fixed(0.0, 0.0)  # the path of the block that is exposed last, or next
         self._recent: list[NDArray[np.uint8]] = []
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        picture = self._picture_space = self.observation.space(self.view)
+        picture = self.observation.space(self.view)
+        self._space_of = self.observation, picture
         self.observation_space: spaces.Space[Any] = with_state_space(picture) if obs_state else picture
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -263,7 +264,9 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def _shown(self) -> tuple[Any, dict[str, Any]]:
         """What is seen of the last block, and what is known of it."""
         picture, self._seen = self.observation.step(self.blocks, self._seen)
-        _check_picture(picture, self._picture_space, self.observation)
+        if self._space_of[0] is not self.observation:  # a vector environment has exchanged it
+            self._space_of = self.observation, self.observation.space(self.view)
+        _check_picture(picture, self._space_of[1], self.observation)
         age = float(np.asarray(self.observation.age(self._seen)).reshape(-1)[0])
         info = self._info() | {"age": age}
         if not self.obs_state:
