@@ -6,7 +6,7 @@ A network of the recipe's own class computes passes by `passed`, which sees less
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -15,9 +15,6 @@ from denoiser.network import DnSS
 from denoiser.recipe import Recipe
 from denoiser.stream_network import StreamDnSS
 from spikecam_env.errors import InputError, OwnCodeError
-
-if TYPE_CHECKING:
-    from denoiser.infer import Carried
 
 
 def check_network(recipe: Any, network: Any) -> None:
@@ -50,7 +47,7 @@ def check_network(recipe: Any, network: Any) -> None:
             raise InputError(f"network: {name} holds values that are not finite; train anew or load other weights")
 
 
-def check_output(network: nn.Module, found: Any, sizes: tuple[int, int, int, int]) -> tuple[Tensor, Carried]:
+def check_output(network: nn.Module, found: Any, sizes: tuple[int, int, int, int]) -> tuple[Tensor, tuple[Tensor, ...]]:
     """What a module returned for a batch: rates and what is carried.
 
     Args:

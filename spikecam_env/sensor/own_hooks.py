@@ -225,9 +225,9 @@ def _block(call: Call) -> tuple[int, int, int]:
 
 
 def _charge(call: Call, value: Any, name: str) -> Charge:
-    if any(value is given for given in call.given):
-        return value
     charge: Charge = _instance(call, value, name, Charge)
+    if any(charge is given for given in call.given):
+        return charge
     frames, rows, columns = _block(call)
     pixels = _field(call, charge.pixels, f"pixels of {name}", (frames, rows, columns), _ANY)
     if pixels.shape[1:] != (rows, columns):
@@ -272,16 +272,16 @@ def _imprint(call: Call, found: Any) -> PixelArray:
         "capacitance_fF": _CAPACITANCE_FF,
         "swing_V": UNIT_RANGES["swing_V"],
     }
-    arrays = {
+    values: dict[str, Any] = {
         name: _whole(call, getattr(after, name), name, before.gain.shape, bounds).astype(np.float64, copy=False)
         for name, bounds in ranges.items()
     }
     spreads = ("reset_noise_mV", "swing_spread_V", "capacitance_spread_fF")
-    numbers = {name: _number(call, getattr(after, name), name, _FROM_ZERO) for name in spreads}
-    quanta = _number(call, after.quanta, "quanta", (0.0, UNIT_RANGES["electrons"][1]))
+    values |= {name: _number(call, getattr(after, name), name, _FROM_ZERO) for name in spreads}
+    values["quanta"] = _number(call, after.quanta, "quanta", (0.0, UNIT_RANGES["electrons"][1]))
     if not isinstance(after.dark_is_noisy, bool | np.bool_):
         raise call.error(f"dark_is_noisy is {shown(after.dark_is_noisy)}; it must be True or False")
-    return replace(after, **arrays, **numbers, quanta=quanta)
+    return replace(after, **values)
 
 
 def _image(call: Call, found: Any) -> NDArray[np.float32]:
