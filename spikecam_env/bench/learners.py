@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
@@ -52,8 +53,8 @@ def bench_learners(count: int = ENVIRONMENTS, rollout: int = ROLLOUT, rounds: in
             for env in (dummy, native)
         ]
         for _ in range(rounds):
-            alone = [_seconds(lambda env=env: _played(env, rollout)) for env in (dummy, native)]
-            learned = [_seconds(lambda model=model: model.learn(count * rollout)) for model in models]
+            alone = [_seconds(partial(_played, env, rollout)) for env in (dummy, native)]
+            learned = [_seconds(partial(model.learn, count * rollout)) for model in models]
             taken.append([alone, learned])
     steps, seconds = count * rollout, np.array(taken)  # (rounds, alone or learned, vectors)
     return [

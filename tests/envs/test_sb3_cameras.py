@@ -76,7 +76,8 @@ def same(ours: VecEnv, theirs: VecEnv, steps: int = 12) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("state", [False, True])
 def test_everything_is_as_of_stable_baselines_own_vector_in_monitors(state: bool) -> None:
-    ended = same(SB3Cameras(native(obs_state=state)), dummy(obs_state=state))
+    options = {"obs_state": state, "ground_truth": state}
+    ended = same(SB3Cameras(native(**options)), dummy(**options))
     assert {info["TimeLimit.truncated"] for info in ended} == {False, True}
     assert all(info["episode"]["l"] <= 5 and info["episode"]["t"] >= 0 for info in ended)
 
