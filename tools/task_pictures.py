@@ -104,8 +104,8 @@ def _moment(env: TaskEnv, seen: NDArray[np.uint8]) -> Moment:
     said = [f"{1e3 * frame / course.drive.frame_rate_hz:.1f} ms"]
     if isinstance(episode, Lit):
         said.append(f"iris {10 ** episode.iris.values[1]:.2g} x")
-    if isinstance(episode, Reading) and episode.answer is not None:
-        said.append(f"a {episode.answer}" if task.further == len(DIGITS) else f"{RPM[episode.answer]:.0f} rpm")
+    if isinstance(episode, Reading) and episode.is_right:
+        said.append(f"a {episode.truth}" if task.answers == len(DIGITS) else f"{RPM[episode.truth]:.0f} rpm")
     if course.end:
         said.append("success")
     return Moment(seen, target, task.radius * min(env.shape), episode.success_px, env.axes, ", ".join(said))

@@ -87,7 +87,7 @@ class TaskEnv(AimingEnv):
         return self._view_of(self.split).steps(self.task.duration_s)
 
     @property
-    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+    def spec(self) -> EnvSpec | None:
         """What `gymnasium.make` made this of, with the task's own number of steps: learners ask it for the horizon."""
         return self._spec
 
