@@ -1,7 +1,7 @@
 """Notebooks of tutorials: the same text, code and commands, with what they print and draw.
 
-python -m tools.notebooks                       # all of them, in docs/notebooks
-python -m tools.notebooks denoise --small       # one, at the size at which its page is tested
+python -m tools.notebooks            # all of them, in docs/notebooks: some minutes
+python -m tools.notebooks denoise    # one
 
 A page's Python blocks become cells; command lines become cells of `!spikecam ...`; text becomes Markdown, with links as
 from the notebook.  A picture that the page shows is left out: the cell that draws it has it.
@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from io import BytesIO, StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import tyro
 from PIL import Image
@@ -31,10 +31,11 @@ from tools.page_blocks import COMMANDS, PYTHON, ROOT, Block, blocks_of, command_
 
 TUTORIALS = ROOT / "docs" / "tutorials"
 NOTEBOOKS = ROOT / "docs" / "notebooks"
-NAMES = ("first_camera", "denoise", "first_diagnosis")
-"""Tutorials that are notebooks too."""
+Name = Literal["first_camera", "denoise", "first_diagnosis"]
+"""Of a tutorial that is a notebook too."""
+NAMES: tuple[Name, ...] = get_args(Name)
 COLOURS = 64
-"""Of a committed picture: noise in true colours takes four times the bytes."""
+"""Of a committed picture; greys and a few lines need no more."""
 DPI = 80
 """Of a committed picture [dots an inch]."""
 
@@ -51,19 +52,15 @@ class Cell:
     """As nbformat has them."""
 
 
-def main(
-    names: tyro.conf.Positional[tuple[Literal["first_camera", "denoise", "first_diagnosis"], ...]] = NAMES,
-    small: bool = False,
-) -> None:
+def main(names: tyro.conf.Positional[tuple[Name, ...]] = NAMES) -> None:
     """Run tutorials and write their notebooks, with all that they print and draw, to docs/notebooks.
 
     Args:
         names: Tutorials.
-        small: At the size at which pages are tested.
     """
     for name in names:
         cells = cells_of((TUTORIALS / f"{name}.md").read_text(encoding="utf-8"))
-        write_text_whole(NOTEBOOKS / f"{name}.ipynb", notebook(executed(cells, small=small)))
+        write_text_whole(NOTEBOOKS / f"{name}.ipynb", notebook(executed(cells)))
         print(f"wrote {(NOTEBOOKS / name).relative_to(ROOT)}.ipynb")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,7 +87,7 @@ class Restored:
         """A row a picture: mean rate [spikes/frame], and PSNR [dB] where the true light is known; means over the frames
         with true light, or else over MOST_JUDGED of the planes."""
         frames = list(self.light) or evenly(list(self.planes), MOST_JUDGED)
-        pictures = {
+        pictures: dict[tuple[str, str], Callable[[int], Picture]] = {
             ("noisy spikes", over(self.window)): lambda t: middleTFP(self.noisy, t, self.window),
             ("noisy spikes", "one interval"): lambda t: middleTFI(self.noisy, t),
             ("denoised spikes", over(self.window)): lambda t: middleTFP(self.denoised, t, self.window),
