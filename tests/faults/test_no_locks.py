@@ -15,6 +15,7 @@ from pathlib import Path
 import h5py
 import pytest
 
+from benchmarks import blind_trial
 from spikecam_env.cli.main import run
 from spikecam_env.errors import InputError
 from spikecam_env.locks import VARIABLE, lock
@@ -151,6 +152,12 @@ def test_a_second_run_in_a_folder_is_refused_in_a_line(
     lines = said(capsys.readouterr().err)
     assert len(lines) == 1 and "another run is at work" in lines[0] and str(out) in lines[0], lines
     assert not tree(out)
+
+
+def test_a_second_blind_trial_in_a_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with alone_in(tmp_path):
+        assert blind_trial.run(["--set", "small", "--limit", "1", "--out", str(tmp_path)]) == 2
+    assert "another run is at work" in capsys.readouterr().err and not tree(tmp_path)
 
 
 def test_a_run_that_is_killed_holds_nobody_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
