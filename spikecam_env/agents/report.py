@@ -39,10 +39,12 @@ def draw_curves(results: Sequence[Result], path: Path) -> None:
                 steps, scores = ([row[name] for row in result.along] for name in ("steps", "score"))
                 label = None if number else sight
                 axes.plot(np.divide(steps, 1000), scores, f"C{sights.index(sight)}.-", label=label)
-        axes.set(title=task, xlabel="steps of training [thousand]", ylabel="score on test episodes", ylim=(None, 1.05))
+        axes.set(title=task, xlabel="steps of training [thousand]", ylabel="score on test episodes")
+        lowest = min((row["score"] for result in of_task for row in result.along), default=0.0)
+        axes.set(xlim=(0, None), ylim=(min(0.0, lowest) - 0.05, 1.05))
         axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
         if of_task:
-            axes.legend(frameon=False)
+            axes.legend(frameon=False, loc="lower right")
     for axes in panels[len(tasks) :]:
         axes.axis("off")
     with whole_file(path) as beside:
