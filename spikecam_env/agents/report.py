@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -33,20 +34,28 @@ def draw_curves(results: Sequence[Result], path: Path) -> None:
     figure = Figure(figsize=(3.4 * columns, 2.8 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, task in zip(panels, tasks, strict=False):
-        of_task = [result for result in learned if result.case.task == task]
-        for sight in sights:
-            for number, result in enumerate(result for result in of_task if result.case.sight == sight):
-                steps, scores = ([row[name] for row in result.along] for name in ("steps", "score"))
-                label = None if number else sight
-                axes.plot(np.divide(steps, 1000), scores, f"C{sights.index(sight)}.-", label=label)
-        axes.set(title=task, xlabel="steps of training [thousand]", ylabel="score on test episodes", ylim=(None, 1.05))
-        axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
-        if of_task:
-            axes.legend(frameon=False)
+        axes.set(title=task, xlabel="steps of training [thousand]", ylabel="score on test episodes")
+        _draw_lines(axes, [result for result in learned if result.case.task == task], sights)
     for axes in panels[len(tasks) :]:
         axes.axis("off")
     with whole_file(path) as beside:
         figure.savefig(beside, format="png", dpi=110)
+
+
+def _draw_lines(axes: Axes, results: Sequence[Result], sights: Sequence[str]) -> None:
+    """Lines of a task's results; 0 and 1 are within the panel."""
+    seen: set[str] = set()
+    for result in results:
+        sight = result.case.sight
+        steps, scores = ([row[name] for row in result.along] for name in ("steps", "score"))
+        label = None if sight in seen else sight
+        axes.plot(np.divide(steps, 1000), scores, f"C{sights.index(sight)}.-", label=label)
+        seen.add(sight)
+    lowest = min((row["score"] for result in results for row in result.along), default=0.0)
+    axes.set(xlim=(0, None), ylim=(min(0.0, lowest) - 0.05, 1.05))
+    axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
+    if results:
+        axes.legend(frameon=False, loc="lower right")
 
 
 def pictures(actor: Actor, env: gymnasium.Env[Any, Any], seed: int) -> Iterator[NDArray[np.uint8]]:
