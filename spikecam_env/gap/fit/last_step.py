@@ -66,7 +66,8 @@ class Slopes:
     def at(cls, problem: Problem, probe: Probe, found: Fit, free: Free) -> Slopes:
         """Those at a fit, by a twin a parameter and one of the fit; none without parameters."""
         if not free:
-            return cls((), *np.zeros((2, len(problem.seen), 0)), once=True)
+            none = np.zeros((len(problem.seen), 0))
+            return cls((), none, none, once=True)
         here, base = at_settled_unit(probe, problem.null, found.model, found.base, free)
         columns, noise = derivatives(problem, probe, found.model, base, here, free)
         return cls(tuple(free), columns, noise, once=True)
