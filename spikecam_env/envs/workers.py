@@ -11,6 +11,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any, TypeVar
 
 from spikecam_env.envs.spike_camera import in_turn
+from spikecam_env.errors import NotReadyError
 
 T = TypeVar("T")
 
@@ -52,6 +53,9 @@ class Workers:
 
         Returns:
             A value for each number.  Where some fail, the first error is raised when all are done.
+
+        Raises:
+            NotReadyError: in a fork of the process that made them.
         """
         futures = self._begun(work, numbers)
         wait(futures.values())
@@ -79,6 +83,8 @@ class Workers:
 
     def _begun(self, work: Callable[[int], T], numbers: Sequence[int]) -> dict[int, Future[list[T]]]:
         """By thread."""
+        if self._process != os.getpid():  # whose threads a fork does not have: work given to them is never done
+            raise NotReadyError("the environments belong to the process that made them; make others in this one")
         shares: dict[int, list[int]] = {}
         for n in numbers:
             shares.setdefault(n % len(self), []).append(n)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import copy
+import os
 import pickle
+import subprocess
+import sys
 from typing import Any
 
 import cloudpickle
@@ -234,6 +237,42 @@ def test_a_copy_of_a_vector_goes_on_as_the_original_does(copied: Any, device: st
             np.testing.assert_array_equal(np.asarray(ours), np.asarray(theirs))
     env.close()
     other.close()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_fork_is_refused_the_vector_of_its_parent_and_does_not_hang() -> None:
+    program = (
+        "import os, signal, gymnasium, spikecam_env.envs\n"
+        "env = gymnasium.make_vec('spikecam_env/Track-v1', 2, 'vector_entry_point', shape=(16, 16))\n"
+        "env.reset(seed=0)\n"
+        "if os.fork() == 0:\n"
+        "    signal.alarm(60)\n"
+        "    try:\n        env.reset(seed=0)\n"
+        "    except RuntimeError as error:\n        print(error, flush=True)\n"
+        "    env.close()\n"
+        "    os._exit(0)\n"
+        "print(os.wait()[1], env.step(env.action_space.sample())[0].shape[0])\n"
+    )
+    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300).stdout
+    assert "make others in this one" in printed and "0 2" in printed
+
+
+def test_a_holder_that_closes_its_vector_in_a_garbage_collection_does_not_hang() -> None:
+    """The collector clears weak references first, and threads that know their pool by one end then."""
+    program = (
+        "import gc, gymnasium, spikecam_env.envs\n"
+        "class Holder:\n"
+        "    def __init__(self, env): self.env, self.cycle = env, self\n"
+        "    def __del__(self): self.env.close()\n"
+        "env = gymnasium.make_vec('spikecam_env/RotatingDisk-v0', 3, 'vector_entry_point', shape=(16, 16))\n"
+        "env.reset(seed=0)\n"
+        "env.holder = Holder(env)\n"
+        "del env\n"
+        "gc.collect()\n"
+        "print('collected')\n"
+    )
+    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300).stdout
+    assert "collected" in printed
 
 
 def test_attributes_of_the_environments_are_had_as_of_gymnasium_s_vector() -> None:

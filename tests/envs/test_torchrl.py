@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from typing import Any
 
 import gymnasium
@@ -57,21 +55,3 @@ def test_a_rollout_over_the_ends_of_episodes_is_that_of_the_environment(mode: st
     np.testing.assert_array_equal(
         rollout["next", "reward"][..., 0].numpy(), np.stack(rewards, axis=1).astype(np.float32)
     )
-
-
-def test_an_environment_that_torchrl_drops_is_closed_by_the_garbage_collector() -> None:
-    """The collector clears weak references first, and threads that know their pool by one end then."""
-    program = (
-        "import gc, gymnasium, spikecam_env.envs\n"
-        "class Holder:\n"
-        "    def __init__(self, env): self.env, self.cycle = env, self\n"
-        "    def __del__(self): self.env.close()\n"
-        "env = gymnasium.make_vec('spikecam_env/RotatingDisk-v0', 3, 'vector_entry_point', shape=(16, 16))\n"
-        "env.reset(seed=0)\n"
-        "env.holder = Holder(env)\n"
-        "del env\n"
-        "gc.collect()\n"
-        "print('collected')\n"
-    )
-    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300).stdout
-    assert "collected" in printed
