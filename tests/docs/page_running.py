@@ -85,7 +85,8 @@ class Page:
         words = words_of(line)
         reason = block.marks.get("not run") or ("" if block.options else reason_not_to_run(words))
         if words[0] == "spikecam" and not reason:
-            words = [*words, *at_small_size(words), *block.options]
+            words = [*without(words, block.options), *block.options]
+            words = [*words, *at_small_size(words)]
             self.environment(line)
             assert run(words[1:]) == 0, shlex.join(words)
         elif reason:
@@ -120,6 +121,16 @@ def at_small_size(words: Sequence[str]) -> list[str]:
             for option in re.findall(r"--\S+(?: (?!--)\S+)*", options):
                 added += [] if option.split()[0] in words else option.split()
     return added
+
+
+def without(words: Sequence[str], options: Sequence[str]) -> list[str]:
+    """The words less those options, and their values, that are given anew."""
+    kept: list[str] = []
+    dropped = False
+    for word in words:
+        dropped = word in options if word.startswith("--") else dropped
+        kept += [] if dropped else [word]
+    return kept
 
 
 def begins(words: Sequence[str], command: str) -> bool:
