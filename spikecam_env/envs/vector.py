@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import checked_count
 from spikecam_env.envs.observations import Blocks, Spikes, restarted, with_state
+from spikecam_env.envs.registration import MAX_EPISODE_STEPS
 from spikecam_env.envs.spike_camera import SpikeCameraEnv, expose, in_turn
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.threads import as_many
@@ -44,7 +45,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     single              makes one environment: a class or its entry point
     num_envs            N
     models              N models (presets, TOML paths, SensorModels), one an environment; default: all have `model`
-    max_episode_steps   after which an episode is truncated; None is never
+    max_episode_steps   after which an episode is truncated; -1 is never; None is the id's own, as of `gymnasium.make`
     device              a torch device: cameras, planar scenes and observations ("spikes", "multibinary", "tfp", "rate")
                         are there; actions may be tensors, and all but info are tensors there
                         (`envs.cameras_on_device`)
@@ -82,7 +83,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         **options: Any,
     ) -> None:
         self.num_envs = checked_count(num_envs, "num_envs")
-        self.max_episode_steps = max_episode_steps
+        self.max_episode_steps = _limit_of(max_episode_steps, options)
         self.render_mode = render_mode
         make: Any = load_env_creator(single) if isinstance(single, str) else single
         options |= {"render_mode": render_mode, "threads": options.get("threads", 1)}
@@ -248,6 +249,13 @@ def _batched_values(values: list[Any], has: NDArray[np.bool_]) -> Any:
         return array
     nothing = np.zeros_like(first)
     return np.array([nothing if value is MISSING else value for value in values], dtype=nothing.dtype)
+
+
+def _limit_of(steps: int | None, options: dict[str, Any]) -> int | None:
+    """Steps after which episodes are truncated; None: they end by themselves."""
+    if steps is None and options.get("steps", 0) is None:  # an id of a scene, which leaves the end to others
+        return MAX_EPISODE_STEPS
+    return None if steps is None or steps == -1 else checked_count(steps, "max_episode_steps")
 
 
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
