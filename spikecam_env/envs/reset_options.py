@@ -46,10 +46,10 @@ def checked_options(options: Any, rules: Mapping[str, Rule]) -> dict[str, Any]:
     return {name: rules[name](value, name) for name, value in given.items()}
 
 
-def as_dictionary(options: Any) -> dict[str, Any]:
-    """A copy of the options; raises InputError unless they are a dictionary or None."""
+def as_dictionary(options: Any, name: str = "options") -> dict[str, Any]:
+    """A copy of the options; raises InputError unless they are None or a dictionary by name."""
     if options is None:
         return {}
-    if not isinstance(options, Mapping):
-        raise InputError(f"options is {shown(options)}; it must be a dictionary of names and values, or None")
+    if not isinstance(options, Mapping) or not all(isinstance(key, str) for key in options):
+        raise InputError(f"{name} = {shown(options)}; it must be a dictionary of options by name, or None")
     return dict(options)

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.checked import checked_count
 from spikecam_env.envs.cameras_on_host import HostCameras
 from spikecam_env.envs.observations import Spikes, replaced, restarted, with_rows, with_state
+from spikecam_env.envs.registration import MAX_EPISODE_STEPS
 from spikecam_env.envs.spike_camera import SpikeCameraEnv, in_turn
 from spikecam_env.envs.vector_infos import batched
 from spikecam_env.envs.vector_inputs import (
@@ -68,7 +69,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         single: makes one environment: a class or its entry point.
         num_envs: N.
         models: N models (presets, TOML paths, SensorModels), one an environment; default: all have `model`.
-        max_episode_steps: after which an episode is truncated; None or -1 is never.
+        max_episode_steps: after which an episode is truncated; -1 is never, None the id's own, as of `gymnasium.make`.
         autoreset_mode: an `AutoresetMode` or its value: "NextStep", "SameStep", "Disabled".
         workers: threads; default NUMBA_NUM_THREADS, N at most.
         render_mode: as `single` has it.
@@ -111,7 +112,8 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         **options: Any,
     ) -> None:
         self.num_envs = checked_count(num_envs, "num_envs")
-        self.max_episode_steps = checked_limit(max_episode_steps)
+        usual = MAX_EPISODE_STEPS if options.get("steps", 0) is None else None  # an id of a scene has no end of its own
+        self.max_episode_steps = checked_limit(max_episode_steps, usual)
         self.autoreset_mode = checked_mode(autoreset_mode)
         self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode

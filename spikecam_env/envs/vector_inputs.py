@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from spikecam_env.checked import LARGEST_SEED, checked_count, checked_seed
+from spikecam_env.envs.reset_options import as_dictionary
 from spikecam_env.errors import InputError, shown, unknown_name
 
 RESET_MASK = "reset_mask"
@@ -42,11 +43,12 @@ def checked_mode(mode: Any) -> AutoresetMode:
     raise unknown_name("autoreset_mode", mode, [known.value for known in AutoresetMode])
 
 
-def checked_limit(steps: Any) -> int | None:
+def checked_limit(steps: Any, usual: int | None = None) -> int | None:
     """Steps after which an episode is truncated.
 
     Args:
-        steps: 1 or more; None, or -1 as `gymnasium.make` has it, for no limit.
+        steps: 1 or more; -1 for no limit, and None for the usual one, as `gymnasium.make` has them.
+        usual: the limit where none is given; None for no limit.
 
     Returns:
         The steps, or None for no limit.
@@ -55,10 +57,12 @@ def checked_limit(steps: Any) -> int | None:
         InputError: for anything else.
 
     Example:
-        >>> checked_limit(500), checked_limit(-1)
-        (500, None)
+        >>> checked_limit(500), checked_limit(-1, 500), checked_limit(None, 500)
+        (500, None, 500)
     """
-    if steps is None or (type(steps) is int and steps == -1):
+    if steps is None:
+        return usual
+    if type(steps) is int and steps == -1:
         return None
     return checked_count(steps, "max_episode_steps")
 
@@ -136,8 +140,8 @@ def checked_options(options: Any, count: int) -> tuple[NDArray[np.bool_], list[d
     if isinstance(options, (list, tuple)):
         if len(options) != count:
             raise InputError(f"options are {len(options)}; give one dictionary for all, or one an environment, {count}")
-        return everywhere, [_checked_dict(one, f"options[{n}]") for n, one in enumerate(options)]
-    given = _checked_dict(options, "options")
+        return everywhere, [as_dictionary(one, f"options[{n}]") for n, one in enumerate(options)]
+    given = as_dictionary(options)
     mask = _checked_mask(given.pop(RESET_MASK), count) if RESET_MASK in given else everywhere
     return mask, [given] * count
 
@@ -177,14 +181,6 @@ def _on_host(values: Any) -> NDArray[Any]:
 
 def _finite(count: int) -> str:
     return {1: "one finite number", 2: "two finite numbers"}.get(count, f"{count} finite numbers")
-
-
-def _checked_dict(options: Any, name: str) -> dict[str, Any]:
-    if options is None:
-        return {}
-    if not isinstance(options, dict) or not all(isinstance(key, str) for key in options):
-        raise InputError(f"{name} = {shown(options)}; it must be a dictionary of options by name")
-    return dict(options)
 
 
 def _checked_mask(mask: Any, count: int) -> NDArray[np.bool_]:

@@ -81,7 +81,7 @@ def test_an_agent_acts_on_what_it_was_trained_on_and_begins_each_episode(monkeyp
         (("Track-v1", "--policy", "oracl"), "unknown policy 'oracl'.*oracle"),
         (("Track-v1", "--policy", "ReadDigit-v1"), "unknown policy 'ReadDigit-v1'"),
         (("Track-v1", "--policy", "mine.pt"), "mine.pt"),
-        (("ReadSpin-v1", "--policy", "Catch-v1"), "takes 6 numbers an action, this agent gives 1: another task's"),
+        (("ReadSpin-v1", "--policy", "Catch-v1"), "takes 7 numbers an action, this agent gives 1: another task's"),
         (("Track-v1", "--film", "a.avi"), "use .mp4"),
         (("Track-v1", "--slow", "9000"), "at most 90000"),
     ],

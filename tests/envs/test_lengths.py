@@ -12,6 +12,7 @@ import spikecam_env.envs  # noqa: F401
 from spikecam_env.envs.oracle import oracle
 from spikecam_env.envs.rotating_disk import RotatingDiskEnv
 from spikecam_env.envs.scene import SceneEnv
+from spikecam_env.errors import InputError
 from tests.envs.kinds import DISK
 
 SMALL: dict[str, Any] = {"shape": (16, 24), "frames_per_step": 8}
@@ -62,6 +63,21 @@ def test_vectors_are_as_long(steps: int) -> None:
             *_, terminated, truncated, _ = cameras.step(actions)
             assert not terminated.any() and truncated.all() == (step == steps)
         cameras.close()
+
+
+@pytest.mark.parametrize("given", [-1, None, 3, 0])
+def test_the_native_vector_takes_the_numbers_that_a_single_environment_takes(given: int | None) -> None:
+    options: dict[str, Any] = {"vectorization_mode": "vector_entry_point", "max_episode_steps": given, **SMALL}
+    if given == 0:
+        with pytest.raises(InputError, match="max_episode_steps = 0"):
+            gymnasium.make_vec(STILL, num_envs=1, **options)
+        return
+    cameras: Any = gymnasium.make_vec(STILL, num_envs=1, **options)
+    assert cameras.unwrapped.max_episode_steps == {-1: None, None: 500, 3: 3}[given]
+    cameras.reset(seed=0)
+    ends = [bool(cameras.step(np.zeros((1, 2), np.float32))[3][0]) for _ in range(3)]
+    assert ends == [False, False, given == 3]
+    cameras.close()
 
 
 def test_a_class_made_by_hand_ends_after_its_own_steps() -> None:
