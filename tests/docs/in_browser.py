@@ -24,7 +24,8 @@ MEASURED = """<!doctype html><iframe id="frame" style="border:0;height:900px"></
 const pages = PAGES, widths = WIDTHS, found = [];
 const wait = (what, name) => new Promise(done => what.addEventListener(name, done, {once: true}));
 const cut = p => p.scrollWidth > p.clientWidth + 1;
-const plays = film => film.play().then(() => (film.pause(), true), () => false);
+const plays = film => { const ready = Promise.race([wait(film, "canplay").then(() => true),
+  wait(film, "error").then(() => false)]); film.preload = "auto"; film.load(); return ready; };
 async function measure() {
   for (const width of widths) for (const page of pages) {
     frame.style.width = `${width}px`;
@@ -32,7 +33,6 @@ async function measure() {
     frame.src = page;
     await loaded;
     const d = frame.contentDocument, films = [...d.querySelectorAll("video")];
-    films.forEach(film => film.scrollIntoView());
     const played = [];
     if (width === widths[0]) for (const film of films) played.push(await plays(film));
     const blocks = [...d.querySelectorAll("pre")];

@@ -1,8 +1,9 @@
 """Docstrings of this repository as reStructuredText, which Sphinx's autodoc reads.
 
 A docstring here is plain text: a summary, prose with `code`, indented equations or Python, and the sections Args,
-Returns, Raises and Example, or others of one word, such as Scene.  Arguments may also stand in the prose, as `name:
-meaning`, or in two columns.  Prose is escaped, indented blocks stay as they stand, sections become fields.
+Returns, Raises and Example.  Arguments may also stand in the prose, as `name: meaning`, or in two columns; a paragraph
+of lines such as `Scene: ...` and `Action: ...` is a list of them.  Prose is escaped, indented blocks stay as they are,
+sections and such lists become fields.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import re
 from collections.abc import Collection, Iterable
 from textwrap import dedent
 
-SECTION = re.compile(r"([A-Z][a-z]+):$")
+SECTION = re.compile(r"(Args|Returns|Raises|Example):$")
+ASPECT = re.compile(r"(?P<title>[A-Z][a-z]+): (?P<text>.+)", re.DOTALL)
 ENTRY = re.compile(r"^(?=\S)", re.MULTILINE)
 ARGUMENT = re.compile(r"(?:^|\n|  )(?P<names>\w+(?:, \w+)*): ")
 COLUMNS = re.compile(r"^(?P<name>\w+) {2,}(?P<text>\S.*)$")
@@ -43,11 +45,20 @@ def rendered(text: str, arguments: Collection[str] = ()) -> list[str]:
         elif all(line.startswith("  ") for line in lines):
             kind = ".. code-block:: python" if is_python(dedent(paragraph)) else "::"
             prose += [kind, "", *(f"   {line}" for line in lines), ""]
+        elif aspects := _aspects(paragraph):
+            prose += [*aspects, ""]
         else:
             plain, found = _sorted_out(lines, arguments)
             fields += found
             prose += [*plain, ""] if plain else []
     return [*prose, *fields, "", *examples]
+
+
+def _aspects(paragraph: str) -> list[str]:
+    """Fields of a paragraph each of whose lines begins with a title, further ones indented; none of another one."""
+    found = [ASPECT.fullmatch(entry.rstrip()) for entry in ENTRY.split(paragraph) if entry]
+    titled = [f":{one['title']}: {escaped(_one_line(one['text']))}" for one in found if one]
+    return titled if len(titled) == len(found) > 1 else []
 
 
 def is_python(text: str) -> bool:
@@ -63,8 +74,8 @@ def is_python(text: str) -> bool:
 
 def _section(title: str, text: str) -> list[str]:
     """The fields of a section; in Args and Raises an entry is `name: meaning`, its further lines indented."""
-    if title not in ("Args", "Raises"):
-        return [f":{title.lower() if title == 'Returns' else title}: {escaped(_one_line(text))}"]
+    if title == "Returns":
+        return [f":returns: {escaped(_one_line(text))}"]
     kind = "param" if title == "Args" else "raises"
     entries = (entry.partition(": ") for entry in ENTRY.split(text) if entry)
     return [line for names, _, meaning in entries for line in _fields(kind, names, meaning)]
