@@ -88,7 +88,7 @@ def _broken(line: str) -> Iterator[str]:
 
 def main() -> None:
     """Wrap the pages that the command line names, or all; a page appears whole."""
-    for page in map(Path, sys.argv[1:] or sorted(DOCS.rglob("*.md"))):
+    for page in [*map(Path, sys.argv[1:])] or sorted(DOCS.rglob("*.md")):
         text = page.read_text(encoding="utf-8")
         if "_build" not in page.parts and wrapped(text) != text:
             write_text_whole(page, wrapped(text))
