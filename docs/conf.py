@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from spikecam_env import __version__  # noqa: E402
+from tools.site import films  # noqa: E402
 from tools.site.docstrings import rendered  # noqa: E402
 from tools.site.pages import filled_in  # noqa: E402
 from tools.site.signatures import signature_of  # noqa: E402
@@ -21,7 +22,7 @@ copyright = author
 version = release = __version__
 language = "en"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx_copybutton"]
 exclude_patterns = ["_build"]
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4
@@ -38,12 +39,15 @@ python_maximum_signature_line_length = 80
 toc_object_entries_show_parents = "hide"
 
 html_theme = "furo"
-html_title = "spikecam-env"
+html_title = f"spikecam-env {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["films.js"]
 html_copy_source = False
 html_show_sphinx = False
 html_theme_options = {"top_of_page_buttons": []}
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
 pygments_style = "friendly"
 pygments_dark_style = "github-dark"
 
@@ -72,6 +76,7 @@ def arguments(value):
 
 
 def setup(app):
+    films.setup(app)
     app.add_lexer("csv", TextLexer)  # Pygments has none
     app.connect("source-read", read_page)
     app.connect("autodoc-process-docstring", read_docstring)

@@ -1,8 +1,8 @@
 """Meshes: shapes as parts, to be put together to surfaces (`scenes.assembly`); and your own mesh or picture
 (`scenes.mesh_files`).
 
-    assemble(lathe(profile, picture), box((1, 1, 1), 0.2).moved(Still((0, 2, 0))))      one rigid surface
-    from_file("teapot.obj", texture="wood.jpg", size=1.0)                               your own
+    assemble(lathe(profile, picture), box((1, 1, 1), 0.2).moved(Still((0, 2, 0))))  # one rigid surface
+    from_file("teapot.obj", texture="wood.jpg", size=1.0)  # your own
 
 Every part is a grid of points, so that normals are smooth along it and break where two parts meet.
 Faces look outward; light is Lambert's, so a sheet has a front and a back, a little apart.

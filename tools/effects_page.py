@@ -130,7 +130,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import (
+    Acts,
+    Charge,
+    Effect,
+    Exposure,
+    Stage,
+    parameter,
+)
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.frame_moments import mean_decay
 
@@ -142,11 +149,18 @@ class SlowShutter(Effect):
     stage = Stage.OPTICS
     acts = Acts.INTEGRATED
     strength = "tau_us"
-    identification = Identification(family="light", needs=Needs.STEADY, experiment="recordings begun after the shutter")
+    identification = Identification(
+        family="light",
+        needs=Needs.STEADY,
+        experiment="recordings begun after the shutter",
+    )
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+    def collect(
+        self, light: Charge, dark: Charge, now: Exposure, memory: Any
+    ) -> tuple[Charge, Charge, Any]:
         tau = 1e-6 * self.tau_us * now.frame_rate_hz
-        return light.scaled(1.0 - mean_decay(now.start, tau) if tau else 1.0), dark, memory
+        opened = 1.0 - mean_decay(now.start, tau) if tau else 1.0
+        return light.scaled(opened), dark, memory
 ```
 
 Nothing else is needed. The catalogue finds the file; `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))`

@@ -20,6 +20,7 @@ from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.untrusted import parse_toml
+from tools.code_width import commands
 from tools.page_reading import Page, Part, Table, Text
 
 MADE_BY = "python -m tools.pages"
@@ -49,7 +50,7 @@ def page_block(page: Page) -> str:
     return _joined(
         [
             f"*{page.about}; by {page.version}. Written by `{MADE_BY}`.*",
-            "<!-- not run: needs the real recordings -->\n" + _fenced(page.texts("reproduce", "pre")[0]),
+            "<!-- not run: needs the real recordings -->\n" + _fenced(commands(page.texts("reproduce", "pre")[0])),
             f"**{page.verdict}.** {page.sentence}",
             *_sizes(page),
             beside_measured(page),

@@ -84,7 +84,7 @@ def without_code(text: str) -> str:
 
 def command_lines(code: str) -> list[str]:
     """The lines of a block of commands: continued ones and loops joined, remarks (`# ...`, or after two spaces) cut."""
-    continued = re.sub(r"\\\n\s*", " ", code)
+    continued = re.sub(r"\s*\\\n\s*", " ", code)
     joined = re.sub(r"^for .*?^done.*?$", lambda found: _in_one_line(found[0]), continued, flags=re.M | re.S)
     lines = (re.sub(r"(^|\s+)#.*$|(?<=\S) {2,}\S.*$", "", line).strip() for line in joined.splitlines())
     return [line.removeprefix("$ ") for line in lines if line]

@@ -112,6 +112,28 @@ Example:
     ]
 
 
+@pytest.mark.parametrize(
+    "text, code",
+    [
+        ('env = gymnasium.make_vec("spikecam_env/Fan-v0", num_envs=2)', True),
+        ("import numpy", True),
+        ("T = 1/x + tau", False),
+        ("x <- x (1 - exp(-t/tau))", False),
+        ("begin    what the effect remembers", False),
+    ],
+)
+def test_python_in_a_docstring_is_code_and_a_formula_is_not(text: str, code: bool) -> None:
+    assert (".. code-block:: python" in rendered(f"A camera.\n\n    {text}\n")) is code
+
+
+def test_a_paragraph_of_titled_lines_becomes_a_list_and_one_titled_line_stays_prose() -> None:
+    assert rendered("A task.\n\nScene: a disc\n    turns.\nAction: `two` numbers: pan, tilt.")[2:4] == [
+        ":Scene: a disc turns.",
+        r":Action: \ ``two``\  numbers: pan, tilt.",
+    ]
+    assert rendered("A task.\n\nScene: a disc.")[2] == "Scene: a disc."
+
+
 def examples_of(module: str, name: str) -> list[doctest.DocTest]:
     """Of a function or class and its methods, with what the reference says they begin with: numpy, and the names of
     their module."""

@@ -10,7 +10,11 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from in_browser import BROWSER, laid_out
 
+from scenes.catalogue import SCENES
+from spikecam_env import __version__
+from spikecam_env.envs.tasks import TASKS
 from tools.page_blocks import ROOT
 from tools.site.public import MODULES, home_of, kind_of, names_of
 
@@ -50,3 +54,34 @@ def test_no_page_fetches_anything(site: Path) -> None:
 def test_a_word_can_be_searched_for(site: Path) -> None:
     index = (site / "searchindex.js").read_text(encoding="utf-8")
     assert "with_effect" in index and "crosstalk" in index
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_no_code_is_cut_no_page_is_wider_than_the_screen_and_films_play(site: Path) -> None:
+    laid = laid_out(site, (1280, 400))
+    if not laid:
+        pytest.skip("Chromium did not render")
+    desk = [page for page in laid if page.width == 1280]
+    print(f"{len(desk)} pages, {sum(p.blocks for p in desk)} blocks, {sum(p.films for p in desk)} films")
+    assert not [(page.page, page.cut) for page in desk if page.cut]
+    assert not [(page.page, page.page_width) for page in laid if page.page_width > page.width]
+    assert not [(page.page, page.still) for page in desk if page.still]
+    films = {page.page: page.films for page in desk}
+    assert films["gallery.html"] == len(SCENES) + len(TASKS)
+    assert all(films[f"tasks/{kind.__module__.rpartition('.')[2]}.html"] == 1 for kind in TASKS.values())
+    highlighted = [page for page in desk if page.page.startswith(("tutorials/", "howto/")) and page.blocks]
+    assert all(page.copied == page.blocks for page in highlighted)
+
+
+def test_the_start_page_and_the_first_of_the_tutorials_say_how_to_install(site: Path) -> None:
+    for page in ("index.html", "install.html"):
+        assert "pip install" in re.sub(r"<[^>]+>", "", (site / page).read_text(encoding="utf-8"))
+    [tutorials] = re.findall(
+        r"\{toctree\}\n:caption: Tutorials\n:hidden:\n\n(\w+)", (ROOT / "docs/index.md").read_text("utf-8")
+    )
+    assert tutorials == "install"
+
+
+def test_every_page_shows_the_version_and_public_names_lead_to_their_source(site: Path) -> None:
+    assert f"spikecam-env {__version__}" in (site / "index.html").read_text(encoding="utf-8")
+    assert "_modules/spikecam_env/sensor/model.html" in (site / "reference/api/sensor.html").read_text(encoding="utf-8")

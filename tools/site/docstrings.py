@@ -1,23 +1,27 @@
 """Docstrings of this repository as reStructuredText, which Sphinx's autodoc reads.
 
-A docstring here is plain text: a summary, prose with `code`, indented equations, and the sections Args, Returns, Raises
-and Example.  Arguments may also stand in the prose, as `name: meaning`, or in two columns.  Prose is escaped, indented
-blocks stay as they stand, arguments and errors become fields.
+A docstring here is plain text: a summary, prose with `code`, indented equations or Python, and the sections Args,
+Returns, Raises and Example.  Arguments may also stand in the prose, as `name: meaning`, or in two columns; a paragraph
+of lines such as `Scene: ...` and `Action: ...` is a list of them.  Prose is escaped, indented blocks stay as they are,
+sections and such lists become fields.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Collection, Iterable
 from textwrap import dedent
 
 SECTION = re.compile(r"(Args|Returns|Raises|Example):$")
+ASPECT = re.compile(r"(?P<title>[A-Z][a-z]+): (?P<text>.+)", re.DOTALL)
 ENTRY = re.compile(r"^(?=\S)", re.MULTILINE)
 ARGUMENT = re.compile(r"(?:^|\n|  )(?P<names>\w+(?:, \w+)*): ")
 COLUMNS = re.compile(r"^(?P<name>\w+) {2,}(?P<text>\S.*)$")
 RAISES = re.compile(r"(?:^|\n|(?<=[.;])\s+)(?:Raises |Errors: ?|NotReadyError (?=for ))")
 ERROR = re.compile(r"(?P<kind>[A-Z]\w+Error) ?(?P<text>.*)", re.DOTALL)
 CODE = re.compile(r"(`+)(.+?)\1", re.DOTALL)
+IMPORTS = (ast.Import, ast.ImportFrom)
 
 
 def rendered(text: str, arguments: Collection[str] = ()) -> list[str]:
@@ -39,12 +43,33 @@ def rendered(text: str, arguments: Collection[str] = ()) -> list[str]:
         elif lines[0].lstrip().startswith(">>>"):
             examples += [*lines, ""]
         elif all(line.startswith("  ") for line in lines):
-            prose += ["::", "", *(f"   {line}" for line in lines), ""]
+            kind = ".. code-block:: python" if is_python(dedent(paragraph)) else "::"
+            prose += [kind, "", *(f"   {line}" for line in lines), ""]
+        elif aspects := _aspects(paragraph):
+            prose += [*aspects, ""]
         else:
             plain, found = _sorted_out(lines, arguments)
             fields += found
             prose += [*plain, ""] if plain else []
     return [*prose, *fields, "", *examples]
+
+
+def _aspects(paragraph: str) -> list[str]:
+    """Fields of a paragraph each of whose lines begins with a title, further ones indented; none of another one."""
+    found = [ASPECT.fullmatch(entry.rstrip()) for entry in ENTRY.split(paragraph) if entry]
+    titled = [f":{one['title']}: {escaped(_one_line(one['text']))}" for one in found if one]
+    return titled if len(titled) == len(found) > 1 else []
+
+
+def is_python(text: str) -> bool:
+    """Whether an indented block is Python, not a formula: it imports, or calls with a keyword or a string."""
+    try:
+        parts = list(ast.walk(ast.parse(text)))
+    except SyntaxError:
+        return False
+    calls = [part for part in parts if isinstance(part, ast.Call)]
+    texts = [a for call in calls for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+    return bool(texts) or any(call.keywords for call in calls) or any(isinstance(p, IMPORTS) for p in parts)
 
 
 def _section(title: str, text: str) -> list[str]:

@@ -5,7 +5,9 @@
 <!-- generated: formats -->         the table of file formats
 <!-- generated: benchmarks -->      speed by version
 <!-- generated: settings -->        settings of a diagnosis
+<!-- generated: task NAME -->       a task: what its class says of it, and its scores
 <!-- generated: page FILE -->       a page at the root
+<!-- generated: part FILE TITLE --> a section of it, without its title
 
 A link to a file of the repository becomes a download of it; a link to a folder, its name.  A link called by the name
 of its page is called by the title of the page.
@@ -15,15 +17,18 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 
-from tools.site import benchmarks, commands, settings
+from tools.site import benchmarks, commands, settings, tasks
 from tools.site.docstrings import rendered
+from tools.site.films import as_directives
 from tools.site.public import docstring_of, home_of, kind_of, names_of
+from tools.site.sections import section
 
 ROOT = Path(__file__).resolve().parents[2]
-GENERATED = re.compile(r"^<!-- generated: (?P<what>\w+) ?(?P<of>[\w.]*) -->$", re.MULTILINE)
+GENERATED = re.compile(r"^<!-- generated: (?P<what>\w+) ?(?P<of>[\w. ]*) -->$", re.MULTILINE)
 LINK = re.compile(r"(?<!!)\[(?P<text>[^\]]*)\]\((?P<path>[^)#:\s]+)(?P<anchor>#[^)\s]*)?\)")
 PAGES = {"README.md": "index.md", "CHANGELOG.md": "project/changelog.md", "CONTRIBUTING.md": "project/contributing.md"}
 """Files at the root that are pages of the site under another name."""
@@ -31,20 +36,30 @@ PAGES = {"README.md": "index.md", "CHANGELOG.md": "project/changelog.md", "CONTR
 
 def filled_in(text: str, page: str) -> str:
     """The Markdown of a page as Sphinx is to read it.  page: its path below docs, e.g. `reference/index.md`."""
-    whole = GENERATED.sub(lambda found: generated(found["what"], found["of"]), text)
-    return LINK.sub(lambda found: _link(found, PurePosixPath(page).parent), whole)
+    folder = PurePosixPath(page).parent
+    whole = as_directives(GENERATED.sub(lambda found: generated(found["what"], found["of"], folder), text))
+    return LINK.sub(lambda found: _link(found, folder), whole)
 
 
-def generated(what: str, of: str = "") -> str:
-    """The reference of the command line or of a module, tables of formats, benchmarks or settings, or a page at the
-    root."""
-    if what == "api":
-        return "\n".join(_module(of))
-    if what == "page":
-        return _from_root(of)
-    return {"commands": commands.page, "formats": _formats, "benchmarks": benchmarks.page, "settings": settings.page}[
-        what
-    ]()
+def generated(what: str, of: str, folder: PurePosixPath) -> str:
+    """Markdown that stands for a comment of this module's docstring.
+
+    Args:
+        what: first word of the comment, e.g. `api`.
+        of: the words after it, e.g. the name of a module.
+        folder: of the page, below docs.
+    """
+    made: dict[str, Callable[[], str]] = {
+        "api": lambda: "\n".join(_module(of)),
+        "benchmarks": benchmarks.page,
+        "commands": commands.page,
+        "formats": _formats,
+        "page": lambda: _from_root(of, folder),
+        "part": lambda: _from_root(of.partition(" ")[0], folder, of.partition(" ")[2]),
+        "settings": settings.page,
+        "task": lambda: tasks.page(of),
+    }
+    return made[what]()
 
 
 def _formats() -> str:
@@ -53,10 +68,11 @@ def _formats() -> str:
     return str(table)
 
 
-def _from_root(file: str) -> str:
-    """A page at the root as one of docs/project: its links begin there."""
+def _from_root(file: str, folder: PurePosixPath, title: str = "") -> str:
+    """A page at the root, or a section of it, for a page in a folder of docs: its links begin there."""
     text = (ROOT / file).read_text(encoding="utf-8")
-    return LINK.sub(lambda found: _moved(found, ROOT / "docs" / "project"), text)
+    inside = section(text, title) if title else text
+    return LINK.sub(lambda found: _moved(found, ROOT / "docs" / folder), inside)
 
 
 def _moved(found: re.Match[str], folder: Path) -> str:

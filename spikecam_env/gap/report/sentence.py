@@ -105,7 +105,8 @@ def removed_phrase(found: Conclusion, what: str) -> str:
 def gap_line(gap: Gap) -> str:
     """What a model's patch did to the gap."""
     off = f"the mean square distance of statistics from the model, in noise, is {three_digits(gap.before)}"
-    chance = "1 is chance" if gap.floor == CHANCE else f"chance, by two halves of the measurement, is {gap.floor:.3g}"
+    halves = "" if gap.floor == CHANCE else f", and two halves of the measurement differ by {gap.floor:.3g}"
+    chance = f"{CHANCE:g} is chance{halves}"
     said = f"On the held-out recordings {off}; {chance}."
     if not math.isfinite(gap.removed) or gap.before <= HARDLY_A_GAP * gap.floor:
         return said

@@ -78,3 +78,9 @@ def test_two_effects_are_named_together() -> None:
 @pytest.mark.parametrize("before, stated", [(1.1, False), (1.3, True)])
 def test_a_removed_share_is_said_where_there_is_a_gap(before: float, stated: bool) -> None:
     assert ("is removed" in gap_line(Gap(before, 1.0, 1.0, 1.0, {}))) == stated
+
+
+def test_chance_is_one_whatever_two_halves_of_the_measurement_differ_by() -> None:
+    for floor in (1.0, 0.594):
+        said = gap_line(Gap(9.0, 1.0, floor, 0.9, {}))
+        assert "; 1 is chance" in said and ("0.594" in said) == (floor < 1.0)
