@@ -15,7 +15,7 @@ import trimesh
 from PIL import Image
 
 from scenes.assembly import Albedo, Part, Points, assemble, joined
-from scenes.gltf import KINDS, Piece, read_gltf
+from scenes.gltf import KINDS, MeshPart, read_gltf
 from scenes.materials import UNSTATED_ALBEDO, own_albedo
 from scenes.mesh_properties import unread_properties
 from scenes.pictures import SUFFIXES, check_size, read_picture
@@ -100,7 +100,7 @@ def from_mesh(
         [2.0, 2.0, 4.0]
     """
     unread = dict[str, None]()
-    surface = _one_surface(_sized([Piece(mesh)], size), texture, unread)
+    surface = _one_surface(_sized([MeshPart(mesh)], size), texture, unread)
     if unread:
         warnings.warn(f"the mesh {_unshown(unread)}", stacklevel=2)
     return surface
@@ -159,7 +159,7 @@ class Beside(trimesh.resolvers.FilePathResolver):
         return data
 
 
-def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) -> list[Piece]:
+def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) -> list[MeshPart]:
     """The meshes of a file; their albedos where it is a glTF file, which has them in its own way.
 
     Raises InputError where it cannot be read.
@@ -172,7 +172,7 @@ def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) ->
                 pieces, names = read_gltf(data, beside.get, own)
                 unread.update(dict.fromkeys(names))
                 return pieces
-            return [Piece(mesh) for mesh in _by_trimesh(kind, data, beside, unread)]
+            return [MeshPart(mesh) for mesh in _by_trimesh(kind, data, beside, unread)]
     except InputError:
         raise
     except Exception as error:  # the many ways in which a damaged mesh fails
@@ -206,7 +206,7 @@ def _placed(scene: trimesh.Scene) -> Iterator[trimesh.Trimesh]:
 
 
 def _one_surface(
-    pieces: Sequence[Piece], texture: str | PathLike[str] | Texture | None, unread: dict[str, None]
+    pieces: Sequence[MeshPart], texture: str | PathLike[str] | Texture | None, unread: dict[str, None]
 ) -> Surface:
     """Meshes in one space as one rigid surface; adds to `unread` what it does not show."""
     emissions = {piece.emission for piece in pieces}
@@ -217,7 +217,7 @@ def _one_surface(
 
 
 def _reflecting(
-    pieces: Sequence[Piece], texture: str | PathLike[str] | Texture | None, unread: dict[str, None]
+    pieces: Sequence[MeshPart], texture: str | PathLike[str] | Texture | None, unread: dict[str, None]
 ) -> Surface:
     if texture is not None:
         return _textured(_together([piece.mesh for piece in pieces]), _texture(texture))
@@ -261,7 +261,7 @@ def _textured(mesh: trimesh.Trimesh, albedo: Albedo) -> Surface:
     return Surface(mesh, albedo)
 
 
-def _sized(pieces: Sequence[Piece], size: float | None) -> list[Piece]:
+def _sized(pieces: Sequence[MeshPart], size: float | None) -> list[MeshPart]:
     """Copies, checked; their longest side as asked, their middle at the origin."""
     if not any(len(getattr(piece.mesh, "faces", ())) for piece in pieces):
         raise InputError("the mesh has no triangles; a cloud of points has no surface to render")
@@ -285,7 +285,7 @@ def _sized(pieces: Sequence[Piece], size: float | None) -> list[Piece]:
     return pieces
 
 
-def _merged(piece: Piece) -> Piece:
+def _merged(piece: MeshPart) -> MeshPart:
     """With one vertex where several lie, and so smooth normals; meshes keep normals of their own.
 
     Vertices that have colours of their own share the normal alone.

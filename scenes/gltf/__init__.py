@@ -6,9 +6,9 @@
 Source: the glTF 2.0 specification, Khronos 2021, and its registry of extensions.
 """
 
-from scenes.gltf.reading import Piece, read_gltf
+from scenes.gltf.reading import MeshPart, read_gltf
 
 KINDS = ("glb", "gltf")
 """Endings of files, without the dot."""
 
-__all__ = ["KINDS", "Piece", "read_gltf"]
+__all__ = ["KINDS", "MeshPart", "read_gltf"]

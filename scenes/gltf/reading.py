@@ -17,7 +17,7 @@ from spikecam_env.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class MeshPart:
     """A part of a mesh with one material, at one place."""
 
     mesh: trimesh.Trimesh
@@ -28,7 +28,7 @@ class Piece:
     """Radiance that it gives by itself."""
 
 
-def read_gltf(data: bytes, beside: Callable[[str], bytes], own: bool = True) -> tuple[list[Piece], list[str]]:
+def read_gltf(data: bytes, beside: Callable[[str], bytes], own: bool = True) -> tuple[list[MeshPart], list[str]]:
     """The scene that a glTF file shows, at rest.
 
     Args:
@@ -75,8 +75,8 @@ def _parts(file: File, node: Tree, looks: Looks) -> Iterator[tuple[Shape, Look]]
         yield whole, look
 
 
-def _piece(file: File, at: Shape, look: Look) -> Piece:
+def _piece(file: File, at: Shape, look: Look) -> MeshPart:
     mesh = trimesh.Trimesh(at.tables["POSITION"], at.faces, vertex_normals=at.tables["NORMAL"], process=False)
     if look.uv is not None:
         mesh.visual = trimesh.visual.TextureVisuals(uv=look.uv)
-    return Piece(mesh, look.albedo, look.emission)
+    return MeshPart(mesh, look.albedo, look.emission)

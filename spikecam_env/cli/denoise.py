@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from spikecam_env.cli.restore import Restored
+    from spikecam_env.cli.restore import DenoisedRecording
     from spikecam_env.streams.recording import Recording
 
 
@@ -69,9 +69,16 @@ class Denoise:
         print(table([speed]))
         print(f"wrote {', '.join(written)} in {self.out}")
 
-    def _restored(self, recording: Recording) -> Restored:
+    def _restored(self, recording: Recording) -> DenoisedRecording:
         from denoiser import OnlineDnSS
-        from spikecam_env.cli.restore import Restored, checked_window, light_at, picture_frames, restore, whole_windows
+        from spikecam_env.cli.restore import (
+            DenoisedRecording,
+            checked_window,
+            light_at,
+            picture_frames,
+            restore,
+            whole_windows,
+        )
 
         noisy = recording.spikes
         window = checked_window(self.window, len(noisy))
@@ -79,9 +86,11 @@ class Denoise:
         options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
         online = OnlineDnSS.pretrained(self.mode, output="both", **options)
         denoised, planes, seconds = restore(noisy, online, [*picture_frames(len(noisy), window), *light])
-        return Restored(noisy, denoised, planes, light, window, recording.frame_rate_hz, seconds, online.latency)
+        return DenoisedRecording(
+            noisy, denoised, planes, light, window, recording.frame_rate_hz, seconds, online.latency
+        )
 
-    def _write_stream(self, folder: Path, recording: Recording, found: Restored) -> None:
+    def _write_stream(self, folder: Path, recording: Recording, found: DenoisedRecording) -> None:
         from spikecam_env.streams import SpikeWriter
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
@@ -90,7 +99,7 @@ class Denoise:
         with SpikeWriter(folder / "denoised.h5", shape, recording.frame_rate_hz, **attributes) as writer:
             writer.append(found.denoised)
 
-    def _write_pictures(self, folder: Path, found: Restored) -> None:
+    def _write_pictures(self, folder: Path, found: DenoisedRecording) -> None:
         from spikecam_env.cli.before_after import instant
         from spikecam_env.cli.panels import compose, write_film, write_picture
 

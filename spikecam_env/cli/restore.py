@@ -38,7 +38,7 @@ MOST_JUDGED = 12
 
 
 @dataclass(frozen=True)
-class Restored:
+class DenoisedRecording:
     """A recording before and after the denoiser."""
 
     noisy: Spikes
