@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from denoiser.network import DnSS
 from denoiser.recipe import Recipe
 from denoiser.stream_network import StreamDnSS
+from denoiser.threads import where_torch_can
 from spikecam_env.errors import InputError, OwnCodeError
 
 
@@ -40,11 +41,7 @@ def check_network(recipe: Any, network: Any) -> None:
         _check_sizes(weights, own.state_dict())
     elif isinstance(network, DnSS | StreamDnSS) and not isinstance(network, type(own)):
         raise InputError(f"network is a {type(network).__name__}, the recipe's is a {type(own).__name__}; give its own")
-    for name, tensor in weights.items():
-        if isinstance(tensor, Tensor) and tensor.is_meta:
-            raise InputError(f"network: {name} is on the device meta and has no values; load its weights")
-        if isinstance(tensor, Tensor) and not bool(torch.isfinite(tensor).all()):
-            raise InputError(f"network: {name} holds values that are not finite; train anew or load other weights")
+    where_torch_can(lambda: _check_values(weights))
 
 
 def check_output(network: nn.Module, found: Any, sizes: tuple[int, int, int, int]) -> tuple[Tensor, tuple[Tensor, ...]]:
@@ -72,6 +69,14 @@ def check_output(network: nn.Module, found: Any, sizes: tuple[int, int, int, int
 def has_passes(network: Any) -> bool:
     """Whether a network's own class has `passed`; a wrapper that hands on its network's attributes has none."""
     return hasattr(type(network), "passed")
+
+
+def _check_values(weights: dict[str, Any]) -> None:
+    for name, tensor in weights.items():
+        if isinstance(tensor, Tensor) and tensor.is_meta:
+            raise InputError(f"network: {name} is on the device meta and has no values; load its weights")
+        if isinstance(tensor, Tensor) and not bool(torch.isfinite(tensor).all()):
+            raise InputError(f"network: {name} holds values that are not finite; train anew or load other weights")
 
 
 def _check_sizes(weights: dict[str, Any], own: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ import spikecam_env.envs  # noqa: F401
 from spikecam_env.envs.registration import SMALL_TASKS
 from tests.envs.kinds import DISK, KINDS
 
-SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20}
+SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20, "obs": "spikes"}
 STEPS = 2
 """The denoiser's frames come 31 late: they are seen from the first step on."""
 
