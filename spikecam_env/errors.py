@@ -73,13 +73,20 @@ def unknown_name(kind: str, name: object, allowed: Iterable[str]) -> InputError:
 
 
 def shown(value: object) -> str:
-    """A value in an error's text: at most 60 characters.
+    """A value in an error's text: one line of at most 60 characters.
 
-    >>> len(shown("a" * 1000))
-    60
+    Args:
+        value: Any; also one whose text has several lines, or which has none.
+
+    Returns:
+        Its text.
+
+    Example:
+        >>> len(shown("a" * 1000))
+        60
     """
     try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits have no text
+        text = " ".join(line.strip() for line in repr(value).splitlines())
+    except Exception:  # whole numbers of more than 4300 digits, and objects of users whose own code raises
         return f"a {type(value).__name__}"
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -18,7 +18,7 @@ from spikecam_env.checked import checked_count, checked_seed
 from spikecam_env.envs.evaluation import Evaluation
 from spikecam_env.envs.observations import Observation
 from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS, register
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import InputError, shown, unknown_name
 
 Env = gymnasium.Env[Any, Any]
 
@@ -77,7 +77,7 @@ def evaluate(
         given["split"] = split
     env = gymnasium.make(name, **given)
     try:
-        seen = (wrap or _same)(stacked(env, checked_count(stack, "stack", MOST_STACK)))
+        seen = _wrapped(stacked(env, checked_count(stack, "stack", MOST_STACK)), wrap)
         _check_spaces(policy, seen, stack)
         first = checked_seed(seed)
         return judged(act, seen, range(first, first + episodes), progress=progress)
@@ -122,8 +122,14 @@ def _known(task: Any) -> str:
     raise unknown_name("task", task, (each.split("/")[1] for each in known))
 
 
-def _same(env: Env) -> Env:
-    return env
+def _wrapped(env: Env, wrap: Any) -> Env:
+    """The environment in the user's wrappers."""
+    if wrap is None:
+        return env
+    found = wrap(env) if callable(wrap) else None
+    if not isinstance(found, gymnasium.Env):
+        raise InputError(f"wrap is {shown(wrap)}; give a function, environment -> environment")
+    return found
 
 
 def _check_spaces(policy: Any, env: Env, stack: int) -> None:

@@ -46,6 +46,8 @@ def policy_of(policy: Any) -> tuple[Policy, dict[str, Any]]:
         if policy in BASELINES:
             return BASELINES[policy], {}
         policy = import_module("spikecam_env.agents.agent").Agent.load(policy)
+    if isinstance(policy, type):
+        raise InputError(f"policy is the class {policy.__name__}; give an instance of it")
     if hasattr(policy, "begin") and hasattr(policy, "act"):
         obs = getattr(policy, "obs", None)
         return acting(policy), {} if obs is None else {"obs": obs, "obs_state": True}

@@ -18,7 +18,7 @@ def checked_action(action: Any, count: int, names: str = "") -> list[float]:
     """The numbers of an action, cut to [-1, 1].
 
     Args:
-        action: Numbers (count,): an array, a list, or a torch tensor on the host.
+        action: Numbers (count,): an array, a list, or a torch tensor on the host, with or without gradient.
         count: How many an action has.
         names: Of the numbers, for the error's text, e.g. "(pan, tilt)".
 
@@ -33,11 +33,12 @@ def checked_action(action: Any, count: int, names: str = "") -> list[float]:
         [0.5, 1.0]
     """
     try:
-        given = np.asarray(action)
+        given = np.asarray(action.detach() if hasattr(action, "detach") else action)
         numbers = given.astype(np.float64).reshape(-1).tolist() if given.dtype.kind in "biuf" else []
     except (TypeError, ValueError, RuntimeError):  # ragged lists, tensors elsewhere
         given, numbers = np.empty(0), []
     if given.shape != (count,) or len(numbers) != count or not all(map(isfinite, numbers)):
         wanted = NUMBERS.get(count, f"{count} finite numbers")
-        raise InputError(f"action is {shown(action)}; it must be {wanted} in [-1, 1]{names and f', {names}'}")
+        form = "" if given.shape == (count,) else f", of shape ({count},)"
+        raise InputError(f"action is {shown(action)}; it must be {wanted} in [-1, 1]{form}{names and f', {names}'}")
     return [cut(number, 1.0) for number in numbers]

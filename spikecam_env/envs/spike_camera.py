@@ -16,7 +16,7 @@ from scenes.exposure import lit
 from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
-from spikecam_env.checked import as_number, checked_number, checked_shape
+from spikecam_env.checked import as_number, checked_number, checked_seed, checked_shape
 from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.keywords import check_keywords
 from spikecam_env.envs.motor import turned
@@ -162,7 +162,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         given = as_dictionary(options)
         model = self._checked_model(given.pop("model", self.model))
         light = checked_number(given.pop("light", 1.0), "light", 0.0, MOST_LIGHT, above=True)
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else checked_seed(seed))
         begin_to_use(self)
         self._drawn = self._checked(self._make_scene(self.np_random, given))
         self._scene = lit(self._drawn, light)

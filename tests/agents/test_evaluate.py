@@ -156,3 +156,11 @@ def test_it_prints_its_figures_and_cannot_be_changed() -> None:
         assert part in text
     with pytest.raises(FrozenInstanceError):
         result.score = 1.0  # type: ignore[misc]
+
+
+def test_a_class_and_wrappers_that_give_no_environment_are_refused() -> None:
+    with pytest.raises(InputError, match="policy is the class Model; give an instance"):
+        evaluate(Model, "Catch-v1", **SMALL)
+    for wrap in (3, lambda env: None):
+        with pytest.raises(InputError, match=r"wrap is .* give a function"):
+            evaluate("nothing", "Catch-v1", wrap=wrap, **SMALL)

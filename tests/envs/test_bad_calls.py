@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import torch
 
 from spikecam_env.envs.registration import SMALL_TASKS, register
 from spikecam_env.errors import InputError
@@ -122,3 +123,31 @@ def test_a_class_of_a_user_s_own_keeps_its_keywords() -> None:
 
     assert Own(shape=(16, 24), bulb=2.0).lamp == 2.0
     assert "(lamp?)" in refused(Own, lmp=1.0)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.0, "3", [1], True, 2**64])
+def test_nonsense_as_a_seed_is_refused_and_changes_nothing(seed: Any) -> None:
+    env = made("spikecam_env/Track-v1")
+    env.reset(seed=0)
+    before = env.standing
+    assert "seed = " in refused(env.reset, seed=seed)
+    assert env.standing == before
+    env.reset(seed=np.int64(0))
+    assert env.np_random_seed == 0
+
+
+def test_a_tensor_with_a_gradient_is_an_action() -> None:
+    env = made("spikecam_env/Track-v1")
+    found = []
+    for action in ([0.5, 0.0], torch.tensor([0.5, 0.0], requires_grad=True)):
+        env.reset(seed=0)
+        found.append(env.step(action)[1])
+    assert found[0] == found[1]
+
+
+def test_an_action_of_another_shape_is_answered_with_the_shape() -> None:
+    env = made("spikecam_env/Catch-v1")
+    env.reset(seed=0)
+    assert "of shape (1,)" in refused(env.step, 0.3)
+    assert "of shape (1,)" in refused(env.step, np.zeros((2, 1)))
+    assert "shape" not in refused(env.step, [np.nan])
