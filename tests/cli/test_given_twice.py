@@ -12,7 +12,7 @@ import pytest
 
 from spikecam_env.cli.main import run
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import SensorModel
+from spikecam_env.gap import diagnose, write_campaign
 from spikecam_env.untrusted import parse_json, read_arrays
 
 RECORD = ("record", "--size", "8", "8", "--frames", "2", "--out", "{out}.h5")
@@ -60,13 +60,10 @@ def test_options_that_may_be_repeated_still_may(tmp_path: Path) -> None:
     assert run(["record", "--size", "8", "8", "--frames", "2", "--out", str(out), *effects]) == 0
 
 
-def test_a_candidate_that_is_also_excluded_is_refused(tmp_path: Path) -> None:
-    from spikecam_env.gap.candidates.table import chosen
-
-    model = SensorModel.preset("scsim")
-    for only, exclude in ((["dead_time"] * 2, ()), (None, ["dead_time"] * 2), (["dead_time"], ["dead_time"])):
-        with pytest.raises(InputError, match="candidates and exclude: 'dead_time' is given more than once"):
-            chosen(model, only, exclude)
+@pytest.mark.parametrize("name", ["candidates", "exclude"])
+def test_a_candidate_that_is_given_twice_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"{name}: 'dead_time' is given more than once"):
+        diagnose(write_campaign(tmp_path / "c", "scsim", shape=(8, 8), frames=40), "scsim", **{name: ["dead_time"] * 2})
 
 
 def test_a_key_that_stands_twice_in_a_file_is_refused(tmp_path: Path) -> None:

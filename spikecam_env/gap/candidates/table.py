@@ -174,12 +174,13 @@ def expected_events(
 
 
 def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str]) -> list[str]:
-    """Names to try: the catalogue less what the model has, less `exclude`; raises InputError for unknown names, and
-    for one that is given twice or in both."""
+    """Names to try: the catalogue, or `only`, less the model's effects, less `exclude`; raises InputError for unknown
+    names, and for one that is given twice in a list."""
     for name in (*(only or ()), *exclude):
         if name not in CATALOGUE:
             raise unknown_name("candidate", name, CATALOGUE)
-    each_once((*(only or ()), *exclude), "candidates and exclude")
+    each_once(only or (), "candidates")
+    each_once(exclude, "exclude")
     has = {e.name for e in model.effects}
     return [n for n in CATALOGUE if n not in has and n not in exclude and (only is None or n in only)]
 
