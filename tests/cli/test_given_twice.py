@@ -13,6 +13,7 @@ import pytest
 from spikecam_env.cli.main import run
 from spikecam_env.errors import InputError
 from spikecam_env.gap import diagnose, write_campaign
+from spikecam_env.sensor import SensorModel
 from spikecam_env.untrusted import parse_json, read_arrays
 
 RECORD = ("record", "--size", "8", "8", "--frames", "2", "--out", "{out}.h5")
