@@ -21,7 +21,7 @@ COUNTED = ("pixels", "spikes", "frames")
 
 PARTNERS = {"sway": "parts", "parts": "sway", "kinks": "sway"}
 """Hook -> the hook without which it is never called, or changes nothing."""
-IDLE = ("begin", "parts", "kinks", "off_the_line")
+IDLE = ("begin", "parts", "kinks", "off_the_line", "feedback")
 """Hooks that change nothing by themselves."""
 
 
