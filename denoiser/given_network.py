@@ -34,6 +34,8 @@ def check_network(recipe: Any, network: Any) -> None:
         raise InputError(f"network is {_kind(network)}; give a torch module, `recipe.network()` or of `load_weights`")
     if isinstance(network, torch.jit.ScriptModule):
         raise InputError("network is a ScriptModule, which cannot be copied in another type; give the network itself")
+    if any(getattr(part, "_compiled_call_impl", None) is not None for part in network.modules()):
+        raise InputError("network is compiled in place, which a copy of it is not; give torch.compile(network)")
     with torch.device("meta"):
         own = recipe.network()
     weights = network.state_dict()
@@ -67,8 +69,12 @@ def check_output(network: nn.Module, found: Any, sizes: tuple[int, int, int, int
 
 
 def has_passes(network: Any) -> bool:
-    """Whether a network's own class has `passed`; a wrapper that hands on its network's attributes has none."""
-    return hasattr(type(network), "passed")
+    """Whether a network's own class has `passed`, and nothing is hung on the network that only a call reaches.
+
+    A wrapper that hands on its network's attributes has none.
+    """
+    called = any(vars(network).get(name) for name in ("_forward_hooks", "_forward_pre_hooks", "forward"))
+    return hasattr(type(network), "passed") and not called
 
 
 def _check_values(weights: dict[str, Any]) -> None:

@@ -116,6 +116,30 @@ def _listed(values: Any) -> list[Any]:
         return []
 
 
+def checked_switch(value: Any, name: str) -> bool:
+    """True or false; text such as "no", which Python takes as true, is neither.
+
+    Args:
+        value: True or False, numpy's too.
+        name: Begins the error's text.
+
+    Returns:
+        The value as Python's own.
+
+    Raises:
+        InputError: For anything else.
+
+    Example:
+        >>> checked_switch("no", "packed")
+        Traceback (most recent call last):
+            ...
+        spikecam_env.errors.InputError: packed = 'no'; it must be True or False
+    """
+    if type(value).__name__ in ("bool", "bool_"):  # numpy's too, which commands do not import for this
+        return bool(value)
+    raise InputError(f"{_said(name, value)}; it must be True or False")
+
+
 def checked_above_zero(value: Any, name: str) -> float:
     """A number above 0, which may be infinite."""
     number = as_number(value)

@@ -16,7 +16,14 @@ from scenes.exposure import lit
 from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
-from spikecam_env.checked import as_number, checked_number, checked_seed, checked_shape
+from spikecam_env.checked import (
+    as_number,
+    checked_memory,
+    checked_number,
+    checked_seed,
+    checked_shape,
+    checked_switch,
+)
 from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.keywords import check_keywords
 from spikecam_env.envs.motor import turned
@@ -109,6 +116,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         if not (as_number(frames_per_step) >= 1 and as_number(frames_per_step).is_integer()):
             raise InputError(f"frames_per_step is {shown(frames_per_step)}; it must be a whole number, 1 or more")
         self.frames_per_step = int(frames_per_step)
+        checked_memory(self.frames_per_step * self.shape[0] * self.shape[1], f"a step of {self.frames_per_step} frames")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render_mode", render_mode, self.metadata["render_modes"])
         rate = 4.0 * min(self.shape) if max_gaze_rate_px_s is None else max_gaze_rate_px_s
@@ -116,7 +124,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             raise InputError(f"max_gaze_rate_px_s is {shown(rate)}; it must be positive and finite")
         self.max_gaze_rate_px_s = rate
         self.model = _loaded(model)
-        self.ground_truth = ground_truth
+        self.ground_truth = checked_switch(ground_truth, "ground_truth")
         self.render_mode = render_mode
         self._make_scene, self._judge = make_scene, judge
         self._engine, self._threads = engine, threads
@@ -128,7 +136,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._gaze = Gaze.fixed(0.0, 0.0)  # the path of the block that is exposed last, or next
         self._recent: list[NDArray[np.uint8]] = []
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self.observe(_observation(obs, packed, self.usual_obs), obs_state)
+        is_packed = checked_switch(packed, "packed")
+        self.observe(_observation(obs, is_packed, self.usual_obs), checked_switch(obs_state, "obs_state"))
 
     def observe(self, law: Observation, obs_state: bool = False) -> None:
         """Set the observation, and its space.

@@ -19,6 +19,12 @@ COUNTED = ("pixels", "spikes", "frames")
 """What a `share` can be a share of."""
 
 
+PARTNERS = {"sway": "parts", "parts": "sway", "kinks": "sway"}
+"""Hook -> the hook without which it is never called, or changes nothing."""
+IDLE = ("begin", "parts", "kinks", "off_the_line", "feedback")
+"""Hooks that change nothing by themselves."""
+
+
 def check_declaration(effect: type[Effect]) -> None:
     """Raises InputError for the first thing that is missing or wrong in an effect's class, and says how to mend it."""
     _check_class(effect)
@@ -29,8 +35,7 @@ def check_declaration(effect: type[Effect]) -> None:
         raise unknown_name(f"strength of {effect.name}", getattr(effect, "strength", None), known)
     if isinstance(known[effect.strength].default, bool):
         raise _wrong(effect, f"its strength {effect.strength} is a switch; a strength is a number")
-    if not any(effect.overrides(hook) for hook in CHECKS):
-        raise _wrong(effect, f"it has no hook, so that it does nothing; write one of {', '.join(CHECKS)}")
+    _check_hooks(effect)
     Sheet.of(effect)
     _made(effect, {})
     _made(effect, {effect.strength: effect.neutral})
@@ -45,6 +50,15 @@ def _check_class(effect: type[Effect]) -> None:
         raise _wrong(effect, "it is no frozen dataclass; write @dataclass(frozen=True) above the class")
     if not isinstance(getattr(effect, "stage", None), Stage):
         raise _wrong(effect, f"it has no stage; write stage = Stage.X, one of {', '.join(s.name for s in Stage)}")
+
+
+def _check_hooks(effect: type[Effect]) -> None:
+    for hook, partner in PARTNERS.items():
+        if effect.overrides(hook) and not effect.overrides(partner):
+            raise _wrong(effect, f"its hook {hook} does nothing without {partner}; write {partner} too")
+    acting = [hook for hook in CHECKS if hook not in IDLE]
+    if not any(effect.overrides(hook) for hook in acting):
+        raise _wrong(effect, f"it has no hook, so that it does nothing; write one of {', '.join(acting)}")
 
 
 def _check_parameter(effect: type[Effect], field: Field[Any]) -> None:

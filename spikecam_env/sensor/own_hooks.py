@@ -151,6 +151,8 @@ def _as_given(found: Any, handed: Iterable[Any], given: Iterable[Any]) -> Any:
 def _numbers(call: Call, value: Any, name: str, shape: tuple[int, ...], kind: str = "fiu") -> NDArray[Any]:
     """An array of real numbers; each axis is as long as in `shape`, or 1.  kind: numpy's letters of allowed types."""
     array = np.asarray(value)
+    if np.ma.is_masked(value):
+        raise call.error(f"{name} is an array with masked values; each must be a number, and not masked")
     if array.dtype.kind not in kind:
         wanted = "true and false" if kind == "b" else "real numbers"
         raise call.error(f"{name} is {_kind(value, array)}; it must be an array of {wanted}")

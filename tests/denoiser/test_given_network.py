@@ -45,6 +45,20 @@ def test_a_compiled_network_runs_compiled(network: nn.Module) -> None:
     np.testing.assert_allclose(wrapped, rates(network), atol=1e-4)
 
 
+def test_a_network_compiled_in_place_is_refused(network: nn.Module) -> None:
+    """torch leaves such compilation out of copies, and the denoiser computes by a copy."""
+    given = copy.deepcopy(network)
+    given.stem.compile(backend="eager")
+    with pytest.raises(InputError, match=r"compiled in place.* give torch\.compile\(network\)"):
+        rates(given)
+
+
+def test_a_hook_of_a_network_acts(network: nn.Module) -> None:
+    given = copy.deepcopy(network)
+    given.register_forward_hook(lambda module, seen, found: (found[0] * 0.0, found[1]))
+    assert not rates(given).any() and rates(network).any()
+
+
 WRAPPED = {
     "DataParallel": nn.DataParallel,
     "train": lambda network: copy.deepcopy(network).train(),

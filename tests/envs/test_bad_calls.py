@@ -151,3 +151,14 @@ def test_an_action_of_another_shape_is_answered_with_the_shape() -> None:
     assert "of shape (1,)" in refused(env.step, 0.3)
     assert "of shape (1,)" in refused(env.step, np.zeros((2, 1)))
     assert "shape" not in refused(env.step, [np.nan])
+
+
+@pytest.mark.parametrize("name", ["packed", "obs_state", "ground_truth"])
+@pytest.mark.parametrize("value", ["no", "False", 0, 2, None, [False]])
+def test_a_switch_is_true_or_false(name: str, value: Any) -> None:
+    assert f"{name} = {value!r}; it must be True or False" in refused(gymnasium.make, DISK, **SMALL, **{name: value})
+    made(DISK, **{name: np.True_})
+
+
+def test_a_step_that_would_fill_memory_is_refused() -> None:
+    assert "a step of 1000000000 frames would take" in refused(made, DISK, shape=(1000, 1000), frames_per_step=10**9)

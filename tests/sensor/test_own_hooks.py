@@ -240,6 +240,30 @@ def test_an_effect_without_a_hook_is_refused(tmp_path: Path) -> None:
         pass
 
 
+@pytest.mark.parametrize(
+    ("hook", "partner"), [("sway(self, now, phase, beside)", "parts"), ("parts(self, rate)", "sway")]
+)
+def test_a_hook_that_is_never_called_is_refused_with_its_partner(hook: str, partner: str, tmp_path: Path) -> None:
+    alone = own_file(tmp_path / "grey_filter.py", f"{GOOD}\n    def {hook}:\n        raise ValueError\n")
+    said = f"its hook {hook.split('(')[0]} does nothing without {partner}; write {partner} too"
+    with pytest.raises(InputError, match=said), effects_from(alone):
+        pass
+
+
+def test_an_effect_that_only_remembers_is_refused(tmp_path: Path) -> None:
+    idle = own_file(tmp_path / "grey_filter.py", "    def begin(self, first, pattern, rng):\n        return 1\n")
+    with pytest.raises(InputError, match="it has no hook, so that it does nothing"), effects_from(idle):
+        pass
+
+
+def test_masked_values_of_a_hook_are_refused(tmp_path: Path) -> None:
+    hooks = law("compare", "return Shift(factor=np.ma.masked_equal(np.ones((now.frames, 1, 1)), 1.0)), memory")
+    with effects_from(own_file(tmp_path / "grey_filter.py", hooks)) as [grey]:
+        sensor = SpikeSensor(SensorModel.preset("ideal").with_effect(grey()), SHAPE)
+        with pytest.raises(OwnCodeError, match=r"compare, .*factor is an array with masked values"):
+            sensor.step(np.full(SHAPE, 0.5), FRAMES)
+
+
 @pytest.mark.parametrize("base", ["ideal", "scsim"])
 @pytest.mark.parametrize("engine", ["reference", "fast"])
 def test_a_checked_law_gives_the_bits_of_the_same_law_unchecked(base: str, engine: str, tmp_path: Path) -> None:
