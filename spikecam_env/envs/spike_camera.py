@@ -343,8 +343,10 @@ def _checked_verdict(found: Any) -> tuple[float, bool]:
 
 def _check_picture(picture: Any, space: spaces.Space[Any], law: Observation) -> None:
     """Raise OwnCodeError where an observation is not one of its own space: arrays (1, ...) of its shape and type."""
-    shape, dtype = getattr(picture, "shape", None), getattr(picture, "dtype", None)
-    if space.shape is not None and (shape != (1, *space.shape) or dtype != space.dtype):
+    if space.shape is None:
+        return
+    shape, dtype = getattr(picture, "shape", None), str(getattr(picture, "dtype", None)).removeprefix("torch.")
+    if shape != (1, *space.shape) or dtype != str(space.dtype):
         raise OwnCodeError(
             f"observation {type(law).__name__}: step returned {dtype} of shape {shape}; its space has {space.dtype} of "
             f"{(1, *space.shape)}"
