@@ -76,7 +76,7 @@ class FilmNode(nodes.General, nodes.Element):  # type: ignore[misc]
     """A film; `film` and `poster` are names among the site's downloads, `name` is what the page calls it."""
 
 
-class FilmDirective(SphinxDirective):  # type: ignore[misc]
+class FilmDirective(SphinxDirective):
     """The film that its argument names, from the page's folder, and the text below it."""
 
     required_arguments = 1
