@@ -128,6 +128,8 @@ def _real(value: Any) -> NDArray[np.float32]:
         array = np.asarray(value)
     except ValueError as error:
         raise InputError(f"a calibration map is no array: {error}") from error
+    if np.ma.is_masked(value):
+        raise InputError("a calibration map is masked in part; fill it first, e.g. with .filled(1.0)")
     if array.dtype.kind not in "iuf":
         raise InputError(f"a calibration map holds {array.dtype}; it must hold real numbers")
     with np.errstate(over="ignore"):

@@ -11,10 +11,12 @@ from collections.abc import Callable
 from typing import Any
 
 import gymnasium
+from gymnasium.envs.registration import load_env_creator
 from gymnasium.wrappers import FrameStackObservation, ReshapeObservation
 
 from spikecam_env.agents.playing import episodes_of, judged, policy_of
 from spikecam_env.checked import checked_count, checked_seed
+from spikecam_env.envs.aiming import AimingEnv
 from spikecam_env.envs.evaluation import Evaluation
 from spikecam_env.envs.observations import Observation
 from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS, register
@@ -118,8 +120,17 @@ def _known(task: Any) -> str:
     known = [*TASK_ENVIRONMENTS, *ENVIRONMENTS]
     for name in (task, f"spikecam_env/{task}"):
         if isinstance(task, str) and (name in known or name in gymnasium.registry):
+            _check_kind(name)
             return name
     raise unknown_name("task", task, (each.split("/")[1] for each in known))
+
+
+def _check_kind(name: str) -> None:
+    """Raise InputError for an id of other people's, whose episodes have no oracle and no performance."""
+    entry = gymnasium.spec(name).entry_point
+    kind = load_env_creator(entry) if isinstance(entry, str) else entry
+    if isinstance(kind, type) and not issubclass(kind, AimingEnv):
+        raise InputError(f"{name} makes a {kind.__name__}, which has no oracle; give an id of a task or a scene")
 
 
 def _wrapped(env: Env, wrap: Any) -> Env:

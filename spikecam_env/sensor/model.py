@@ -143,7 +143,19 @@ class SensorModel:
         return own + tomli_w.dumps(data)
 
     def with_effect(self, effect: Effect) -> SensorModel:
-        """This model with an effect added, or replaced where it has one of that name."""
+        """This model with an effect added, or replaced where it has one of that name.
+
+        Args:
+            effect: An instance of an effect's class, e.g. `DeadTime(tau_us=0.5)`.
+
+        Returns:
+            Another model; this one stays as it is.
+
+        Raises:
+            InputError: For anything else, such as a name or a class.
+        """
+        if not isinstance(effect, Effect):
+            raise InputError(f"effect = {shown(effect)}; give an instance of its class, e.g. DeadTime(tau_us=0.5)")
         return replace(self, effects=(*(e for e in self.effects if e.name != effect.name), effect))
 
     def without(self, name: str) -> SensorModel:

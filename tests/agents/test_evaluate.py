@@ -164,3 +164,8 @@ def test_a_class_and_wrappers_that_give_no_environment_are_refused() -> None:
     for wrap in (3, lambda env: None):
         with pytest.raises(InputError, match=r"wrap is .* give a function"):
             evaluate("nothing", "Catch-v1", wrap=wrap, **SMALL)
+
+
+def test_an_environment_of_others_is_refused() -> None:
+    with pytest.raises(InputError, match="CartPole-v1 makes a CartPoleEnv, which has no oracle"):
+        evaluate("nothing", "CartPole-v1", episodes=1)

@@ -125,3 +125,9 @@ def test_files_that_hold_no_map_are_refused_in_one_line(tmp_path):
         with pytest.raises(InputError) as caught:
             PixelMap.of(tmp_path / name)
         assert "\n" not in str(caught.value) and name in str(caught.value)
+
+
+def test_a_pair_of_maps_that_is_masked_in_part_is_refused():
+    gain = np.ma.masked_array(np.ones(SHAPE), mask=np.eye(*SHAPE, dtype=bool))
+    with pytest.raises(InputError, match="masked in part; fill it first"):
+        PixelMap.of((gain, np.zeros(SHAPE)))

@@ -60,9 +60,9 @@ def test_a_wrong_number_of_environments_is_named(count: Any) -> None:
         gymnasium.make_vec(DISK, count, "vector_entry_point", **SMALL)
 
 
-@pytest.mark.parametrize("limit", [None, -1])
-def test_no_limit_is_no_truncation(limit: int | None) -> None:
-    assert native(max_episode_steps=limit).unwrapped.max_episode_steps is None
+@pytest.mark.parametrize(("limit", "steps"), [(None, 500), (-1, None), (7, 7)])
+def test_a_limit_is_that_of_the_id_or_none_or_as_given(limit: int | None, steps: int | None) -> None:
+    assert native(max_episode_steps=limit).unwrapped.max_episode_steps == steps
 
 
 WRONG_SEEDS: list[tuple[Any, str]] = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import Circuit, SensorModel
+from spikecam_env.sensor import CATALOGUE, Circuit, SensorModel
 
 PRESETS = ("ideal", "scsim", "physical")
 
@@ -79,3 +79,9 @@ def test_what_is_wrong_is_named_with_what_is_allowed(tmp_path) -> None:
             SensorModel.from_toml(path)
     with pytest.raises(InputError, match="cannot read model file"):
         SensorModel.from_toml(tmp_path / "absent.toml")
+
+
+@pytest.mark.parametrize("effect", ["dead_time", CATALOGUE["dead_time"], None, {"tau_us": 1.0}])
+def test_what_is_no_effect_is_refused(effect: object) -> None:
+    with pytest.raises(InputError, match=r"effect = .* give an instance of its class"):
+        SensorModel.preset("scsim").with_effect(effect)  # type: ignore[arg-type]
