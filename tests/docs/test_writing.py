@@ -61,6 +61,12 @@ def test_no_line_of_code_is_longer_than_the_article_shows(page: Path) -> None:
     assert not lines, f"python -m tools.code_width {page.relative_to(ROOT)}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_the_size_at_which_code_is_tested_replaces_words_that_are_in_it(page: Path) -> None:
+    for block in blocks_of(page.read_text(encoding="utf-8")):
+        assert block.small or not block.code
+
+
 def test_wrapped_code_says_the_same() -> None:
     """Words of a command line, and the syntax tree of Python, stay as they were; what fits stays too."""
     line = "spikecam film clip.mp4 --film-rate 1000 --transfer linear --mean-interval 6 --out clip.h5  # 'a' clip"
