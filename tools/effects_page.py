@@ -1,6 +1,8 @@
-"""The catalogue of effects as a page, made from the effects' own declarations.
+"""The catalogue of effects as pages, made from the effects' own declarations.
 
-python -m tools.effects_page docs/effects.md
+    python -m tools.effects_page docs/effects.md
+
+writes the table of all effects there, and the law of each to `docs/effects/STAGE.md`.
 """
 
 from __future__ import annotations
@@ -8,6 +10,7 @@ from __future__ import annotations
 import inspect
 import sys
 from dataclasses import MISSING, Field, fields
+from pathlib import Path
 from typing import Any
 
 from spikecam_env.sensor.effect_sheet import Sheet
@@ -18,23 +21,39 @@ from spikecam_env.sensor.unit import LEAST_SHARE, MOST_KAPPA, MOST_SPREAD, SWING
 from spikecam_env.whole import write_text_whole
 
 
-def page() -> str:
-    """The whole page, Markdown."""
+def pages() -> dict[str, str]:
+    """Markdown of every page by its path from docs: the table of all effects, and a page for each stage."""
     stages = {stage: [e for e in CATALOGUE.values() if e.stage is stage] for stage in Stage}
-    chapters = (_chapter(stage, of) for stage, of in stages.items())
-    return "\n".join([_HEAD, _contents(stages), _camera(), *chapters, _TAIL])
+    table = "\n".join([_HEAD, _table(stages), _camera(), _TAIL, _toctree()])
+    return {"effects.md": table, **{path_of(stage): _chapter(stage, of) for stage, of in stages.items()}}
 
 
 def main() -> None:
-    """Write the page to the file named on the command line; it appears whole."""
-    if len(sys.argv) != 2:
+    """Write the pages beside the file named on the command line; each appears whole."""
+    if len(sys.argv) != 2 or Path(sys.argv[1]).name != "effects.md":
         raise SystemExit("usage: python -m tools.effects_page docs/effects.md")
-    write_text_whole(sys.argv[1], page())
+    docs = Path(sys.argv[1]).parent
+    (docs / "effects").mkdir(exist_ok=True)
+    for path, text in pages().items():
+        write_text_whole(docs / path, text)
 
 
-def _contents(stages: dict[Stage, list[type[Effect]]]) -> str:
-    rows = [f"| {_title(stage)} | {', '.join(f'[{e.name}](#{e.name})' for e in of)} |" for stage, of in stages.items()]
-    return "\n".join(["| stage | effects |", "|---|---|", *rows, ""])
+def path_of(stage: Stage) -> str:
+    """Path of a stage's page from docs."""
+    return f"effects/{stage.name.lower()}.md"
+
+
+def _table(stages: dict[Stage, list[type[Effect]]]) -> str:
+    rows = [
+        f"| [{_title(stage)}]({path_of(stage)}) | [`{e.name}`]({path_of(stage)}#{e.name}) | {Sheet.of(e).summary} |"
+        for stage, of in stages.items()
+        for e in of
+    ]
+    return "\n".join(["| stage | effect | summary |", "|---|---|---|", *rows, ""])
+
+
+def _toctree() -> str:
+    return "\n".join(["```{toctree}", ":hidden:", "", *(path_of(stage)[:-3] for stage in Stage), "```", ""])
 
 
 def _camera() -> str:
@@ -43,7 +62,7 @@ def _camera() -> str:
 
 
 def _chapter(stage: Stage, effects: list[type[Effect]]) -> str:
-    return "\n".join([f"## {_title(stage).capitalize()}", "", *map(_entry, effects)])
+    return "\n".join([f"# {_title(stage).capitalize()}", "", _CHAPTER, *map(_entry, effects)])
 
 
 def _entry(effect: type[Effect]) -> str:
@@ -51,7 +70,7 @@ def _entry(effect: type[Effect]) -> str:
     said = [f"- {name}: {text}" for name, text in sheet.sections.items() if name != "Stage"]
     return "\n".join(
         [
-            f"### {effect.name}",
+            f"## {effect.name}",
             "",
             sheet.summary,
             "",
@@ -102,12 +121,16 @@ most {MOST_SPREAD:g} of the swing, that of capacitances {MOST_SPREAD:g} of the c
 
 _HEAD = """# Effects
 
-Effects act in physical order, in whatever order a model lists them. x is the charge of a frame over the threshold phi,
-T the mean interval in frames, N the electrons to a threshold, kappa the relative noise of a spike's threshold; A_k is
-E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of spike times t. Each entry states the strength at which no bit changes.
+Effects act in physical order, in whatever order a model lists them. The page of a stage has the law of each effect, its
+parameters, its twins and its source; [adding an effect](#adding-an-effect) is below.
 
-This page is made by `python -m tools.effects_page docs/effects.md` from the effects' files in
-`spikecam_env/sensor/effects`, and a test compares it with them: edit those files, not the page.
+This page and those of the stages are made by `python -m tools.effects_page docs/effects.md` from the effects' files in
+`spikecam_env/sensor/effects`, and a test compares them: edit those files, not the pages.
+"""
+
+_CHAPTER = """x is the charge of a frame over the threshold phi, T the mean interval in frames, N the electrons to a
+threshold, kappa the relative noise of a spike's threshold; A_k is E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of spike times t.
+Each entry states the strength at which no bit changes. [Effects](../effects.md) has the table of all.
 """
 
 _TAIL = '''## Adding an effect
@@ -164,9 +187,9 @@ class SlowShutter(Effect):
 ```
 
 Nothing else is needed. The catalogue finds the file; `SensorModel.with_effect(CATALOGUE["slow_shutter"](tau_us=200.0))`
-and `[[effect]]` in a model file accept it; `engine="auto"` picks an engine that supports it; and this page gets its
-entry when it is made again. `acts` declares how the effect acts within a frame, and its docstring states the accuracy:
-charge is integrated over the frame, not sampled at its middle. `now.start` is the start of each frame, and
+and `[[effect]]` in a model file accept it; `engine="auto"` picks an engine that supports it; and the pages get its
+entry when they are made again. `acts` declares how the effect acts within a frame, and its docstring states the
+accuracy: charge is integrated over the frame, not sampled at its middle. `now.start` is the start of each frame, and
 `spikecam_env/sensor/frame_moments.py` has closed forms. With `wants_rise = True` a `Charge` holds the rise of light
 within the frame, and a frame with keys inside is given piece by piece. `off_the_line` returns an effect's error in such
 a frame; beyond 1 % the frame is refused.

@@ -11,6 +11,7 @@ every document that has a place for them.
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import tempfile
 import time
@@ -31,6 +32,7 @@ from spikecam_env.gap.report.reproduce import version_of_code
 from spikecam_env.version import __version__
 from spikecam_env.whole import check_file, whole_file, write_text_whole
 from tools.figure_blocks import filled, ladder_block, ladder_short_block, page_block, short_block
+from tools.page_blocks import PAGES as PAGES_OF_DOCS
 from tools.page_reading import read_page
 
 REPOSITORY = Path(__file__).parents[1]
@@ -159,9 +161,7 @@ def done_by_command(words: Sequence[str]) -> None:
 
 def documents() -> list[Path]:
     """Where blocks of figures stand."""
-    return [
-        p for p in (REPOSITORY / "README.md", *sorted(DOCS.glob("*.md"))) if "<!-- figures:" in p.read_text("utf-8")
-    ]
+    return [p for p in PAGES_OF_DOCS if re.search("^<!-- figures: ", p.read_text("utf-8"), re.MULTILINE)]
 
 
 def all_blocks() -> dict[str, str]:

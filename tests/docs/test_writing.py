@@ -11,7 +11,7 @@ import pytest
 
 from tools import code_width, diagnosis_figure
 from tools.code_width import WIDTH
-from tools.page_blocks import TEXT, blocks_of, command_lines
+from tools.page_blocks import TEXT, blocks_of, command_lines, without_code
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -22,8 +22,11 @@ LENGTHS = {
     **{f"docs/howto/add_{what}.md": 50 for what in ("an_effect", "a_scene", "a_statistic", "a_task")},
     **{f"docs/tutorials/{page.name}": 95 for page in TUTORIALS},
     "docs/explanation/diagnosis.md": 100,
+    "docs/results.md": 60,
 }
 """Most lines of a page, whose code has 88 columns."""
+LONG = 3000
+"""Words of a page from which on a list of its contents stands on top: ten minutes of reading and more."""
 MOST_BYTES = 100_000
 """Of a tutorial's picture."""
 UNUSABLE = {
@@ -41,12 +44,27 @@ def test_a_page_is_short(page: str, most: int) -> None:
     assert lines <= most
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_a_long_page_begins_with_links_to_all_its_chapters(page: Path) -> None:
+    text = without_code(page.read_text(encoding="utf-8"))
+    top, *chapters = re.split(r"^## ", text, flags=re.MULTILINE)
+    words = len(text.split())
+    print(f"{page.name}: {words} words, {len(chapters)} chapters")
+    assert words < LONG or top.count("](#") == len(chapters)
+
+
 @pytest.mark.parametrize("page", PAGES[1:], ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_no_line_of_code_is_longer_than_the_article_shows(page: Path) -> None:
     blocks = blocks_of(page.read_text(encoding="utf-8"))
     lines = {f"{block.line + i}: {line}" for block in blocks if block.kind != TEXT
              for i, line in enumerate(block.code.splitlines()) if len(line) > WIDTH}  # fmt: skip
     assert not lines, f"python -m tools.code_width {page.relative_to(ROOT)}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_the_size_at_which_code_is_tested_replaces_words_that_are_in_it(page: Path) -> None:
+    for block in blocks_of(page.read_text(encoding="utf-8")):
+        assert block.small or not block.code
 
 
 def test_wrapped_code_says_the_same() -> None:

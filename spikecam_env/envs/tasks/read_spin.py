@@ -30,7 +30,7 @@ class ReadSpin(Task):
     Action: seven numbers in [-1, 1]: pan, tilt, say, and one for each speed. A say above 0 gives an answer: the speed
         with the largest number. An answer counts if the disc's centre is within 1/8 side of the picture's middle as
         the step begins, and is ignored otherwise. A step is 40 frames (1 ms).
-    Reward: "progress" (see `envs.task`); 10 more for the right answer, and 10 / 3 less for a wrong one.
+    Reward: "progress" as of `Track`; 10 more for the right answer, and 10 / 3 less for a wrong one.
     End: terminated by the right answer; truncated after 250 steps. A wrong answer locks answers for a third of these.
     Success: the right answer. Performance: share of the time that is left then, less 1/3 for each wrong answer. So a
         guess is worth nothing on average, or less (formula scoring: 1 / (answers - 1) for a wrong answer).

@@ -233,14 +233,16 @@ def test_every_effect_has_a_test_of_its_own() -> None:
     assert not missing, f"no test_<name>_... in tests/sensor/effects for {', '.join(missing)}"
 
 
-def test_page_of_effects_is_up_to_date() -> None:
-    shipped = (Path(__file__).parents[3] / "docs" / "effects.md").read_text(encoding="utf-8")
-    assert shipped == effects_page.page(), "run: python -m tools.effects_page docs/effects.md"
+def test_pages_of_effects_are_up_to_date() -> None:
+    docs = Path(__file__).parents[3] / "docs"
+    found = [docs / "effects.md", *(docs / "effects").glob("*.md")]
+    shipped = {page.relative_to(docs).as_posix(): page.read_text(encoding="utf-8") for page in found}
+    assert shipped == effects_page.pages(), "run: python -m tools.effects_page docs/effects.md"
 
 
 def test_effect_of_the_page_on_adding_one_works(tmp_path, monkeypatch) -> None:
     """The example of docs/effects.md, run as a file: from frame 0 the light comes on as 1 - exp(-t/tau)."""
-    code = re.findall(r"```python\n(.*?)```", effects_page.page(), flags=re.DOTALL)[-1]
+    code = re.findall(r"```python\n(.*?)```", effects_page.pages()["effects.md"], flags=re.DOTALL)[-1]
     (tmp_path / "slow_shutter.py").write_text(code, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     slow_shutter = importlib.import_module("slow_shutter").SlowShutter
