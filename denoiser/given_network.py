@@ -17,6 +17,9 @@ from denoiser.stream_network import StreamDnSS
 from denoiser.threads import where_torch_can
 from spikecam_env.errors import InputError, OwnCodeError
 
+COMPILED, PARALLEL = "_orig_mod.", "module."
+"""Prefixes that torch.compile and DataParallel give the names of a network's weights."""
+
 
 def check_network(recipe: Any, network: Any) -> None:
     """Refuse what is no network of this recipe, or cannot compute.
@@ -39,9 +42,8 @@ def check_network(recipe: Any, network: Any) -> None:
     with torch.device("meta"):
         own = recipe.network()
     weights = network.state_dict()
-    if type(network) is type(own):
-        _check_sizes(weights, own.state_dict())
-    elif isinstance(network, DnSS | StreamDnSS) and not isinstance(network, type(own)):
+    _check_sizes(weights, own.state_dict())
+    if isinstance(network, DnSS | StreamDnSS) and not isinstance(network, type(own)):
         raise InputError(f"network is a {type(network).__name__}, the recipe's is a {type(own).__name__}; give its own")
     where_torch_can(lambda: _check_values(weights))
 
@@ -86,8 +88,9 @@ def _check_values(weights: dict[str, Any]) -> None:
 
 
 def _check_sizes(weights: dict[str, Any], own: dict[str, Any]) -> None:
-    for name, tensor in weights.items():
-        if name in own and tensor.shape != own[name].shape:
+    for full_name, tensor in weights.items():
+        name = full_name.removeprefix(COMPILED).removeprefix(PARALLEL)
+        if name in own and getattr(tensor, "shape", None) != own[name].shape:
             raise InputError(
                 f"network is of another recipe: {name} is {tuple(tensor.shape)}, of this recipe "
                 f"{tuple(own[name].shape)}; give the recipe that `load_weights` returns with the network"

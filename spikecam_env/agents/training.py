@@ -186,5 +186,16 @@ ALONG = "along"
 
 
 def agents_along(out: Path) -> dict[int, Path]:
-    """Files of the agents that `train_agent` kept on the way, by their steps, in order."""
+    """Files of the agents that `train_agent` kept on the way, by their steps, in order.
+
+    Args:
+        out: folder of the run.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from spikecam_env.agents.ppo import PPO
+        >>> agent = train_agent(Study("Catch-v1"), Path("run"), PPO(steps=64, rollout=16), environments=2, points=2)
+        >>> list(agents_along(Path("run")))
+        [32, 64]
+    """
     return {int(path.stem): path for path in sorted((out / ALONG).glob(f"*{ENDING}"))}

@@ -88,6 +88,7 @@ def _with(network: nn.Module, value: float) -> nn.Module:
 REFUSED = {
     "of one plane": (lambda n: RECIPES["paper"].network(), "network is a DnSS, the recipe's is a StreamDnSS"),
     "smaller": (lambda n: RECIPES["fast"].network(), r"another recipe: stem.0.weight is \(32.*of this recipe \(64"),
+    "compiled smaller": (lambda n: torch.compile(RECIPES["fast"].network()), "another recipe: stem.0.weight is"),
     "without values": (lambda n: copy.deepcopy(n).to("meta"), "stem.0.weight is on the device meta"),
     "NaN": (lambda n: _with(n, np.nan), "out.bias holds values that are not finite"),
     "infinite": (lambda n: _with(n, np.inf), "out.bias holds values that are not finite"),
