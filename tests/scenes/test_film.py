@@ -473,7 +473,7 @@ def test_a_film_of_one_picture_is_refused(tmp_path: Path) -> None:
         (np.zeros((2, 4, 4), np.uint8), {"channel": "red"}, "the pictures are grey"),
         (np.zeros((2, 4, 4), np.uint8), {"channel": "pink"}, "unknown channel"),
         (np.zeros((2, 4, 4), np.uint8), {"interpolation": "cubic"}, "unknown interpolation"),
-        (np.zeros((2, 4, 4), np.uint8), {"mean_interval": 0.5}, "mean_interval is 0.5"),
+        (np.zeros((2, 4, 4), np.uint8), {"mean_interval": 0.5}, "mean_interval = 0.5; it must be a number from 1"),
         (np.zeros((2, 4, 4), np.uint8), {"shape": (0, 4)}, "shape is"),
         (np.zeros((2, 4, 4), np.uint8), {"seconds": float("nan")}, "seconds is nan"),
     ],
