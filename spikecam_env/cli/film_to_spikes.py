@@ -67,7 +67,7 @@ class FilmToSpikes:
 
     def run(self) -> None:
         from scenes import VideoScene
-        from spikecam_env.cli.recording import check_out, record_scene, truth_frames
+        from spikecam_env.cli.recording import check_out, lit_frames, record_scene
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
 
@@ -91,7 +91,7 @@ class FilmToSpikes:
         check_out(self.out, frames, self.size)
         attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
         attributes |= {"film": self.film.name, "transfer": scene.transfer, "gain": scene.gain}
-        truth, what = truth_frames(self.out, frames, self.truth_every), f"record {self.film.name}"
+        truth, what = lit_frames(self.out, frames, self.truth_every), f"record {self.film.name}"
         spikes = record_scene(self.out, scene, sensor, frames, what, attributes, truth)
         self._warn_if_off(frames * math.prod(self.size), spikes)
         done = self._done(scene, frames, sensor.engine, spikes)

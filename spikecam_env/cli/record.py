@@ -36,7 +36,7 @@ class Record:
 
     def run(self) -> None:
         from spikecam_env.cli.named_scene import scene_named
-        from spikecam_env.cli.recording import check_out, record_scene, truth_frames
+        from spikecam_env.cli.recording import check_out, lit_frames, record_scene
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
 
@@ -45,7 +45,7 @@ class Record:
         sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
         scene = scene_named(self.scene, self.size, self.seed, model.frame_rate_hz, self.rpm)
         attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
-        truth = truth_frames(self.out, self.frames, self.truth_every)
+        truth = lit_frames(self.out, self.frames, self.truth_every)
         spikes = record_scene(self.out, scene, sensor, self.frames, f"record {self.scene}", attributes, truth)
         rate = spikes / (self.frames * math.prod(self.size))
         print(table([{"file": str(self.out), "frames": self.frames, "engine": sensor.engine, "spikes/frame": rate}]))

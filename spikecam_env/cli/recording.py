@@ -21,7 +21,7 @@ BLOCK = 64
 HDF5 = (".h5", ".hdf5")
 
 
-def truth_frames(out: Path, frames: int, every: int | None) -> range:
+def lit_frames(out: Path, frames: int, every: int | None) -> range:
     """Frames of a recording whose true light is kept.
 
     Args:
@@ -29,9 +29,11 @@ def truth_frames(out: Path, frames: int, every: int | None) -> range:
         frames: Its length.
         every: Frames between two; 0: none; None: the frame in the middle, where there is room.
     """
+    from spikecam_env.datasets.write import truth_frames
+
     if every is None:
         return range(frames // 2, frames // 2 + 1) if out.suffix.lower() in HDF5 else range(0)
-    return range(0, frames, every) if every else range(0)
+    return truth_frames(every, 0, frames)
 
 
 def check_out(out: Path, frames: int, shape: tuple[int, int], truth_every: int | None = 0) -> None:

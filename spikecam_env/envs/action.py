@@ -10,9 +10,6 @@ import numpy as np
 from spikecam_env.envs.motor import cut
 from spikecam_env.errors import InputError, shown
 
-NUMBERS = {1: "one finite number", 2: "two finite numbers", 3: "three finite numbers"}
-"""Counts as messages have them; others are figures."""
-
 
 def checked_action(action: Any, count: int, names: str = "") -> list[float]:
     """The numbers of an action, cut to [-1, 1].
@@ -38,7 +35,14 @@ def checked_action(action: Any, count: int, names: str = "") -> list[float]:
     except (TypeError, ValueError, RuntimeError):  # ragged lists, tensors elsewhere
         given, numbers = np.empty(0), []
     if given.shape != (count,) or len(numbers) != count or not all(map(isfinite, numbers)):
-        wanted = NUMBERS.get(count, f"{count} finite numbers")
+        wanted = finite_numbers(count)
         form = "" if given.shape == (count,) else f", of shape ({count},)"
         raise InputError(f"action is {shown(action)}; it must be {wanted} in [-1, 1]{form}{names and f', {names}'}")
     return [cut(number, 1.0) for number in numbers]
+
+
+def finite_numbers(count: int) -> str:
+    """So many finite numbers, in the words of a message."""
+    return {1: "one finite number", 2: "two finite numbers", 3: "three finite numbers"}.get(
+        count, f"{count} finite numbers"
+    )

@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from spikecam_env.checked import LARGEST_SEED, checked_count, checked_seed
+from spikecam_env.envs.action import finite_numbers
 from spikecam_env.envs.reset_options import as_dictionary
 from spikecam_env.errors import InputError, shown, unknown_name
 
@@ -170,17 +171,13 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     finite = np.isfinite(given).all(axis=tuple(range(1, given.ndim)))
     if not finite.all():
         n = int(finite.argmin())
-        raise InputError(f"actions[{n}] = {shown(given[n].tolist())}; it must be {_finite(shape[1])} in [-1, 1]")
+        raise InputError(f"actions[{n}] = {shown(given[n].tolist())}; it must be {finite_numbers(shape[1])} in [-1, 1]")
     return given
 
 
 def _on_host(values: Any) -> NDArray[Any]:
     """An array, of tensors too, wherever they are."""
     return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
-
-
-def _finite(count: int) -> str:
-    return {1: "one finite number", 2: "two finite numbers"}.get(count, f"{count} finite numbers")
 
 
 def _checked_mask(mask: Any, count: int) -> NDArray[np.bool_]:
